@@ -1,0 +1,73 @@
+"""Errors that a user can act on: what was found, where, what was expected, what to do.
+
+Every error that Kinertia raises on purpose derives from `KinertiaError` and carries the data of its message as
+attributes. The command line prints the message as one line and exits with status 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+
+class KinertiaError(Exception):
+    """Base of all errors raised on purpose; `str(error)` is one complete sentence for the user."""
+
+
+class FileError(KinertiaError):
+    """A file is missing, unreadable, or not what its name says.
+
+    Attributes:
+        path: the file.
+        line: one-based line number where the trouble was found, or None.
+        problem: what was found, what was expected and what to do.
+    """
+
+    def __init__(self, path: str | Path, problem: str, line: int | None = None) -> None:
+        self.path = Path(path)
+        self.line = line
+        self.problem = problem
+        where = f"{self.path}" if line is None else f"{self.path}, line {line}"
+        super().__init__(f"{where}: {problem}")
+
+
+class MarkerSetError(KinertiaError):
+    """A marker set does not fit the labels of a trial.
+
+    Attributes:
+        missing: what is missing (labels or landmarks).
+        nearest: for each missing item, the labels of the trial that look most like it.
+    """
+
+    def __init__(self, problem: str, missing: Sequence[str] = (), nearest: dict[str, list[str]] | None = None):
+        self.missing = tuple(missing)
+        self.nearest = dict(nearest or {})
+        super().__init__(problem)
+
+
+class TrialError(KinertiaError):
+    """A trial cannot be used: no overlap of forces and markers, no measured frame, a marker lost, NaN in forces.
+
+    Attributes:
+        trial: the trial's name.
+        problem: what was found, what was expected and what to do.
+    """
+
+    def __init__(self, trial: str, problem: str) -> None:
+        self.trial = trial
+        self.problem = problem
+        super().__init__(f"trial '{trial}': {problem}")
+
+
+class SubjectError(KinertiaError):
+    """A subject's mass, height or sex is missing or cannot be true.
+
+    Attributes:
+        field: the field's name (`mass_kg`, `height_m`, `sex`).
+        value: what was given.
+    """
+
+    def __init__(self, field: str, value: object, problem: str) -> None:
+        self.field = field
+        self.value = value
+        super().__init__(f"{field} = {value}: {problem}")
