@@ -1,0 +1,396 @@
+"""Body segment parameters (BSPs): one table, its views, and the vector of parameters that is estimated.
+
+A rigid segment has ten inertial parameters: mass, three coordinates of the centre of mass (CoM), six elements
+of the inertia tensor. Biomechanics states the tensor about the CoM, in the segment frame; the equations of
+motion are linear in another ten, the *dynamic parameters*: the first moment m c replaces the CoM, and the
+tensor is about the origin of the segment frame. `BodySegmentParameters` holds the former and shows the
+latter.
+
+ixy, ixz and iyz are elements of the tensor, ixy = -integral of x y dm, as in OpenSim, URDF and Pinocchio, not
+"products of inertia" of the opposite sign.
+
+Left and right are told by the suffixes `_l` and `_r`. Axes are x anterior, y up, z to the body's right on
+both sides (ISB): the left segment is the right one mirrored in the x-y plane; com_z, ixz and iyz change sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+FloatArray = npt.NDArray[np.float64]
+
+PARAMETERS = ("mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+"""Order of the ten in `BodySegmentParameters.table` and in files; the first seven are the study's."""
+
+UNITS = ("kg", "m", "m", "m") + 6 * ("kg m2",)
+"""Unit of each of `PARAMETERS`."""
+
+MIRROR_SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
+"""Factor on each of `PARAMETERS` that turns a right segment into a left one."""
+
+_TABLE_ROWS, _TABLE_COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # ixx iyy izz ixy ixz iyz
+_PIN_ROWS, _PIN_COLUMNS = [0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]  # Ixx Ixy Iyy Ixz Iyz Izz
+_STUDY = 7  # parameters per segment in the study: PARAMETERS[:7]
+
+
+@dataclass(frozen=True, eq=False)
+class BodySegmentParameters:
+    """Inertial parameters of `s` segments, each in its own segment frame.
+
+    Physically impossible values (a negative mass) are allowed, because an estimator passes through them;
+    `inconsistencies` names them.
+
+    Attributes:
+        segments: unique names, `s` of them; a left/right pair is `<name>_l` and `<name>_r`.
+        mass_kg: (s,) masses, kg.
+        com_m: (s, 3) centres of mass from the segment's origin, m.
+        inertia_kgm2: (s, 3, 3) symmetric inertia tensors about the segment's CoM, kg m2.
+
+    Raises:
+        ValueError: wrong shape, a name twice, a value that is not finite, or a tensor that is not symmetric.
+    """
+
+    segments: tuple[str, ...]
+    mass_kg: FloatArray
+    com_m: FloatArray
+    inertia_kgm2: FloatArray
+
+    def __post_init__(self) -> None:
+        segments = tuple(self.segments)
+        if len(set(segments)) != len(segments):
+            raise ValueError(f"segment names must be unique: {', '.join(segments)}")
+        object.__setattr__(self, "segments", segments)
+        for name, shape in (("mass_kg", ()), ("com_m", (3,)), ("inertia_kgm2", (3, 3))):
+            array = np.array(getattr(self, name), dtype=float)
+            expected = (len(segments), *shape)
+            if array.shape != expected:
+                raise ValueError(f"{name} has shape {array.shape}; {expected} was expected")
+            for segment, values in zip(segments, array, strict=True):
+                if not np.isfinite(values).all():
+                    raise ValueError(f"{name} of segment '{segment}' is not finite")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        for segment, inertia in zip(segments, self.inertia_kgm2, strict=True):
+            if not np.allclose(inertia, inertia.T, rtol=0.0, atol=1e-9 * np.abs(inertia).max()):
+                raise ValueError(f"inertia_kgm2 of segment '{segment}' is not symmetric")
+
+    @property
+    def total_mass_kg(self) -> float:
+        """Sum of the segments' masses, kg."""
+        return float(self.mass_kg.sum())
+
+    def table(self) -> FloatArray:
+        """(s, 10) values in the order of `PARAMETERS`, SI units."""
+        moments = self.inertia_kgm2[:, _TABLE_ROWS, _TABLE_COLUMNS]
+        return np.column_stack([self.mass_kg, self.com_m, moments])
+
+    @classmethod
+    def from_table(cls, segments: Sequence[str], table: npt.ArrayLike) -> BodySegmentParameters:
+        """Inverse of `table`."""
+        values = _rows(segments, table)
+        inertia = _tensors(values[:, 4:], _TABLE_ROWS, _TABLE_COLUMNS)
+        return cls(tuple(segments), values[:, 0], values[:, 1:4], inertia)
+
+    def dynamic_parameters(self) -> FloatArray:
+        """(10 s,) parameters in which the equations of motion are linear, segment after segment.
+
+        Pinocchio's order (`pin.Inertia.toDynamicParameters`): m, m c_x, m c_y, m c_z (kg m), then Ixx, Ixy,
+        Iyy, Ixz, Iyz, Izz (kg m2) about the SEGMENT ORIGIN: I_origin = I_com + m (c.c 1 - c c^T).
+        """
+        inertia = self.inertia_kgm2 + _point_mass_inertia(self.mass_kg, self.com_m)
+        moments = inertia[:, _PIN_ROWS, _PIN_COLUMNS]
+        return np.column_stack([self.mass_kg, self.mass_kg[:, None] * self.com_m, moments]).ravel()
+
+    @classmethod
+    def from_dynamic_parameters(
+        cls, segments: Sequence[str], parameters: npt.ArrayLike
+    ) -> BodySegmentParameters:
+        """Inverse of `dynamic_parameters`; a segment without mass gets its CoM at its origin.
+
+        Raises:
+            ValueError: wrong number of parameters, or a first moment without a mass.
+        """
+        values = _rows(segments, parameters)
+        mass, first_moment = values[:, 0], values[:, 1:4]
+        for segment, m, moment in zip(segments, mass, first_moment, strict=True):
+            if m == 0.0 and moment.any():
+                raise ValueError(f"segment '{segment}' has a first moment but no mass")
+        com = first_moment / np.where(mass == 0.0, 1.0, mass)[:, None]
+        inertia = _tensors(values[:, 4:], _PIN_ROWS, _PIN_COLUMNS) - _point_mass_inertia(mass, com)
+        return cls(tuple(segments), mass, com, inertia)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Long table with columns segment, parameter, unit, value; ten rows per segment (`PARAMETERS`)."""
+        s = len(self.segments)
+        return pd.DataFrame(
+            {
+                "segment": np.repeat(np.array(self.segments, dtype=object), len(PARAMETERS)),
+                "parameter": PARAMETERS * s,
+                "unit": UNITS * s,
+                "value": self.table().ravel(),
+            }
+        )
+
+    @classmethod
+    def from_frame(cls, frame: pd.DataFrame) -> BodySegmentParameters:
+        """Inverse of `to_frame`; rows may come in any order, segments keep the order of their first row.
+
+        Raises:
+            ValueError: a column, segment parameter or unit is missing, unknown or given twice.
+        """
+        columns = ("segment", "parameter", "unit", "value")
+        if missing := [column for column in columns if column not in frame.columns]:
+            raise ValueError(f"the table of body segment parameters lacks the column(s) {', '.join(missing)}")
+        units = dict(zip(PARAMETERS, UNITS, strict=True))
+        values: dict[str, dict[str, float]] = {}
+        for segment, parameter, unit, value in zip(*(frame[column] for column in columns), strict=True):
+            row = values.setdefault(segment, {})
+            if parameter not in units:
+                raise ValueError(f"{segment}: '{parameter}' is none of {', '.join(PARAMETERS)}")
+            if unit != units[parameter]:
+                raise ValueError(f"{segment}: {parameter} is in '{unit}'; give it in '{units[parameter]}'")
+            if parameter in row:
+                raise ValueError(f"{segment}: {parameter} is given twice")
+            row[parameter] = float(value)
+        for segment, row in values.items():
+            absent = [parameter for parameter in PARAMETERS if parameter not in row]
+            if absent:
+                raise ValueError(f"{segment}: {', '.join(absent)} missing")
+        return cls.from_table(tuple(values), [[row[p] for p in PARAMETERS] for row in values.values()])
+
+    def pseudo_inertia(self) -> FloatArray:
+        """(s, 4, 4) pseudo-inertia matrices [[S, m c], [m c^T, m]]; S = integral of x x^T dm at the origin.
+
+        They are positive definite exactly when the parameters belong to a body of positive density (Wensing,
+        Kim & Slotine 2018, IEEE RA-L 3:60). Units: kg m2 (S), kg m, kg.
+        """
+        first_moment = self.mass_kg[:, None] * self.com_m
+        pseudo = np.empty((len(self.segments), 4, 4))
+        pseudo[:, :3, :3] = (
+            _second_moments(self.inertia_kgm2) + first_moment[:, :, None] * self.com_m[:, None, :]
+        )
+        pseudo[:, :3, 3] = pseudo[:, 3, :3] = first_moment
+        pseudo[:, 3, 3] = self.mass_kg
+        return pseudo
+
+    def physically_consistent(self) -> npt.NDArray[np.bool_]:
+        """(s,) whether mass > 0 and pseudo-inertia positive definite: a body of positive density exists."""
+        return np.array([not self._problems(i) for i in range(len(self.segments))], dtype=bool)
+
+    def inconsistencies(self) -> list[str]:
+        """One sentence for each physical condition that a segment violates; empty if all are consistent."""
+        return [
+            f"{name}: {problem}." for i, name in enumerate(self.segments) for problem in self._problems(i)
+        ]
+
+    def _problems(self, i: int) -> list[str]:
+        # about the CoM: the pseudo-inertia is positive definite about one point or else about none
+        problems = [] if self.mass_kg[i] > 0 else [f"mass is {self.mass_kg[i]:.4g} kg, not positive"]
+        moments = dict(zip(("ixx", "iyy", "izz"), np.diag(self.inertia_kgm2[i]), strict=True))
+        bad = [f"{name} is {v:.4g} kg m2, not positive" for name, v in moments.items() if not v > 0]
+        for a, b, c in (("ixx", "iyy", "izz"), ("iyy", "izz", "ixx"), ("izz", "ixx", "iyy")):
+            excess = moments[c] - moments[a] - moments[b]
+            if not excess < 0:
+                bad.append(f"triangle inequality {a} + {b} > {c} violated by {excess:.4g} kg m2")
+        smallest = np.linalg.eigvalsh(_second_moments(self.inertia_kgm2[i]))[0]
+        if not bad and not smallest > 0:
+            bad.append(
+                "ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by "
+                f"{-2 * smallest:.4g} kg m2"
+            )
+        return problems + bad
+
+    def mirrored(self) -> BodySegmentParameters:
+        """The body's mirror image, with the same names in the same order.
+
+        Every segment takes the values of its partner (`_r` <-> `_l`; a segment without partner is its own),
+        with com_z, ixz and iyz changed in sign.
+        """
+        return self.from_table(self.segments, self.table()[_partners(self.segments)] * MIRROR_SIGNS)
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterVector:
+    """The study's unknowns theta: mass, com_x, com_y, com_z, ixx, iyy, izz of every segment or every pair.
+
+    Principal axes lie along the segment axes: ixy, ixz, iyz are not in theta and keep the reference's values
+    (zero in the study). Under symmetry a pair counts once, as its right segment, and everything on the left
+    mirrors the right, the fixed ixy, ixz, iyz too. Twelve segments give 84 parameters, or 49 under symmetry.
+
+    Attributes:
+        reference: gives the segments, their order, and ixy, ixz, iyz.
+        symmetric: whether left mirrors right.
+
+    Raises:
+        ValueError: under symmetry two would share a name (`hand_r`, `hand_l` and also `hand`).
+    """
+
+    reference: BodySegmentParameters
+    symmetric: bool
+
+    def __post_init__(self) -> None:
+        if len(set(self.names)) != len(self.names):
+            raise ValueError(f"parameter names are not unique: {', '.join(self.names)}")
+
+    @cached_property
+    def _is_left(self) -> npt.NDArray[np.bool_]:
+        # (s,) segments whose values mirror their partner's
+        segments = self.reference.segments
+        paired = _partners(segments) != np.arange(len(segments))
+        return np.array(
+            [self.symmetric and p and n.endswith("_l") for n, p in zip(segments, paired, strict=True)]
+        )
+
+    @cached_property
+    def _group(self) -> npt.NDArray[np.intp]:
+        # (s,) which seven of theta a segment takes
+        own = np.cumsum(~self._is_left) - 1
+        return np.where(self._is_left, own[_partners(self.reference.segments)], own)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """`<segment>.<parameter>` for every element of theta; a pair drops its suffix ("thigh.mass")."""
+        mirrored = set(self._group[self._is_left])
+        groups = []
+        for name, group, left in zip(self.reference.segments, self._group, self._is_left, strict=True):
+            if not left:
+                groups.append(name[:-2] if group in mirrored else name)
+        return tuple(f"{group}.{parameter}" for group in groups for parameter in PARAMETERS[:_STUDY])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of every element of theta."""
+        return UNITS[:_STUDY] * (len(self.names) // _STUDY)
+
+    @property
+    def lower_bounds(self) -> FloatArray:
+        """Lower bounds of theta: 0 for masses (kg) and moments (kg m2), -inf for CoM coordinates (m)."""
+        return np.tile([0.0, -np.inf, -np.inf, -np.inf, 0.0, 0.0, 0.0], len(self.names) // _STUDY)
+
+    def values(self, bsp: BodySegmentParameters) -> FloatArray:
+        """Theta of these body segment parameters; under symmetry the mean of the right and the mirrored left.
+
+        Raises:
+            ValueError: the segments are not those of the reference.
+        """
+        return self._symmetrised(bsp)[~self._is_left, :_STUDY].ravel()
+
+    def bsp(self, theta: npt.ArrayLike) -> BodySegmentParameters:
+        """Body segment parameters with this theta; the left mirrors the right under symmetry."""
+        table = self._symmetrised(self.reference)
+        table[:, :_STUDY] = self._grouped(theta) * self._signs
+        return BodySegmentParameters.from_table(self.reference.segments, table)
+
+    def jacobian(self, theta: npt.ArrayLike) -> FloatArray:
+        """(10 s, len(names)) derivative of `bsp(theta).dynamic_parameters()` with respect to theta."""
+        values = self._grouped(theta) * self._signs
+        blocks = _dynamic_parameter_derivatives(values[:, 0], values[:, 1:4]) * self._signs[:, None, :]
+        jacobian = np.zeros((len(blocks), 10, len(self.names) // _STUDY, _STUDY))
+        jacobian[np.arange(len(blocks)), :, self._group, :] = blocks
+        return jacobian.reshape(10 * len(blocks), len(self.names))
+
+    @cached_property
+    def _signs(self) -> FloatArray:
+        # (s, 7) factors from a segment's seven of theta to its own parameters
+        return np.where(self._is_left[:, None], MIRROR_SIGNS[:_STUDY], 1.0)
+
+    def _grouped(self, theta: npt.ArrayLike) -> FloatArray:
+        # (s, 7) each segment's elements of theta
+        vector = np.asarray(theta, dtype=float)
+        if vector.shape != (len(self.names),):
+            raise ValueError(f"theta has shape {vector.shape}; ({len(self.names)},) was expected")
+        return vector.reshape(-1, _STUDY)[self._group]
+
+    def _symmetrised(self, bsp: BodySegmentParameters) -> FloatArray:
+        # (s, 10) table in which, under symmetry, pairs are the mean of either side and the mirrored other
+        if bsp.segments != self.reference.segments:
+            raise ValueError(
+                f"segments {bsp.segments} are not those of the reference {self.reference.segments}"
+            )
+        table = bsp.table()
+        if self.symmetric:
+            paired = _partners(bsp.segments) != np.arange(len(bsp.segments))
+            table[paired] = 0.5 * (table[paired] + bsp.mirrored().table()[paired])
+        return table
+
+
+def combine(
+    mass_kg: npt.ArrayLike, com_m: npt.ArrayLike, inertia_kgm2: npt.ArrayLike
+) -> tuple[float, FloatArray, FloatArray]:
+    """Join `n` bodies, given in one frame, rigidly into one.
+
+    Args:
+        mass_kg: (n,) masses, kg.
+        com_m: (n, 3) centres of mass, m.
+        inertia_kgm2: (n, 3, 3) tensors, each about its own body's CoM, kg m2.
+
+    Returns:
+        Mass (kg), centre of mass (3,) (m) and tensor (3, 3) about that centre of mass (kg m2).
+
+    Raises:
+        ValueError: the total mass is not positive.
+    """
+    mass, com, inertia = (np.asarray(a, dtype=float) for a in (mass_kg, com_m, inertia_kgm2))
+    total = float(mass.sum())
+    if not total > 0:
+        raise ValueError(f"bodies of total mass {total} kg have no common centre of mass")
+    centre = mass @ com / total
+    return total, centre, (inertia + _point_mass_inertia(mass, com - centre)).sum(axis=0)
+
+
+def _partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:
+    """(s,) index of each segment's `_l`/`_r` partner, or its own."""
+    index = {name: i for i, name in enumerate(segments)}
+    other = {"_r": "_l", "_l": "_r"}
+    return np.array(
+        [index.get(name[:-2] + other.get(name[-2:], ""), i) for name, i in index.items()], dtype=np.intp
+    )
+
+
+def _rows(segments: Sequence[str], values: npt.ArrayLike) -> FloatArray:
+    array = np.asarray(values, dtype=float)
+    if array.size != 10 * len(segments):
+        raise ValueError(
+            f"{array.size} values were given; ten for each of {len(segments)} segments were expected"
+        )
+    return array.reshape(len(segments), 10)
+
+
+def _tensors(moments: FloatArray, rows: list[int], columns: list[int]) -> FloatArray:
+    tensors = np.empty((len(moments), 3, 3))
+    tensors[:, rows, columns] = tensors[:, columns, rows] = moments
+    return tensors
+
+
+def _point_mass_inertia(mass: FloatArray, position: FloatArray) -> FloatArray:
+    """(n, 3, 3) inertia about the origin of point masses (n,) at positions (n, 3)."""
+    squares = np.einsum("ni,ni->n", position, position)
+    return mass[:, None, None] * (
+        squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :]
+    )
+
+
+def _second_moments(inertia: FloatArray) -> FloatArray:
+    """(..., 3, 3) integrals of x x^T dm from inertia tensors about the same point."""
+    return 0.5 * np.trace(inertia, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - inertia
+
+
+def _dynamic_parameter_derivatives(mass: FloatArray, com: FloatArray) -> FloatArray:
+    """(s, 10, 7) derivative of a segment's dynamic parameters by its mass, CoM and three moments."""
+    derivative = np.zeros((len(mass), 10, _STUDY))
+    derivative[:, 0, 0] = 1.0
+    derivative[:, 1:4, 0] = com
+    derivative[:, 4:, 0] = _point_mass_inertia(np.ones_like(mass), com)[:, _PIN_ROWS, _PIN_COLUMNS]
+    for k, unit in enumerate(np.eye(3)):
+        derivative[:, 1 + k, 1 + k] = mass
+        outer = com[:, :, None] * unit
+        tensor = 2.0 * com[:, k, None, None] * np.eye(3) - outer - outer.transpose(0, 2, 1)
+        derivative[:, 4:, 1 + k] = (mass[:, None, None] * tensor)[:, _PIN_ROWS, _PIN_COLUMNS]
+    derivative[:, [4, 6, 9], [4, 5, 6]] = 1.0
+    return derivative

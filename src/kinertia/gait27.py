@@ -1,0 +1,200 @@
+"""The 14-segment, 27-DOF gait model (DESIGN section 4), built from a static trial.
+
+Four open chains leave the pelvis: hip (3), knee (1), ankle (2: talocrural and subtalar, with a massless talus between), back
+(3), shoulder (2), elbow (1). Twelve of the fourteen segments carry mass. Signs are OpenSim's (Rajagopal): flexion of
+hip, knee and elbow, dorsiflexion, adduction, internal rotation and inversion are positive; hip, knee and
+shoulder angles are zero when segments are aligned, the ankle's when foot and shank are square.
+
+Eight more axes are locked unless they are calibrated (`calibration.py`): the shoulder centres in the torso, and the axial
+rotation of the upper arm and of the forearm, which this model does not move but which differ between a T-pose and walking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinertia import joint_centres as jc
+from kinertia.marker_set import MarkerSet
+from kinertia.skeleton import Axis, Joint, Marker, Skeleton
+from kinertia.trial import Recording
+
+SHOULDER_OFFSETS = tuple(f"shoulder_{axis}_{side}" for side in "rl" for axis in "xyz")
+ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", "pro_sup"))
+
+_X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Gait27:
+    """The model of one person.
+
+    Attributes:
+        skeleton: 27 free coordinates; markers at their places in the static trial.
+        lengths: m, what the anthropometric tables scale with: `pelvis_width`, and per segment the distance between its
+            joint centres (`torso` to the cervical joint, `foot_r` from ankle to metatarsals, `heel_toe_r` along the foot).
+        lumbar_in_pelvis, mid_hip_in_pelvis: (3,) m.
+    """
+
+    skeleton: Skeleton
+    lengths: Mapping[str, float]
+    lumbar_in_pelvis: np.ndarray
+    mid_hip_in_pelvis: np.ndarray
+
+
+def build_gait27(
+    static: Recording, marker_set: MarkerSet, height_m: float, sex: str, hip_centre: str = "bell"
+) -> Gait27:
+    """Segment frames, joint centres and axes, and marker positions in their segments, from a static trial.
+
+    Args:
+        static: a person standing; arms hanging or raised. Feet flat on the ground.
+        marker_set: which label is which landmark, and which marker moves with which segment.
+        height_m: stature, for lengths that markers do not show (head, and the torso without C7).
+        sex: "male" or "female", for the lumbar and cervical joints.
+        hip_centre: "bell" (1990) or "harrington" (2007).
+
+    Raises:
+        MarkerSetError: a landmark that a joint needs is missing; names the joint and the nearest labels.
+    """
+    marks = jc.find_landmarks(static, marker_set)
+    pelvis, origin, width, depth = jc.pelvis_frame(marks)
+    frames = {"pelvis": (pelvis, origin)}
+    joints = [_root()]
+    lengths = {"pelvis_width": width}
+    hips = {side: jc.hip_in_pelvis(width, depth, hip_centre, side) for side in "rl"}
+    for side in "rl":
+        joints += _leg(marks, frames, lengths, hips[side], side)
+    lumbar = jc.lumbar_in_pelvis(width, sex)
+    joints.append(Joint("pelvis", "torso", np.eye(3), lumbar, _gimbal("lumbar_", "extension bending rotation".split())))
+    at = origin + pelvis @ lumbar
+    torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
+    frames["torso"] = (torso, at)
+    locked = dict.fromkeys(SHOULDER_OFFSETS, 0.0)
+    for side in "rl":
+        joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, side)
+    mid_hip = (hips["r"] + hips["l"]) / 2
+    lengths["pelvis"] = float(np.linalg.norm(lumbar - mid_hip))
+    skeleton = Skeleton("gait27", tuple(joints), _markers(static, marker_set, frames), locked)
+    return Gait27(skeleton, lengths, lumbar, mid_hip)
+
+
+def _root() -> Joint:
+    axes = [Axis(f"pelvis_t{name}", "translation", d) for name, d in zip("xyz", (_X, _Y, _Z), strict=True)]
+    turns = zip(("tilt", "list", "rotation"), (_Z, _X, _Y), strict=True)
+    axes += [Axis(f"pelvis_{name}", "rotation", d) for name, d in turns]
+    return Joint("ground", "pelvis", np.eye(3), np.zeros(3), tuple(axes))
+
+
+def _gimbal(prefix: str, names: list[str], suffix: str = "", side: str = "r") -> tuple[Axis, ...]:
+    directions = (np.array(_Z), *(jc.mirrored_axis(np.array(d), side) for d in (_X, _Y)))
+    return tuple(
+        Axis(f"{prefix}{name}{suffix}", "rotation", tuple(map(float, d)))
+        for name, d in zip(names, directions, strict=False)
+    )
+
+
+def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    return Rotation.from_rotvec(np.asarray(axis) * angle).as_matrix()
+
+
+def _pin(parent: str, child: str, at: np.ndarray, relative: np.ndarray, axis: Axis, angle: float) -> Joint:
+    """A pin joint that puts the child at orientation `relative` in the parent when its coordinate is `angle`."""
+    return Joint(parent, child, relative @ _turn(np.array(axis.direction), angle).T, at, (axis,))
+
+
+def _axis(coordinate: str, direction: np.ndarray) -> Axis:
+    unit = direction / np.linalg.norm(direction)
+    return Axis(coordinate, "rotation", tuple(map(float, unit)))
+
+
+def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side: str) -> list[Joint]:
+    pelvis, origin = frames["pelvis"]
+    hip_at = origin + pelvis @ hip
+    knee_at, knee_axis = jc.knee(marks, hip_at, side)
+    thigh = jc.frame(hip_at - knee_at, knee_axis)
+    marks.require(f"ankle_{side}", f"ankle_lateral_{side}")
+    rough = jc.frame(knee_at - marks[f"ankle_lateral_{side}"], thigh[:, 2])
+    ankle_at, _ = jc.ankle(marks, knee_at, rough, side)
+    shank = jc.frame(knee_at - ankle_at, thigh[:, 2])
+    _, ankle_axis = jc.ankle(marks, knee_at, shank, side)
+    foot, heel_to_metatarsals = jc.foot_frame(marks, side)
+    lengths[f"thigh_{side}"] = float(np.linalg.norm(hip_at - knee_at))
+    lengths[f"shank_{side}"] = float(np.linalg.norm(knee_at - ankle_at))
+    lengths[f"foot_{side}"] = float(np.linalg.norm(marks[f"metatarsal_{side}"] - ankle_at))
+    lengths[f"heel_toe_{side}"] = heel_to_metatarsals
+    drop = jc.subtalar_in_talus(heel_to_metatarsals)
+    frames[f"thigh_{side}"] = (thigh, hip_at)
+    frames[f"shank_{side}"] = (shank, knee_at)
+    frames[f"foot_{side}"] = (foot, ankle_at + foot @ drop)
+
+    in_thigh = thigh.T @ shank
+    flexion = np.arctan2(in_thigh[0, 1], in_thigh[1, 1])
+    knee_pin = _axis(f"knee_angle_{side}", -(shank.T @ thigh[:, 2]))
+    in_shank = shank.T @ foot
+    dorsiflexion = np.arctan2(in_shank[1, 0], in_shank[0, 0])
+    ankle_pin = _axis(f"ankle_angle_{side}", foot.T @ ankle_axis)
+    subtalar_pin = _axis(f"subtalar_angle_{side}", jc.subtalar_axis(side))
+    down = np.array([0.0, -1.0, 0.0])
+    hip_axes = _gimbal("hip_", ["flexion", "adduction", "rotation"], f"_{side}", side)
+    return [
+        Joint("pelvis", f"thigh_{side}", np.eye(3), hip, hip_axes),
+        _pin(f"thigh_{side}", f"shank_{side}", lengths[f"thigh_{side}"] * down, in_thigh, knee_pin, flexion),
+        _pin(f"shank_{side}", f"talus_{side}", lengths[f"shank_{side}"] * down, in_shank, ankle_pin, dorsiflexion),
+        Joint(f"talus_{side}", f"foot_{side}", np.eye(3), drop, (subtalar_pin,)),
+    ]
+
+
+def _arm(
+    marks: jc.Landmarks, frames: dict, lengths: dict, locked: dict, shoulder: np.ndarray, height_m: float, side: str
+) -> list[Joint]:
+    torso, torso_at = frames["torso"]
+    elbow_at, wrist_at, elbow_axis = jc.arm(marks, shoulder, torso, height_m, side)
+    upper = jc.frame(shoulder - elbow_at, elbow_axis)
+    lower = jc.frame(elbow_at - wrist_at, upper[:, 2])
+    frames[f"upper_arm_{side}"] = (upper, shoulder)
+    frames[f"forearm_{side}"] = (lower, elbow_at)
+    lengths[f"upper_arm_{side}"] = float(np.linalg.norm(shoulder - elbow_at))
+    lengths[f"forearm_{side}"] = float(np.linalg.norm(elbow_at - wrist_at))
+
+    angles = Rotation.from_matrix(torso.T @ upper).as_euler("ZXY")
+    locked[f"arm_rot_{side}"] = float(angles[2] if side == "r" else -angles[2])
+    locked[f"pro_sup_{side}"] = 0.0
+    in_upper = upper.T @ lower
+    flexion = np.arctan2(-in_upper[0, 1], in_upper[1, 1])
+    elbow_pin = _axis(f"elbow_flex_{side}", lower.T @ upper[:, 2])
+    offsets = tuple(
+        Axis(f"shoulder_{name}_{side}", "translation", d) for name, d in zip("xyz", (_X, _Y, _Z), strict=True)
+    )
+    shoulder_axes = offsets + _gimbal("arm_", ["flex", "add", "rot"], f"_{side}", side)
+    elbow = _pin(
+        f"upper_arm_{side}",
+        f"forearm_{side}",
+        np.array([0.0, -lengths[f"upper_arm_{side}"], 0.0]),
+        in_upper,
+        elbow_pin,
+        flexion,
+    )
+    twist = Axis(f"pro_sup_{side}", "rotation", tuple(map(float, jc.mirrored_axis(np.array(_Y), side))))
+    return [
+        Joint("torso", f"upper_arm_{side}", np.eye(3), torso.T @ (shoulder - torso_at), shoulder_axes),
+        Joint(elbow.parent, elbow.child, elbow.rotation, elbow.translation, (elbow_pin, twist)),
+    ]
+
+
+def _markers(static: Recording, marker_set: MarkerSet, frames: dict) -> tuple[Marker, ...]:
+    positions = static.markers.positions
+    seen = np.isfinite(positions).all(axis=-1)
+    column = {label: i for i, label in enumerate(static.markers.labels)}
+    placed = []
+    for segment, labels in marker_set.segments.items():
+        rotation, origin = frames[segment]
+        for label in labels:
+            if label in column and seen[:, column[label]].any():
+                i = column[label]
+                at = np.median(positions[seen[:, i], i], axis=0)
+                placed.append(Marker(label, segment, rotation.T @ (at - origin)))
+    return tuple(placed)

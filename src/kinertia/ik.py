@@ -1,0 +1,235 @@
+"""Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
+
+For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
+once, by Gauss-Newton steps with an analytic Jacobian. Frames are independent problems, so they are computed together: one
+Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over every tenth frame gives the warm start of all
+the others.
+
+The normal matrix of a tree of markers is the mass matrix of the same tree with a unit mass at every marker, and is built
+the same way: per segment one 6 x 6 matrix of its markers, summed over what each coordinate carries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from kinertia.errors import MarkerSetError, TrialError
+from kinertia.skeleton import Pose, Skeleton
+from kinertia.trial import Markers
+
+_WARM_START_EVERY = 10
+_MAX_STEPS = 60
+_STEP_TOLERANCE = 1e-5
+"""Rad or m; the step below it is still taken and leaves an error some twenty times smaller."""
+_UNINFORMED_RAD_PER_M = 60.0
+"""A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
+
+
+@dataclass(frozen=True)
+class InverseKinematics:
+    """Result of `solve_ik`.
+
+    Attributes:
+        time: (n,) s.
+        coordinates: names, in the order of the columns of q.
+        q: (n, c) rad and m; NaN where the visible markers do not determine the coordinate.
+        labels: the markers used.
+        errors_m: (n, m) distance between measured and model marker; NaN where not visible.
+        converged: (n,) False where the iteration stopped at its limit.
+    """
+
+    time: np.ndarray
+    coordinates: tuple[str, ...]
+    q: np.ndarray
+    labels: tuple[str, ...]
+    errors_m: np.ndarray
+    converged: np.ndarray
+
+    @property
+    def marker_rms_m(self) -> float:
+        """Root mean square of the marker distances over all visible markers and frames."""
+        return rms(self.errors_m)
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square over everything that is not NaN."""
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def solve_ik(skeleton: Skeleton, markers: Markers, start: np.ndarray | None = None) -> InverseKinematics:
+    """All coordinates at every frame, by least squares on all visible markers.
+
+    Args:
+        skeleton: the model; its markers and those of the trial are matched by label.
+        markers: measured markers.
+        start: (c,) coordinates to start from; zero if not given. The root is placed on the pelvis markers in any case.
+
+    Raises:
+        MarkerSetError: fewer than three root markers of the skeleton are in the trial.
+        TrialError: no frame has three visible root markers.
+    """
+    used = [m for m in skeleton.markers if m.label in markers.labels]
+    model = skeleton.with_markers(used)
+    measured = markers.positions[:, [markers.labels.index(m.label) for m in used]]
+    q = np.tile(np.zeros(len(model.coordinates)) if start is None else start, (len(measured), 1))
+    q[:, :6], placed = _place_root(model, measured)
+    if not placed.any():
+        raise TrialError(
+            "markers", "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers"
+        )
+    fine = np.flatnonzero(placed)
+    coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
+    q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse])
+    q_coarse[:, model.rotational] = np.unwrap(q_coarse[:, model.rotational], axis=0)
+    q[fine] = PchipInterpolator(coarse, q_coarse)(fine) if len(coarse) > 1 else q_coarse
+    converged = np.zeros(len(q), dtype=bool)
+    q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine])
+    errors = np.full(measured.shape[:2], np.nan)
+    modelled = model.marker_positions(model.pose(q[fine]))
+    errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
+    q[~placed] = np.nan
+    q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
+    return InverseKinematics(markers.time, model.coordinates, _unwrap(q, model), model.labels, errors, converged)
+
+
+def _unwrap(q: np.ndarray, model: Skeleton) -> np.ndarray:
+    for c in np.flatnonzero(model.rotational):
+        seen = np.isfinite(q[:, c])
+        q[seen, c] = np.unwrap(q[seen, c])
+    return q
+
+
+def _place_root(model: Skeleton, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root coordinates (n, 6) by fitting the root segment to its markers, and (n,) whether three were visible."""
+    root = np.flatnonzero(model.marker_segments == 0)
+    if len(root) < 3:
+        raise MarkerSetError(
+            f"the trial has {len(root)} of the markers on the {model.segments[0]}; at least 3 are needed",
+            missing=[m.label for m in model.markers if m.segment == model.segments[0]],
+        )
+    here, there = model.marker_locals[root], measured[:, root]
+    seen = np.isfinite(there).all(axis=-1)
+    placed = seen.sum(axis=1) >= 3
+    weight = (seen / np.maximum(seen.sum(axis=1, keepdims=True), 1))[..., None]
+    there = np.nan_to_num(there)
+    mean_here = (weight * here).sum(axis=1)
+    mean_there = (weight * there).sum(axis=1)
+    covariance = np.einsum("nmi,nmj->nij", weight * (there - mean_there[:, None]), here - mean_here[:, None])
+    u, _, vt = np.linalg.svd(covariance)
+    flip = np.ones((len(u), 3))
+    flip[:, 2] = np.sign(np.linalg.det(u @ vt))
+    rotation = (u * flip[:, None, :]) @ vt
+    q = np.zeros((len(measured), 6))
+    q[:, :3] = mean_there - (rotation @ mean_here[..., None])[..., 0]
+    q[:, 3] = np.arctan2(-rotation[:, 0, 1], rotation[:, 1, 1])
+    q[:, 4] = np.arcsin(np.clip(rotation[:, 2, 1], -1.0, 1.0))
+    q[:, 5] = np.arctan2(-rotation[:, 2, 0], rotation[:, 2, 2])
+    return q, placed
+
+
+def _gauss_newton(
+    model: Skeleton, measured: np.ndarray, q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Minimise the squared marker distances frame by frame; returns q (n, c), (n,) converged, J^T J (n, c, c).
+
+    Steps are damped (Levenberg) per frame: a step that makes the fit worse is taken back and the damping raised.
+    """
+    q = q.copy()
+    n = len(q)
+    damping = np.full(n, 1e-6)
+    best = np.full(n, np.inf)
+    accepted = q.copy()
+    step = np.zeros_like(q)
+    converged = np.zeros(n, dtype=bool)
+    active = np.arange(n)
+    normal = np.zeros((n, q.shape[1], q.shape[1]))
+    gradient = np.zeros_like(q)
+    above = _ancestor_of(model)
+    for _ in range(_MAX_STEPS):
+        h, g, cost = _normal_equations(model, above, measured[active], model.pose(q[active]))
+        better = cost <= best[active] * (1 + 1e-12)
+        up = active[better]
+        best[up], accepted[up] = cost[better], q[up]
+        normal[up], gradient[up] = h[better], g[better]
+        damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
+        damping[active[~better]] *= 100.0
+        step[active] = _damped_step(normal[active], gradient[active], damping[active])
+        small = np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE
+        done = active[small]
+        converged[done] = True
+        accepted[done] += step[done]
+        active = active[~small]
+        if not active.size:
+            break
+        q[active] = accepted[active] + step[active]
+    return accepted, converged, normal
+
+
+def _damped_step(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    c = normal.shape[-1]
+    scale = np.einsum("nii->n", normal) / c
+    damped = normal + (damping * scale)[:, None, None] * np.eye(c)
+    return np.linalg.solve(damped, gradient[..., None])[..., 0]
+
+
+def _normal_equations(
+    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model."""
+    positions = model.marker_positions(pose)
+    residual = measured - positions
+    seen = np.isfinite(residual).all(axis=-1)
+    residual = np.where(seen[..., None], residual, 0.0)
+    per_segment = np.zeros((len(model.segments), len(model.markers)))
+    per_segment[model.marker_segments, np.arange(len(model.markers))] = 1.0
+    wrench = per_segment @ np.concatenate([residual, np.cross(positions, residual)], axis=-1)
+    support = model.support.astype(float)
+    blocks = _marker_blocks(positions, seen.astype(float), per_segment)
+    n, c = len(measured), support.shape[1]
+    carried = (support.T @ blocks.reshape(n, -1, 36)).reshape(n, c, 6, 6)
+    columns = pose.jacobian.transpose(0, 2, 1)
+    moved = (carried @ columns[..., None])[..., 0]
+    upper = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
+    normal = upper + np.triu(upper, 1).transpose(0, 2, 1)
+    gradient = np.einsum("ncd,ncd->nc", columns, support.T @ wrench)
+    return normal, gradient, np.square(residual).sum(axis=(1, 2))
+
+
+def _ancestor_of(model: Skeleton) -> np.ndarray:
+    """(c, c) True where coordinate i is coordinate j or moves it (parents come first, so this is upper triangular)."""
+    tree = model.model
+    above = np.zeros((tree.nv, tree.nv), dtype=bool)
+    for joint in range(1, tree.njoints):
+        above[[i - 1 for i in tree.supports[joint] if i > 0], joint - 1] = True
+    return above
+
+
+def _marker_blocks(positions: np.ndarray, weight: np.ndarray, per_segment: np.ndarray) -> np.ndarray:
+    """(n, s, 6, 6): sum over a segment's markers of B^T B with B = [1, -[x]]: how a twist moves them."""
+    x = positions * weight[..., None]
+    sums = per_segment @ np.concatenate([weight[..., None], x], axis=-1)
+    outer = per_segment @ (x[..., :, None] * positions[..., None, :]).reshape(*x.shape[:2], 9)
+    outer = outer.reshape(*outer.shape[:2], 3, 3)
+    blocks = np.zeros((*outer.shape[:2], 6, 6))
+    blocks[..., :3, :3] = sums[..., :1, None] * np.eye(3)
+    skew = _skew(sums[..., 1:])
+    blocks[..., :3, 3:] = -skew
+    blocks[..., 3:, :3] = skew
+    blocks[..., 3:, 3:] = np.einsum("nsii->ns", outer)[..., None, None] * np.eye(3) - outer
+    return blocks
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    zero = np.zeros(v.shape[:-1])
+    rows = [[zero, -v[..., 2], v[..., 1]], [v[..., 2], zero, -v[..., 0]], [-v[..., 1], v[..., 0], zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _uninformed(normal: np.ndarray) -> np.ndarray:
+    """(n, c) True where the visible markers do not determine the coordinate, from J^T J (n, c, c)."""
+    c = normal.shape[-1]
+    deviation = np.sqrt(np.einsum("ncc->nc", np.linalg.inv(normal + 1e-9 * np.eye(c))))
+    return deviation > _UNINFORMED_RAD_PER_M

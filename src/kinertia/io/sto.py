@@ -1,0 +1,127 @@
+"""STO and MOT files: OpenSim's tables of columns over time, as text."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kinertia.errors import FileError
+from kinertia.io.rows import read_lines, read_rows
+
+_ROW_KEYS = ("nrows", "datarows")
+_COLUMN_KEYS = ("ncolumns", "datacolumns")
+
+
+def read_sto(path: str | Path) -> pd.DataFrame:
+    """Read a table, indexed by time (s), in the file's own units.
+
+    Returns:
+        one column per quantity; `attrs["in_degrees"]` is True, False or, where the header does not say, None.
+
+    Raises:
+        FileError: the file is missing or is not a complete, consistent STO or MOT file; with the line.
+    """
+    path = Path(path)
+    lines = read_lines(path)
+    end = next((number for number, line in enumerate(lines, start=1) if line.strip().lower() == "endheader"), None)
+    if end is None:
+        raise FileError(path, "not a STO or MOT file: no line 'endheader'; check what was exported")
+    header = _header(lines[: end - 1])
+    label_line = next((number for number in range(end + 1, len(lines) + 1) if lines[number - 1].strip()), None)
+    if label_line is None:
+        raise FileError(path, "ends after 'endheader'; expected column labels and rows, export the file again", end)
+    labels = _labels(path, lines[label_line - 1], label_line)
+    values, line_numbers = read_rows(path, lines, label_line + 1, len(labels))
+    _check_counts(path, header, len(values), len(labels))
+    time = values[:, 0]
+    if np.isnan(time).any():
+        raise FileError(path, "the row has no time", line_numbers[int(np.argmax(np.isnan(time)))])
+    table = pd.DataFrame(values[:, 1:], index=pd.Index(time, name="time"), columns=labels[1:])
+    told = header.get("indegrees")
+    table.attrs["in_degrees"] = None if told is None else told[0].lower() == "yes"
+    return table
+
+
+def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str) -> None:
+    """Write a table indexed by time (s) in the form that OpenSim 4 reads.
+
+    Args:
+        path: the file, `.sto` or `.mot`; it appears complete or not at all.
+        table: columns over time, in the units they shall have in the file.
+        in_degrees: whether angles in the table are in degrees.
+        name: first line of the file.
+    """
+    labels = ["time", *map(str, table.columns)]
+    values = np.column_stack((table.index.to_numpy(float), table.to_numpy(float))).tolist()
+    form = "\t".join(["%.17g"] * len(labels))
+    lines = [
+        name,
+        "version=1",
+        f"nRows={len(table)}",
+        f"nColumns={len(labels)}",
+        f"inDegrees={'yes' if in_degrees else 'no'}",
+        "endheader",
+        "\t".join(labels),
+        *(form % tuple(row) for row in values),
+        "",
+    ]
+    write_then_rename(Path(path), "\n".join(lines))
+
+
+def write_then_rename(path: Path, text: str) -> None:
+    """Write text so that `path` appears complete or not at all."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+
+
+def _header(lines: list[str]) -> dict[str, tuple[str, int]]:
+    """Header entries by lower-case key, each with its line; the forms are `key=value` and `key value`."""
+    entries = {}
+    for number, line in enumerate(lines, start=1):
+        parts = line.replace("=", " ").split()
+        if len(parts) == 2:
+            entries[parts[0].lower()] = (parts[1], number)
+    return entries
+
+
+def _labels(path: Path, line: str, number: int) -> list[str]:
+    cells = line.rstrip().split("\t") if "\t" in line.strip() else line.split()
+    labels = [cell.strip() for cell in cells]
+    if labels[0].lower() != "time":
+        raise FileError(path, f"the first column is '{labels[0]}', expected 'time'; export the file again", number)
+    if "" in labels:
+        raise FileError(path, f"column {labels.index('') + 1} has no label; export the file again", number)
+    repeated = [label for label, times in Counter(labels).items() if times > 1]
+    if repeated:
+        raise FileError(
+            path, f"repeated column labels {', '.join(repeated)}; expected each once, rename or remove the others", number
+        )
+    return labels
+
+
+def _check_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> None:
+    for keys, found, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns")):
+        for key in keys:
+            if key not in header:
+                continue
+            told, line = header[key]
+            if not told.isdigit() or int(told) != found:
+                raise FileError(
+                    path,
+                    f"the header announces {told} {what} but the file has {found}; export the file again or correct it",
+                    line,
+                )
+    if not rows:
+        raise FileError(path, "no rows after the column labels; export the file again")

@@ -1,0 +1,194 @@
+"""TRC files: marker trajectories as text, as Motion Analysis defined them and OpenSim uses them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.io.rows import read_lines, read_rows
+from kinertia.io.sto import write_then_rename
+from kinertia.trial import FloatArray, Markers
+
+METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+_HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
+_FIRST_ROW_LINE = 6
+_TIME_TOLERANCE_FRAMES = 0.1
+
+
+def read_trc(path: str | Path) -> Markers:
+    """Read marker trajectories (m, ground axes as in the file) from a TRC file.
+
+    Empty cells, NaN and the triple 0 0 0 are missing markers. Frame times that were rounded when written are put
+    back on the uniform grid they came from. `read_trc_with_notes` tells when either was needed.
+
+    Raises:
+        FileError: the file is missing or is not a complete, consistent TRC file; with the line.
+    """
+    return read_trc_with_notes(path)[0]
+
+
+def read_trc_with_notes(path: str | Path) -> tuple[Markers, tuple[str, ...]]:
+    """`read_trc` and the assumptions made while reading, one sentence each."""
+    path = Path(path)
+    lines = read_lines(path)
+    header = _header(path, lines)
+    labels = _labels(path, lines, _count(path, header, "NumMarkers"))
+    values, line_numbers = read_rows(path, lines, _first_row(lines), 2 + 3 * len(labels), may_be_short=True)
+    frames = _count(path, header, "NumFrames")
+    if len(values) != frames or not frames:
+        raise FileError(
+            path,
+            f"the header announces {frames} frames but the file has {len(values)}; export the file again or correct "
+            "NumFrames",
+            3,
+        )
+    time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
+    positions, position_notes = _positions(path, values[:, 2:], labels, line_numbers)
+    unit = header["Units"].lower()
+    if unit not in METRES_PER_UNIT:
+        raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
+    return Markers(time, labels, positions * METRES_PER_UNIT[unit]), (*time_notes, *position_notes)
+
+
+def write_trc(path: str | Path, markers: Markers) -> None:
+    """Write marker trajectories as a TRC file in mm (to 1e-6 mm) that OpenSim reads; a missing marker is NaN.
+
+    Raises:
+        ValueError: a label contains a tab or line end, which TRC cannot hold.
+    """
+    path = Path(path)
+    if any(set(label) & set("\t\r\n") or not label.strip() for label in markers.labels):
+        raise ValueError("TRC labels must not be blank or contain tabs or line ends")
+    n, m = len(markers.time), len(markers.labels)
+    rate = f"{markers.rate_hz if n > 1 else 1.0:.10g}"
+    rows = np.column_stack((markers.time, 1000.0 * markers.positions.reshape(n, 3 * m)))
+    form = "%d\t%.9f" + "\t%.6f" * (3 * m)
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate}\t{rate}\t{n}\t{m}\tmm\t{rate}\t1\t{n}",
+        "Frame#\tTime\t" + "\t\t\t".join(markers.labels) + "\t\t",
+        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, m + 1)),
+        "",
+        *(form % (frame, *row) for frame, row in enumerate(rows.tolist(), start=1)),
+        "",
+    ]
+    write_then_rename(path, "\n".join(lines))
+
+
+def _header(path: Path, lines: list[str]) -> dict[str, str]:
+    if not lines[0].lstrip().startswith("PathFileType"):
+        raise FileError(path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1)
+    if len(lines) < _FIRST_ROW_LINE:
+        raise FileError(
+            path, f"ends within its header after {len(lines)} lines; export it again", len(lines)
+        )
+    names, values = lines[1].split(), lines[2].split()
+    missing = [key for key in _HEADER_KEYS if key not in names]
+    if missing:
+        raise FileError(path, f"the header lacks {', '.join(missing)}; export the file again", 2)
+    if len(values) != len(names):
+        raise FileError(path, f"{len(values)} values for {len(names)} header names; export the file again", 3)
+    return dict(zip(names, values, strict=True))
+
+
+def _number(path: Path, header: dict[str, str], key: str) -> float:
+    try:
+        return float(header[key])
+    except ValueError:
+        raise FileError(path, f"{key} is '{header[key]}', expected a number; export the file again", 3) from None
+
+
+def _count(path: Path, header: dict[str, str], key: str) -> int:
+    number = _number(path, header, key)
+    if number < 0 or number != int(number):
+        raise FileError(path, f"{key} is {header[key]}, expected a whole number; export the file again", 3)
+    return int(number)
+
+
+def _labels(path: Path, lines: list[str], count: int) -> tuple[str, ...]:
+    line = lines[3]
+    cells = line.split("\t") if "\t" in line else line.split()
+    labels = tuple(cell.strip() for cell in cells if cell.strip())[2:]
+    if len(labels) != count or not count:
+        raise FileError(
+            path, f"{len(labels)} marker labels, expected {count} as NumMarkers says; correct or export it again", 4
+        )
+    repeated = [label for label, times in Counter(labels).items() if times > 1]
+    if repeated:
+        raise FileError(
+            path, f"repeated marker labels {', '.join(repeated)}; expected each once, rename or remove the others", 4
+        )
+    return labels
+
+
+def _first_row(lines: list[str]) -> int:
+    """One-based line of the first row: line 5 is X1 Y1 Z1 ..., but some writers leave it out."""
+    return _FIRST_ROW_LINE if lines[4].strip()[:1].upper() in ("X", "") else _FIRST_ROW_LINE - 1
+
+
+def _uniform_time(
+    path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
+) -> tuple[FloatArray, tuple[str, ...]]:
+    if np.isnan(time).any():
+        raise FileError(path, "the row has no time; expected it in column 2", line_numbers[int(np.argmax(np.isnan(time)))])
+    if len(time) == 1:
+        return time, ()
+    late = np.flatnonzero(np.diff(time) <= 0)
+    if late.size:
+        row = int(late[0]) + 1
+        raise FileError(
+            path, f"time {time[row]:g} s does not come after {time[row - 1]:g} s; expected time to grow", line_numbers[row]
+        )
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if abs(rate_hz * step - 1) > 0.01:
+        raise FileError(
+            path, f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz; correct the wrong one", 3
+        )
+    frames = np.arange(len(time))
+    uniform = time[0] + frames / rate_hz
+    error = np.abs(time - uniform)
+    if error.max() > _TIME_TOLERANCE_FRAMES * step:
+        uniform = time[0] + frames * step
+        error = np.abs(time - uniform)
+    off = np.flatnonzero(error > _TIME_TOLERANCE_FRAMES * step)
+    if off.size:
+        row = int(off[0])
+        raise FileError(
+            path,
+            f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s; Kinertia takes uniform "
+            "frames only, so export every frame (gaps as empty cells)",
+            line_numbers[row],
+        )
+    if error.max() <= 1e-9:
+        return time, ()
+    note = (
+        f"{path.name}: frame times are rounded by up to {1000 * error.max():.2g} ms; the uniform times of "
+        f"{1 / (uniform[1] - uniform[0]):.6g} Hz were taken instead"
+    )
+    return uniform, ((note,) if error.max() > 1e-6 else ())
+
+
+def _positions(
+    path: Path, values: FloatArray, labels: tuple[str, ...], line_numbers: list[int]
+) -> tuple[FloatArray, tuple[str, ...]]:
+    positions = values.reshape(len(values), len(labels), 3)
+    absent = np.isnan(positions)
+    partly = np.argwhere(absent.any(axis=2) & ~absent.all(axis=2))
+    if partly.size:
+        row, marker = partly[0]
+        raise FileError(
+            path,
+            f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair the row",
+            line_numbers[row],
+        )
+    zero = (positions == 0).all(axis=2)
+    if not zero.any():
+        return positions, ()
+    positions[zero] = np.nan
+    named = ", ".join(label for label, hit in zip(labels, zero.any(axis=0), strict=True) if hit)
+    return positions, (f"{path.name}: {int(zero.sum())} marker positions 0 0 0 were taken as missing ({named})",)

@@ -1,0 +1,278 @@
+"""`Skeleton`: segments, joints, coordinates and markers, as a Pinocchio model.
+
+A joint places its child segment in its parent by a constant placement followed by a list of single axes, each a
+rotation about or a translation along a fixed direction (DESIGN section 4). Every axis belongs to one coordinate and
+becomes one 1-DOF Pinocchio joint, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are
+constants: they are folded into the placements, which is how a calibrated joint-centre offset (a coordinate that
+does not move in time) or an arm rotation that no marker shows enters the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+from kinertia.bsp import BodySegmentParameters
+
+GRAVITY_M_S2 = 9.80665
+"""Standard gravity; OpenSim's default models use 9.80665 or 9.8066."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One degree of freedom of a joint: `coordinate` moves along or about `direction` (unit, in the frame so far)."""
+
+    coordinate: str
+    kind: Literal["rotation", "translation"]
+    direction: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Places segment `child` in segment `parent` ("ground" for the root).
+
+    The joint frame stands at `translation` (m) with `rotation` (3, 3) in the parent's frame; the `axes` follow in
+    order; after the last one stands the child's frame.
+    """
+
+    parent: str
+    child: str
+    rotation: np.ndarray
+    translation: np.ndarray
+    axes: tuple[Axis, ...]
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A marker fixed to a segment: `position` (3,) m in the segment's frame."""
+
+    label: str
+    segment: str
+    position: np.ndarray
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where everything is at n frames, from one Pinocchio pass per frame.
+
+    Attributes:
+        rotation: (n, s, 3, 3) segment frames in ground.
+        translation: (n, s, 3) m, segment origins in ground.
+        jacobian: (n, 6, c): column j is the spatial velocity in ground axes, at the ground origin, that coordinate j at
+            unit rate gives to what it moves: linear first, then angular.
+    """
+
+    rotation: np.ndarray
+    translation: np.ndarray
+    jacobian: np.ndarray
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Segments connected by joints, with markers on them; the first joint is the root.
+
+    Attributes:
+        name: the model's name.
+        joints: parents before children.
+        markers: all markers, in order.
+        locked: coordinates held at a constant value (rad or m).
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    markers: tuple[Marker, ...]
+    locked: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Names of all segments, root first."""
+        return tuple(joint.child for joint in self.joints)
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates that move, root first (the order of q)."""
+        return tuple(axis.coordinate for axis in self._axes if axis.coordinate not in self.locked)
+
+    @cached_property
+    def rotational(self) -> np.ndarray:
+        """(c,) True where the coordinate is an angle (rad), False where it is a length (m)."""
+        kinds = {axis.coordinate: axis.kind for axis in self._axes}
+        return np.array([kinds[name] == "rotation" for name in self.coordinates])
+
+    @property
+    def _axes(self) -> list[Axis]:
+        return [axis for joint in self.joints for axis in joint.axes]
+
+    def lock(self, values: Mapping[str, float]) -> Skeleton:
+        """The same skeleton with these coordinates held at these values (rad or m)."""
+        self._check_names(values)
+        return replace(self, locked={**self.locked, **values})
+
+    def free(self, names: Iterable[str]) -> Skeleton:
+        """The same skeleton with these coordinates moving again."""
+        names = set(names)
+        self._check_names(names)
+        return replace(self, locked={k: v for k, v in self.locked.items() if k not in names})
+
+    def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
+        """The same skeleton with other markers."""
+        return replace(self, markers=tuple(markers))
+
+    def _check_names(self, names: Iterable[str]) -> None:
+        unknown = set(names) - {axis.coordinate for axis in self._axes}
+        if unknown:
+            raise KeyError(f"no such coordinate in {self.name}: {', '.join(sorted(unknown))}")
+
+    @cached_property
+    def _built(self) -> tuple[pin.Model, dict[str, int], dict[str, pin.SE3]]:
+        """Pinocchio model without masses, the joint that carries each segment, and the segment's place in that joint."""
+        model = pin.Model()
+        model.gravity.linear = np.array([0.0, -GRAVITY_M_S2, 0.0])
+        carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
+        for joint in self.joints:
+            parent = carrier[joint.parent]
+            place = offset[joint.parent] * pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
+            for axis in joint.axes:
+                if axis.coordinate in self.locked:
+                    place = place * _motion(axis, self.locked[axis.coordinate])
+                    continue
+                parent = model.addJoint(parent, _pinocchio_joint(axis), place, axis.coordinate)
+                place = pin.SE3.Identity()
+            carrier[joint.child], offset[joint.child] = parent, place
+        return model, carrier, offset
+
+    @property
+    def model(self) -> pin.Model:
+        """The Pinocchio model, without masses."""
+        return self._built[0]
+
+    @cached_property
+    def support(self) -> np.ndarray:
+        """(s, c) True where coordinate c moves segment s."""
+        model, carrier, _ = self._built
+        moves = np.zeros((len(self.segments), model.nv), dtype=bool)
+        for i, segment in enumerate(self.segments):
+            for joint in model.supports[carrier[segment]]:
+                if joint > 0:
+                    moves[i, joint - 1] = True
+        return moves
+
+    @cached_property
+    def marker_segments(self) -> np.ndarray:
+        """(m,) index of each marker's segment."""
+        index = {name: i for i, name in enumerate(self.segments)}
+        return np.array([index[marker.segment] for marker in self.markers], dtype=int)
+
+    @cached_property
+    def marker_locals(self) -> np.ndarray:
+        """(m, 3) marker positions in their segments' frames, m."""
+        return np.array([marker.position for marker in self.markers]).reshape(-1, 3)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of all markers."""
+        return tuple(marker.label for marker in self.markers)
+
+    def pose(self, q: np.ndarray) -> Pose:
+        """Segment frames and Jacobian at the coordinates q (n, c)."""
+        model, carrier, offset = self._built
+        data = model.createData()
+        n, s = len(q), len(self.segments)
+        joints = [carrier[segment] for segment in self.segments]
+        frames = [data.oMi[j] for j in joints]
+        place = np.empty((n, s, 4, 4))
+        jacobian = np.empty((n, 6, model.nv))
+        for k in range(n):
+            jacobian[k] = pin.computeJointJacobians(model, data, q[k])
+            for i, frame in enumerate(frames):
+                place[k, i] = frame.homogeneous
+        local = np.array([offset[segment].homogeneous for segment in self.segments])
+        place = place @ local
+        return Pose(place[..., :3, :3], place[..., :3, 3], jacobian)
+
+    def marker_positions(self, pose: Pose) -> np.ndarray:
+        """(n, m, 3) m, model markers in ground at this pose."""
+        turned = pose.rotation[:, self.marker_segments] @ self.marker_locals[:, :, None]
+        return turned[..., 0] + pose.translation[:, self.marker_segments]
+
+    def model_with(self, bsp: BodySegmentParameters) -> pin.Model:
+        """A Pinocchio model that carries these body segment parameters."""
+        model = self.model.copy()
+        params = (self.placement_of_parameters(bsp.segments) @ bsp.dynamic_parameters()).reshape(-1, 10)
+        for j in range(1, model.njoints):
+            model.inertias[j] = _inertia(params[j - 1])
+        return model
+
+    def placement_of_parameters(self, segments: Sequence[str]) -> np.ndarray:
+        """(10 c, 10 s): dynamic parameters in segment frames -> dynamic parameters of the Pinocchio joints.
+
+        Linear, so it also serves the regressor: Y_segments = Y_joints @ this.
+        """
+        model, carrier, offset = self._built
+        result = np.zeros((10 * model.nv, 10 * len(segments)))
+        for i, segment in enumerate(segments):
+            j = carrier[segment] - 1
+            result[10 * j : 10 * j + 10, 10 * i : 10 * i + 10] = _moved_parameters(offset[segment])
+        return result
+
+
+def _motion(axis: Axis, value: float) -> pin.SE3:
+    direction = np.array(axis.direction)
+    if axis.kind == "translation":
+        return pin.SE3(np.eye(3), direction * value)
+    return pin.SE3(Rotation.from_rotvec(direction * value).as_matrix(), np.zeros(3))
+
+
+_ALIGNED = {
+    ("rotation", (1.0, 0.0, 0.0)): pin.JointModelRX,
+    ("rotation", (0.0, 1.0, 0.0)): pin.JointModelRY,
+    ("rotation", (0.0, 0.0, 1.0)): pin.JointModelRZ,
+    ("translation", (1.0, 0.0, 0.0)): pin.JointModelPX,
+    ("translation", (0.0, 1.0, 0.0)): pin.JointModelPY,
+    ("translation", (0.0, 0.0, 1.0)): pin.JointModelPZ,
+}
+
+
+def _pinocchio_joint(axis: Axis) -> pin.JointModel:
+    aligned = _ALIGNED.get((axis.kind, axis.direction))
+    if aligned is not None:
+        return aligned()
+    unaligned = pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
+    return unaligned(*axis.direction)
+
+
+def _inertia(params: np.ndarray) -> pin.Inertia:
+    if not params.any():
+        return pin.Inertia.Zero()
+    return pin.Inertia.FromDynamicParameters(params)
+
+
+def _moved_parameters(place: pin.SE3) -> np.ndarray:
+    """(10, 10) linear map of dynamic parameters from a frame to the frame in which it stands at `place`.
+
+    The pseudo-inertia of a body moves as J' = T J T^T (Wensing, Kim and Slotine 2018); the parameters are linear in J.
+    """
+    transform = place.homogeneous
+    columns = [_from_pseudo(transform @ _to_pseudo(unit) @ transform.T) for unit in np.eye(10)]
+    return np.array(columns).T
+
+
+def _to_pseudo(p: np.ndarray) -> np.ndarray:
+    inertia = np.array([[p[4], p[5], p[7]], [p[5], p[6], p[8]], [p[7], p[8], p[9]]])
+    pseudo = np.zeros((4, 4))
+    pseudo[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    pseudo[:3, 3] = pseudo[3, :3] = p[1:4]
+    pseudo[3, 3] = p[0]
+    return pseudo
+
+
+def _from_pseudo(pseudo: np.ndarray) -> np.ndarray:
+    inertia = np.trace(pseudo[:3, :3]) * np.eye(3) - pseudo[:3, :3]
+    i = inertia
+    return np.array([pseudo[3, 3], *pseudo[:3, 3], i[0, 0], i[0, 1], i[1, 1], i[0, 2], i[1, 2], i[2, 2]])

@@ -1,0 +1,209 @@
+"""The study's estimator: pelvis correction (inner level) and body segment parameters (outer level); DESIGN section 5.
+
+Inner level: equation (2) gives the pelvis acceleration that needs no residual at the measured state; integrated twice by the
+trapezoid rule, with the two constants per coordinate that track the measured pelvis best (linear least squares, closed form).
+Outer level: bounded nonlinear least squares on the residual P at the corrected motion, over all frames of all trials.
+
+Deviations from the study: no finite differences (the derivative is chained through (2), the integration and the fit), and
+moments are divided by the body's radius of gyration about the pelvis, so that N and N m add up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from kinertia.bsp import BodySegmentParameters, ParameterVector
+from kinertia.dynamics import (
+    Motion,
+    consistent_root_acceleration,
+    residual,
+    root_derivatives,
+    root_regressor,
+)
+from kinertia.skeleton import Skeleton
+
+_MAX_EVALUATIONS = 200
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of a trial in which every contact is measured.
+
+    Attributes:
+        time: (n,) s, uniform.
+        motion: smoothed coordinates and derivatives.
+        wrench: (n, 6) sum over both feet: force (N), moment about the ground origin (N m), ground axes.
+    """
+
+    time: np.ndarray
+    motion: Motion
+    wrench: np.ndarray
+
+    @cached_property
+    def integration(self) -> Integration:
+        """The double integration on this window's time base."""
+        return Integration(self.time)
+
+
+class Integration:
+    """Trapezoid integration, twice, with the constants that track a given trajectory best.
+
+    Linear: position = I2 a + line, velocity = I1 a + slope, with the line fitted to (measured - I2 a).
+    """
+
+    def __init__(self, time: np.ndarray) -> None:
+        self._step = np.diff(time)[:, None]
+        t = time - time.mean()
+        self._line = np.column_stack([np.ones_like(t), t])
+        self._fit = np.linalg.pinv(self._line)
+
+    def _once(self, rate: np.ndarray) -> np.ndarray:
+        flat = rate.reshape(len(rate), -1)
+        total = np.zeros_like(flat)
+        np.cumsum((flat[:-1] + flat[1:]) / 2 * self._step, axis=0, out=total[1:])
+        return total.reshape(rate.shape)
+
+    def track(self, acceleration: np.ndarray, measured: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Position and velocity (n, ...) with this acceleration, nearest to the measured position.
+
+        With `measured` zero it is the derivative of the result with respect to anything that moves the acceleration.
+        """
+        velocity = self._once(acceleration)
+        position = self._once(velocity)
+        gap = (measured - position).reshape(len(position), -1)
+        constants = self._fit @ gap
+        position = position + (self._line @ constants).reshape(position.shape)
+        return position, velocity + constants[1].reshape(velocity.shape[1:])
+
+
+@dataclass(frozen=True)
+class TwoLevelResult:
+    """Outcome of `estimate_two_level`.
+
+    Attributes:
+        bsp: the estimate.
+        motions: per window, the motion it goes with (corrected, if correction was asked for).
+        residuals: per window, (n, 6) root residual.
+        cost: half the sum of squared, scaled residuals at start and end.
+        evaluations: of the residual.
+        converged: False where the iteration stopped at its limit.
+    """
+
+    bsp: BodySegmentParameters
+    motions: tuple[Motion, ...]
+    residuals: tuple[np.ndarray, ...]
+    cost: tuple[float, float]
+    evaluations: int
+    converged: bool
+
+
+def correct_pelvis(skeleton: Skeleton, bsp: BodySegmentParameters, window: Window) -> Motion:
+    """Inner level: the motion with the pelvis that equation (2) asks for, nearest to the measured pelvis."""
+    acceleration, _ = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
+    position, velocity = window.integration.track(acceleration, window.motion.q[:, :6])
+    return window.motion.with_root(position, velocity, acceleration)
+
+
+def estimate_two_level(
+    skeleton: Skeleton,
+    start: BodySegmentParameters,
+    windows: Sequence[Window],
+    *,
+    symmetric: bool = True,
+    correct: bool = True,
+    progress: Callable[[int, float], None] | None = None,
+) -> TwoLevelResult:
+    """Outer level: the BSPs that minimise the residual P over all frames of all windows.
+
+    Args:
+        skeleton: the model.
+        start: initial BSPs; their products of inertia are kept (zero in the study).
+        windows: measured stretches of one or more trials of this person.
+        symmetric: 49 parameters, left mirroring right, instead of 84.
+        correct: with pelvis correction (equation 3) or without (equation 1 at the measured motion).
+        progress: called with the number of evaluations so far and the current cost.
+    """
+    vector = ParameterVector(start, symmetric)
+    length = _radius_of_gyration(skeleton, start, windows)
+    problem = _Problem(skeleton, vector, windows, correct, length, progress)
+    theta = vector.values(start)
+    bounds = (vector.lower_bounds + 1e-9, np.full(len(theta), np.inf))
+    begin = 0.5 * float(np.square(problem.residuals(theta)).sum())
+    fit = least_squares(
+        problem.residuals,
+        np.maximum(theta, bounds[0] + 1e-6),
+        jac=problem.jacobian,
+        bounds=bounds,
+        x_scale="jac",
+        method="trf",
+        xtol=1e-12,
+        ftol=1e-10,
+        gtol=1e-12,
+        max_nfev=_MAX_EVALUATIONS,
+    )
+    bsp = vector.bsp(fit.x)
+    motions = tuple(problem.motion(bsp, window) for window in windows)
+    loads = tuple(residual(skeleton, bsp, m, w.wrench) for m, w in zip(motions, windows, strict=True))
+    return TwoLevelResult(bsp, motions, loads, (begin, float(fit.cost)), int(fit.nfev), fit.status > 0)
+
+
+def _radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:
+    first = windows[0]
+    one = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
+    _, mass = consistent_root_acceleration(skeleton, bsp, one, first.wrench[:1])
+    return float(np.sqrt(np.trace(mass[0, 3:, 3:]) / 3 / mass[0, 0, 0]))
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Scaled residuals and their Jacobian with respect to the parameter vector."""
+
+    skeleton: Skeleton
+    vector: ParameterVector
+    windows: Sequence[Window]
+    correct: bool
+    length: float
+    progress: Callable[[int, float], None] | None
+
+    @property
+    def _scale(self) -> np.ndarray:
+        return np.repeat([1.0, 1.0 / self.length], 3)
+
+    def motion(self, bsp: BodySegmentParameters, window: Window) -> Motion:
+        return correct_pelvis(self.skeleton, bsp, window) if self.correct else window.motion
+
+    def residuals(self, theta: np.ndarray) -> np.ndarray:
+        bsp = self.vector.bsp(theta)
+        parts = [residual(self.skeleton, bsp, self.motion(bsp, w), w.wrench) * self._scale for w in self.windows]
+        flat = np.concatenate([part.ravel() for part in parts])
+        if self.progress is not None:
+            self.progress(1, 0.5 * float(flat @ flat))
+        return flat
+
+    def jacobian(self, theta: np.ndarray) -> np.ndarray:
+        bsp = self.vector.bsp(theta)
+        change = self.vector.jacobian(theta)
+        parts = [self._jacobian(bsp, change, window) for window in self.windows]
+        return np.concatenate([(part * self._scale[:, None]).reshape(-1, len(theta)) for part in parts])
+
+    def _jacobian(self, bsp: BodySegmentParameters, change: np.ndarray, window: Window) -> np.ndarray:
+        """(n, 6, k) dP / dtheta: Y dphi, and with correction also what the moved pelvis adds."""
+        if not self.correct:
+            return root_regressor(self.skeleton, bsp.segments, window.motion) @ change
+        acceleration, _ = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
+        measured = window.motion
+        balanced = measured.with_root(measured.q[:, :6], measured.qd[:, :6], acceleration)
+        at_balance = root_derivatives(self.skeleton, bsp, balanced, window.wrench)
+        shown = root_regressor(self.skeleton, bsp.segments, balanced) @ change
+        d_acceleration = -np.linalg.solve(at_balance.qdd, shown)
+        d_position, d_velocity = window.integration.track(d_acceleration)
+        position, velocity = window.integration.track(acceleration, measured.q[:, :6])
+        moved = measured.with_root(position, velocity, acceleration)
+        by = root_derivatives(self.skeleton, bsp, moved, window.wrench)
+        direct = root_regressor(self.skeleton, bsp.segments, moved) @ change
+        return direct + by.q @ d_position + by.qd @ d_velocity + by.qdd @ d_acceleration
