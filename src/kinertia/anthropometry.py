@@ -30,10 +30,6 @@ SEGMENTS = (
 """The twelve segments with mass of the 27-DOF model; torso includes the head, forearm the hand."""
 
 _DUMAS_STATURE_M = {"male": 1.77, "female": 1.61}
-_DUMAS_LENGTH_M = {  # Dumas & Wojtusch (2018), mean lengths of the reference subjects
-    "male": {"head": 0.278, "thorax": 0.334, "torso": 0.477, "foot": 0.139},
-    "female": {"head": 0.243, "thorax": 0.322, "torso": 0.429, "foot": 0.117},
-}
 _DELEVA_STATURE_M = {"male": 1.741, "female": 1.735}
 
 
@@ -57,7 +53,7 @@ class BodyGeometry:
 
 @dataclass(frozen=True)
 class _Row:
-    """A table row in ISB axes: mass / body mass; CoM / L; tensor / (m L^2); the reference subject's L, m."""
+    """A table row in ISB axes: mass / body mass; CoM / L; tensor / (m L^2); reference L (m) or NaN."""
 
     mass: float
     com: FloatArray
@@ -67,7 +63,7 @@ class _Row:
 
 @dataclass(frozen=True)
 class _Part:
-    """A row placed in the frame of a model segment, as if it were a right one: CoM = origin + com * length."""
+    """A row placed in the frame of a model segment, as if a right one: CoM = origin + com * length."""
 
     segment: str
     row: _Row
@@ -124,8 +120,8 @@ def literature_bsp(
       the belly, is de Leva's cut.
     - de Leva's foot is measured from the heel, and no table gives the ankle's place between heel and toe tip.
       The foot is placed so that for the reference feet its CoM is where Dumas has it in the sagittal plane:
-      the ankle is 17 % (male) or 21 % (female) of the foot's length before the heel, and the heel-toe axis 20
-      % (male) or 31 % (female) of `foot` below it.
+      the ankle is 0.17 (male) or 0.21 (female) of the foot's length before the heel, and the heel-toe axis
+      0.20 (male) or 0.31 (female) of `foot` below the ankle.
 
     Args:
         mass_kg: body mass, kg, 10-300.
@@ -179,10 +175,10 @@ def _check_geometry(geometry: BodyGeometry, height_m: float, source: str) -> Non
 
 
 def _dumas_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator[_Part]:
-    table, lengths, reference = _dumas_table(sex), geometry.lengths_m, _DUMAS_LENGTH_M[sex]
+    table, lengths = _dumas_table(sex), geometry.lengths_m
     torso = lengths["torso"]
-    thorax = torso * reference["thorax"] / reference["torso"]
-    head = height_m * reference["head"] / _DUMAS_STATURE_M[sex]
+    thorax = torso * table["thorax"].length_m / (table["thorax"].length_m + table["abdomen"].length_m)
+    head = height_m * table["head"].length_m / _DUMAS_STATURE_M[sex]
     lumbar = np.array(geometry.lumbar_joint_m, dtype=float)
     pelvis = float(np.linalg.norm(lumbar - geometry.mid_hip_m))
     yield _Part("pelvis", table["pelvis"], lumbar, pelvis)
@@ -206,8 +202,8 @@ def _deleva_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator
     yield _Part("torso", table["middle_trunk"], _along_y(torso - upper), middle)
     yield _Part("torso", table["upper_trunk"], _along_y(torso), upper)
     yield _Part("torso", table["head"], _along_y(torso + head), head)
-    foot, dumas, dumas_length_m = table["foot"], _dumas_table(sex)["foot"], _DUMAS_LENGTH_M[sex]["foot"]
-    heel_to_ankle = foot.com[0] - dumas.com[0] * dumas_length_m / foot.length_m
+    foot, dumas = table["foot"], _dumas_table(sex)["foot"]
+    heel_to_ankle = foot.com[0] - dumas.com[0] * dumas.length_m / foot.length_m
     for side in "rl":
         yield from _limb_parts(table, lengths, side, _hand_length(height_m, sex))
         total = lengths[f"foot_total_{side}"]
@@ -242,7 +238,7 @@ def _dumas_table(sex: str) -> dict[str, _Row]:
         xx, yy, zz, xy, xz, yz = np.sign(radii) * radii**2
         gyration = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         com = row[["com_x", "com_y", "com_z"]].to_numpy(dtype=float) / 100.0
-        table[str(name)] = _Row(row["mass"] / 100.0, com, gyration, float("nan"))
+        table[str(name)] = _Row(row["mass"] / 100.0, com, gyration, row["length"] / 1000.0)
     return table
 
 

@@ -95,7 +95,7 @@ class SmoothedSpline:
             derivative).
         cutoff_hz: (c,) Hz, frequency at which the equivalent filter's gain is 1/2.
         sigma: (c,) residual deviation in the column's unit: sqrt(RSS / (n_visible - trace A)), Woltring's
-            estimate of the noise's standard deviation.
+            estimate of the noise's standard deviation; NaN where the spline interpolates (cutoff too high).
 
     For values given as (n,) instead of (n, c) the three last are arrays of shape ().
     """
@@ -172,8 +172,9 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
             chosen = np.full(len(group), float(smoothing) * spacing)
         for f in np.unique(chosen):
             which = chosen == f
-            fitted[:, group[which]], rss, dof = system.fit(y[:, which], visible, f)
-            sigma[group[which]] = np.sqrt(rss / (visible.sum() - dof))
+            fitted[:, group[which]], rss, trace = system.fit(y[:, which], visible, f)
+            left_over = visible.sum() - trace
+            sigma[group[which]] = np.sqrt(rss / left_over) if left_over > 0 else np.nan
         cutoff[group] = chosen / spacing
     ends = [(3, np.zeros(columns.shape[1])), (4, np.zeros(columns.shape[1]))]
     spline = make_interp_spline((time - time[0]) / spacing, fitted, k=5, bc_type=(ends, ends))

@@ -58,7 +58,7 @@ class Markers:
         """Frames per second; NaN for a single frame."""
         if len(self.time) < 2:
             return float("nan")
-        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+        return round(float((len(self.time) - 1) / (self.time[-1] - self.time[0])), 9)
 
     def cut(self, start_s: float, end_s: float) -> Markers:
         """The frames with start_s <= time <= end_s."""

@@ -65,9 +65,7 @@ def read_forces_with_notes(
         table = read_sto(path)
         groups, notes = _groups_by_identifier(root, loads_path)
         _expect_columns(groups, table, path, loads_path)
-    if (np.diff(table.index) <= 0).any():
-        late = table.index[int(np.argmax(np.diff(table.index) <= 0)) + 1]
-        raise FileError(path, f"time {late:g} s does not come after the time of the row before; expected it to grow")
+    _expect_steady_time(path, table.index.to_numpy(float))
     wrenches = [_wrench(path, table, group) for group in groups]
     loads = PlateLoads(
         table.index.to_numpy(float),
@@ -77,6 +75,21 @@ def read_forces_with_notes(
         tuple(group.foot for group in groups),
     )
     return loads, (*notes, *_remarks(path, loads, groups))
+
+
+def _expect_steady_time(path: Path, time: FloatArray) -> None:
+    steps = np.diff(time)
+    if not steps.size:
+        return
+    usual = float(np.median(steps))
+    odd = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * abs(usual)))
+    if odd.size:
+        before, after = time[odd[0]], time[odd[0] + 1]
+        raise FileError(
+            path,
+            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal steps, export "
+            "the forces without gaps",
+        )
 
 
 def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArray, FloatArray]:

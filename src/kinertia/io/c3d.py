@@ -1,0 +1,238 @@
+"""C3D files: markers, force plates and the subject's measurements in one binary file, read through ezc3d.
+
+The parts of a C3D file that are only conventions are checked against the data: which axis is vertical, whether plates
+tell the force on the person or the force on the plate, whether a plate lies where its corners say.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import struct
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import ezc3d
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.io.c3d_plates import LabPlates, lab_plates, to_ground_plates
+from kinertia.io.rows import expect_file
+from kinertia.io.trc import METRES_PER_UNIT
+from kinertia.trial import FloatArray, Markers, Recording
+
+_OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+_OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
+_LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
+
+
+def read_c3d(path: str | Path) -> Recording:
+    """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
+
+    Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual points
+    (joint centres, segment origins) are kept; `subject:` prefixes are stripped; of repeated labels the first one with
+    data is kept. Time counts from the first frame of the capture, so a cropped file does not begin at zero.
+
+    Plates: types 1 to 4 (ezc3d reads no others); moment about the ground origin; samples with less than
+    `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so `plates`
+    is None when none is left.
+
+    Raises:
+        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit.
+    """
+    path = Path(path)
+    file, notes = _open(path)
+    parameters = file["parameters"]
+    unit = _metres_per_unit(path, parameters)
+    labels, positions, label_notes = _markers(path, file)
+    time = _times(file, "points")
+    plates, plate_notes = lab_plates(path, file, unit)
+    rotation, axis_notes = _to_ground(path, parameters, unit * positions, plates)
+    markers = Markers(time, labels, unit * positions @ rotation.T)
+    ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
+    mass, height, measurements, subject_notes = _subject(path, parameters)
+    notes += [*label_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
+    return Recording(path.stem, markers, ground_plates, mass, height, measurements, tuple(notes))
+
+
+def _open(path: Path) -> tuple[Any, list[str]]:
+    """The file as ezc3d holds it, with forces where ezc3d can work them out."""
+    expect_file(path)
+    with path.open("rb") as stream:
+        start = stream.read(512)
+    if not start:
+        raise FileError(path, "the file is empty; expected a C3D file, export it again")
+    if len(start) < 2 or start[1] != 0x50:
+        raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
+    notes = []
+    try:
+        file = ezc3d.c3d(str(path))
+    except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
+        raise FileError(path, f"broken or truncated C3D file ({error}); export it again") from None
+    announced, frames = _announced_frames(path, start), file["data"]["points"].shape[2]
+    if frames < announced:
+        raise FileError(path, f"truncated: its header announces {announced} frames, {frames} are there; export it again")
+    if not file["data"]["points"].shape[1]:
+        raise FileError(path, "has no points; expected marker trajectories (a file of rotations or forces alone is not enough)")
+    if _values(file["parameters"], "FORCE_PLATFORM", "USED", [0])[0]:
+        try:
+            file = ezc3d.c3d(str(path), extract_forceplat_data=True)
+        except Exception as error:  # the same, for plate types and parameters that it does not know
+            types = ", ".join(map(str, _values(file["parameters"], "FORCE_PLATFORM", "TYPE", [])))
+            notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {error}")
+    return file, notes
+
+
+def _announced_frames(path: Path, start: bytes) -> int:
+    """Number of frames by the header, which ezc3d replaces by what it finds; 0 where 16 bits do not hold it."""
+    with path.open("rb") as stream:
+        stream.seek(512 * (start[0] - 1) + 3)
+        processor = stream.read(1)
+    order = ">H" if processor == b"\x56" else "<H"
+    first, last = (struct.unpack_from(order, start, offset)[0] for offset in (6, 8))
+    return 0 if last in (0, 0xFFFF) else 1 + last - first
+
+
+def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
+    with contextlib.suppress(KeyError):
+        values = parameters[group][name]["value"]
+        if len(values):
+            return values
+    return default
+
+
+def _metres_per_unit(path: Path, parameters: Any) -> float:
+    unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
+    if unit not in METRES_PER_UNIT:
+        raise FileError(path, f"POINT:UNITS is '{unit}'; expected mm, cm or m, correct the parameter")
+    return METRES_PER_UNIT[unit]
+
+
+def _times(file: Any, kind: str) -> FloatArray:
+    """Times (s) of the marker frames ("points") or of the analog samples ("analogs")."""
+    header = file["header"]["points"]
+    start = header["first_frame"] / header["frame_rate"]
+    if kind == "points":
+        return start + np.arange(file["data"]["points"].shape[2]) / header["frame_rate"]
+    return start + np.arange(file["data"]["analogs"].shape[2]) / (file["header"]["analogs"]["frame_rate"] or 1.0)
+
+
+def _continued(parameters: Any, name: str) -> list[str]:
+    """A list of strings that goes on in NAME2, NAME3 after 255 entries."""
+    entries: list[str] = []
+    for suffix in ["", *map(str, range(2, 100))]:
+        more = _values(parameters, "POINT", name + suffix, None)
+        if more is None:
+            break
+        entries += [str(entry).strip() for entry in more]
+    return entries
+
+
+def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[str]]:
+    """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
+    positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
+    zero = (positions == 0).all(axis=2)
+    positions[zero] = np.nan
+    seen = np.isfinite(positions).all(axis=2).any(axis=0)
+    labels = _continued(file["parameters"], "LABELS")[: positions.shape[1]]
+    labels += ["*"] * (positions.shape[1] - len(labels))
+    outputs = _outputs(file["parameters"], labels)
+    unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
+    kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs]
+    names, notes = _without_prefixes(path, [labels[k] for k in kept])
+    chosen: dict[str, int] = {}
+    for k, name in zip(kept, names, strict=True):
+        if name not in chosen or (not seen[chosen[name]] and seen[k]):
+            chosen[name] = k
+    if not chosen or not seen[list(chosen.values())].any():
+        raise FileError(path, "has no markers with data among its points; expected marker trajectories, export them too")
+    if outputs:
+        notes.append(f"{path.name}: {len(outputs)} model outputs among the points were left out ({_some(sorted(outputs))})")
+    if unnamed:
+        notes.append(f"{path.name}: {len(unnamed)} unnamed points were left out")
+    repeated = [name for name, times in Counter(names).items() if times > 1]
+    if repeated:
+        notes.append(f"{path.name}: repeated labels, the first with data was kept: {_some(repeated)}")
+    zeros = int(zero[:, list(chosen.values())].sum())
+    if zeros:
+        notes.append(f"{path.name}: {zeros} marker positions 0 0 0 were taken as missing")
+    return tuple(chosen), positions[:, list(chosen.values())], notes
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+
+
+def _outputs(parameters: Any, labels: list[str]) -> set[str]:
+    groups = _values(parameters, "POINT", "TYPE_GROUPS", [])
+    lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
+    listed = {label for name in lists for label in _continued(parameters, name)}
+    return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}
+
+
+def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[str]]:
+    """Labels without `subject:`; where there are several subjects only the one with most labels loses its prefix."""
+    prefixes = Counter(label.split(":", 1)[0] for label in labels if ":" in label)
+    if not prefixes:
+        return labels, []
+    subject = prefixes.most_common(1)[0][0]
+    notes = [f"{path.name}: the prefix '{subject}:' was taken off the labels"]
+    if len(prefixes) > 1:
+        others = ", ".join(name for name in prefixes if name != subject)
+        notes = [f"{path.name}: several subjects; '{subject}:' was taken off the labels, {others} keep theirs"]
+    return [label.removeprefix(subject + ":") for label in labels], notes
+
+
+def _to_ground(path: Path, parameters: Any, positions: FloatArray, plates: LabPlates | None) -> tuple[FloatArray, list[str]]:
+    """Rotation (3, 3) from lab to ground axes, from the file's word and from the data."""
+    told = re.fullmatch(r"([+-]?)([XYZ])", str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper())
+    told_up = None if told is None else ("XYZ".index(told[2]), -1 if told[1] == "-" else 1)
+    seen = positions[np.isfinite(positions).all(axis=2).any(axis=1)]
+    extent = (np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)).mean(axis=0)
+    floor = np.zeros(3) if plates is None else plates.corners.mean(axis=(0, 1))
+    force = np.zeros(3) if plates is None else plates.loaded_direction()
+    if np.abs(force).max() > 0.8:
+        axis, why = int(np.argmax(np.abs(force))), "the plates' forces"
+    else:
+        axis, why = int(np.argmax(extent)), "the extent of the markers"
+        if told_up is not None and extent[told_up[0]] > 0.5 * extent[axis]:
+            axis = told_up[0]
+    middle = np.nanmean(seen, axis=(0, 1))[axis] - floor[axis]
+    found_up = (axis, 1 if middle >= 0 else -1)
+    rotation = _rotation(*found_up)
+    up = f"{'+-'[found_up[1] < 0]}{'XYZ'[axis]}"
+    if told_up is None:
+        return rotation, [f"{path.name}: no vertical axis given (POINT:Y_SCREEN); {up} was found from {why}"]
+    if told_up != found_up:
+        return rotation, [f"{path.name}: POINT:Y_SCREEN says {told[0]} is up but {why} say {up}; {up} was believed"]  # type: ignore[index]
+    return rotation, [] if up == "+Y" else [f"{path.name}: lab axes with {up} up were turned to Y up"]
+
+
+def _rotation(axis: int, sign: int) -> FloatArray:
+    """Rotation (3, 3) that turns the signed lab axis to +Y and keeps lab X where it can: (x, y, z) -> (x, z, -y)."""
+    up = np.zeros(3)
+    up[axis] = sign
+    forward = np.eye(3)[1 if axis == 0 else 0]
+    return np.array([forward, up, np.cross(forward, up)])
+
+
+def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[str]]:
+    """Mass (kg), height (m) and other lengths (m) from the PROCESSING group that Plug-in Gait writes."""
+    numbers: dict[str, float] = {}
+    for key in parameters["PROCESSING"] if "PROCESSING" in parameters else ():
+        value = _values(parameters, "PROCESSING", key, [""]) if key != "__METADATA__" else [""]
+        if np.size(value) == 1 and isinstance(value[0], (int, float, np.number)) and value[0] > 0:
+            numbers[key] = float(value[0])
+    by_lower = {key.lower(): value for key, value in numbers.items()}
+    mass, height = by_lower.get("bodymass"), by_lower.get("height")
+    lengths = {key: value for key, value in numbers.items() if _LENGTH_KEY.search(key)}
+    if height is None and not lengths:
+        return mass, None, {}, []
+    unit, word = 0.001, "mm"
+    if height is not None and height < 3:
+        unit, word = 1.0, "m"
+    elif height is not None and height < 300:
+        unit, word = 0.01, "cm"
+    note = f"{path.name}: the lengths in PROCESSING were taken as {word}"
+    return mass, None if height is None else unit * height, {k: unit * v for k, v in lengths.items()}, [note]

@@ -1,0 +1,135 @@
+"""Force plates of a C3D file, from what ezc3d gives to loads about the ground origin.
+
+ezc3d gives each plate's force in lab axes and, for types 2 to 4, its moment about the middle of the plate's four
+corners, also in lab axes, in units made of POINT:UNITS. For type 1 the file holds the centre of pressure and the free
+moment; ezc3d's moment has the opposite sign there, so the moment is made from those two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinertia.trial import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+
+_CORNER_LIMIT_M = 50.0
+_EDGE_LIMITS_M = (0.1, 10.0)
+_OUTSIDE_LIMIT_M = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class LabPlates:
+    """The p readable plates in lab axes, SI.
+
+    Attributes:
+        names: (p) `plate 1`, ... by the file's order.
+        force: (k, p, 3) N as in the file, on the person or on the plate.
+        moment: (k, p, 3) N m about the lab origin.
+        corners: (p, 4, 3) m.
+    """
+
+    names: tuple[str, ...]
+    force: FloatArray
+    moment: FloatArray
+    corners: FloatArray
+
+    def loaded_direction(self) -> FloatArray:
+        """Mean direction (3,) of the loaded samples, each counted without sign; zero when nothing is loaded."""
+        size = np.linalg.norm(self.force, axis=2)
+        loaded = self.force[size > 5 * LOAD_THRESHOLD_N]
+        if len(loaded) < 10:
+            return np.zeros(3)
+        axis = int(np.argmax(np.abs(loaded).sum(axis=0)))
+        mean = (loaded * np.sign(loaded[:, axis, None])).mean(axis=0)
+        return mean / np.linalg.norm(mean)
+
+
+def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, list[str]]:
+    """The plates that can be used, in lab axes; None where there is none. `unit` is metres per file unit."""
+    platforms = file["data"]["platform"] if "platform" in file["data"] else []
+    group = file["parameters"]["FORCE_PLATFORM"] if platforms else None
+    names, forces, moments, corners, notes = [], [], [], [], []
+    for number, platform in enumerate(platforms, start=1):
+        name = f"plate {number}"
+        places = unit * platform["corners"].T
+        trouble = _corner_trouble(places) or _unit_trouble(file, group, number - 1)
+        if trouble:
+            notes.append(f"{path.name}: {name} was left out, {trouble}")
+            continue
+        force = platform["force"].T
+        if int(group["TYPE"]["value"][number - 1]) == 1:
+            moment = np.cross(unit * platform["center_of_pressure"].T, force) + unit * platform["Tz"].T
+        else:
+            moment = unit * platform["moment"].T + np.cross(places.mean(axis=0), force)
+        names.append(name)
+        forces.append(force)
+        moments.append(moment)
+        corners.append(places)
+    if not names:
+        return None, notes
+    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners)), notes
+
+
+def to_ground_plates(
+    path: Path, plates: LabPlates | None, rotation: FloatArray, time: FloatArray
+) -> tuple[PlateLoads | None, list[str]]:
+    """Loads on the person in ground axes, zero below the threshold."""
+    if plates is None:
+        return None, [f"{path.name}: no force plate that can be used"]
+    force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
+    corners = plates.corners @ rotation.T
+    notes = []
+    for p, name in enumerate(plates.names):
+        vertical = force[:, p, 1]
+        if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
+            force[:, p] *= -1
+            moment[:, p] *= -1
+            notes.append(f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed")
+        loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
+        force[~loaded, p] = 0.0
+        moment[~loaded, p] = 0.0
+        if not loaded.any():
+            notes.append(f"{path.name}: {name} never carries {LOAD_THRESHOLD_N:g} N")
+        elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
+            notes.append(
+                f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its corners; check "
+                "the plate's corners, origin and units"
+            )
+    return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners), notes
+
+
+def _corner_trouble(corners: FloatArray) -> str:
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+    low, high = _EDGE_LIMITS_M
+    if np.isfinite(corners).all() and np.abs(corners).max() < _CORNER_LIMIT_M and low < edges.min() and edges.max() < high:
+        return ""
+    return f"its corners are no plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
+
+
+def _unit_trouble(file: Any, group: Any, plate: int) -> str:
+    """ezc3d takes moments to be in N times POINT:UNITS; say where the analog channels say otherwise."""
+    if int(group["TYPE"]["value"][plate]) not in (2, 4):
+        return ""
+    channels = np.atleast_2d(group["CHANNEL"]["value"])[:, plate]
+    units = file["parameters"]["ANALOG"]["UNITS"]["value"]
+    channel = int(channels[3]) - 1
+    told = units[channel] if channel < len(units) else ""
+    said = "".join(letter for letter in str(told).lower() if letter.isalpha())
+    length = str(file["parameters"]["POINT"]["UNITS"]["value"][0]).strip().lower()
+    if said in ("nm", "nmm", "ncm") and said != "n" + length:
+        return f"its moments are in {told} while points are in {length}"
+    return ""
+
+
+def _outside(force: FloatArray, moment: FloatArray, corners: FloatArray) -> float:
+    """How far (m) the load-weighted mean centre of pressure lies outside the box around the corners."""
+    total = force[:, 1].sum()
+    height = corners[:, 1].mean()
+    x = (moment[:, 2].sum() + height * force[:, 0].sum()) / total
+    z = (height * force[:, 2].sum() - moment[:, 0].sum()) / total
+    low, high = corners[:, [0, 2]].min(axis=0), corners[:, [0, 2]].max(axis=0)
+    place = np.array([x, z])
+    return float(np.max(np.maximum(low - place, place - high)))

@@ -1,0 +1,69 @@
+"""One trial from its files, whatever their formats."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from kinertia.errors import FileError, TrialError
+from kinertia.io.c3d import read_c3d
+from kinertia.io.loads import read_forces_with_notes
+from kinertia.io.rows import expect_file
+from kinertia.io.trc import read_trc_with_notes
+from kinertia.trial import Recording
+
+
+def read_recording(
+    markers_path: str | Path, forces_path: str | Path | None = None, loads_path: str | Path | None = None
+) -> Recording:
+    """Read one trial: markers, and forces where there are any.
+
+    Args:
+        markers_path: a .trc or .c3d file.
+        forces_path: a .mot or .sto file; its forces go before those of a C3D file.
+        loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without `forces_path`
+            its own datafile is read.
+
+    Returns:
+        the recording; its `plates` is None where no file holds usable force plates.
+
+    Raises:
+        FileError: a file is missing, broken, or of a kind that Kinertia does not read.
+        TrialError: forces and markers do not overlap in time.
+    """
+    markers_path = Path(markers_path)
+    _expect_kind(markers_path, (".trc", ".c3d"), "markers")
+    if markers_path.suffix.lower() == ".c3d":
+        recording = read_c3d(markers_path)
+    else:
+        markers, notes = read_trc_with_notes(markers_path)
+        recording = Recording(markers_path.stem, markers, notes=notes)
+    if forces_path is not None:
+        _expect_kind(Path(forces_path), (".mot", ".sto"), "forces")
+    if loads_path is not None:
+        _expect_kind(Path(loads_path), (".xml",), "external loads")
+    if forces_path is not None or loads_path is not None:
+        plates, notes = read_forces_with_notes(forces_path, loads_path)
+        if recording.plates is not None:
+            notes = (f"{markers_path.name}: its own force plates were not used, the force file was", *notes)
+        recording = replace(recording, plates=plates, notes=(*recording.notes, *notes))
+    _expect_overlap(recording)
+    return recording
+
+
+def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
+    if path.suffix.lower() not in suffixes:
+        raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}")
+    expect_file(path)
+
+
+def _expect_overlap(recording: Recording) -> None:
+    if recording.plates is None:
+        return
+    markers, forces = recording.markers.time, recording.plates.time
+    if forces[0] > markers[-1] or forces[-1] < markers[0]:
+        raise TrialError(
+            recording.name,
+            f"forces from {forces[0]:.3f} to {forces[-1]:.3f} s and markers from {markers[0]:.3f} to {markers[-1]:.3f} s "
+            "do not overlap; give files of the same trial on the same clock",
+        )
