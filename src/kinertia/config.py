@@ -18,15 +18,13 @@
     [settings]                     # every one has a default, see `Settings`
     cutoff_hz = 6.0
 
-`read_subject` checks it whole and names the line of what is wrong; `init_subject` writes a first one from the files
-of a folder.
+`read_subject` checks it whole and names the line of what is wrong; `init_subject` drafts one from a folder.
 """
 
 from __future__ import annotations
 
 import difflib
 import json
-import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -48,6 +46,8 @@ from kinertia.errors import FileError, KinertiaError, SubjectError
 from kinertia.marker_set import preset_names
 
 Location = tuple[str | int, ...]
+
+_DOUBLE_BRACKETS = "every trial is a table of its own under the heading [[trial]], in double brackets"
 
 
 def _folder(info: ValidationInfo) -> Path:
@@ -94,10 +94,14 @@ def _window(value: object) -> tuple[float, float]:
 def _tables(value: object) -> tuple[object, ...]:
     if isinstance(value, list | tuple) and value:
         return tuple(value)
-    raise ValueError("every trial is a table of its own under the heading [[trial]], in double brackets")
+    raise ValueError(_DOUBLE_BRACKETS)
 
 
 File = Annotated[Path, BeforeValidator(_file)]
+MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
+Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
+Window = Annotated[tuple[float, float], BeforeValidator(_window)]
+Trials = Annotated[tuple["TrialFiles", ...], BeforeValidator(_tables)]
 
 
 class _Table(BaseModel):
@@ -109,8 +113,8 @@ class Subject(_Table):
 
     name: str = Field(min_length=1, description="name in files and report; left out: the folder's name")
     sex: Literal["male", "female"] = Field(description='"male" or "female": which table of the literature')
-    mass_kg: float | None = Field(None, description="body mass on the scale, kg")
-    height_m: float | None = Field(None, description="stature, m")
+    mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
+    height_m: float | None = Field(default=None, description="stature, m")
 
     @model_validator(mode="before")
     @classmethod
@@ -119,65 +123,59 @@ class Subject(_Table):
 
 
 class Model(_Table):
-    """What the skeleton is built from: the static trial, and a marker set (preset, absolute path, or None: detect)."""
+    """What the skeleton is built from. `markers` is a preset's name, an absolute path, or None: detect it."""
 
     static: File = Field(description="static trial, .c3d or .trc")
-    markers: Annotated[str | Path, BeforeValidator(_marker_set)] | None = Field(
-        None, description="marker set: a preset or a TOML file; left out: found from the labels"
-    )
+    markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
 
 
 class TrialFiles(_Table):
-    """Files of one dynamic trial (absolute paths); `window_s` (start, end) overrides the measured window, s."""
+    """Files of one dynamic trial; `window_s` (start, end) overrides the measured window, s."""
 
     name: str = Field(min_length=1, description="name in files and report; left out: the marker file's")
     markers: File = Field(description="markers, .c3d or .trc")
-    forces: File | None = Field(None, description="plate forces, .mot or .sto; a C3D file has its own")
-    loads: File | None = Field(None, description="ExternalLoads .xml: which column of `forces` is what")
-    window_s: Annotated[tuple[float, float], BeforeValidator(_window)] | None = Field(
-        None, description="[start, end] to use, s; left out: where every foot on the ground is measured"
-    )
+    forces: File | None = Field(default=None, description="plate forces, .mot or .sto; C3D has its own")
+    loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
+    window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
 
     @model_validator(mode="before")
     @classmethod
     def _named(cls, data: Any) -> Any:
-        named = isinstance(data, dict) and isinstance(data.get("markers"), str | Path)
-        return {"name": Path(data["markers"]).stem, **data} if named else data
+        if not isinstance(data, dict):
+            return data
+        markers = data.get("markers")
+        return {"name": Path(markers).stem if isinstance(markers, str | Path) else "trial", **data}
 
 
 class Settings(_Table):
     """How to estimate."""
 
-    method: Literal["two-level"] = Field("two-level", description='estimator: "two-level"')
-    bsp: Literal["dumas", "deleva"] = Field(
-        "dumas", description='literature to start from: "dumas" or "deleva"'
-    )
-    symmetry: bool = Field(True, description="true: left mirrors right, 49 parameters; false: 84")
-    cutoff_hz: Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)] = Field(
-        "gcv", description='smoothing: "gcv" (cross-validation, signal by signal) or a cutoff, Hz'
+    method: Literal["two-level"] = Field(default="two-level", description='estimator: "two-level"')
+    bsp: Literal["dumas", "deleva"] = Field(default="dumas", description='first guess: "dumas" or "deleva"')
+    symmetry: bool = Field(default=True, description="true: left mirrors right, 49 parameters; false: 84")
+    cutoff_hz: Cutoff = Field(
+        default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz'
     )
     hip_centre: Literal["bell", "harrington"] = Field(
-        "bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
+        default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
     )
 
 
 class SubjectFile(_Table):
     """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist."""
 
-    subject: Subject = Field(description="who walked")
-    model: Model = Field(description="the static trial and its marker set")
-    trials: Annotated[tuple[TrialFiles, ...], BeforeValidator(_tables)] = Field(
-        alias="trial", description="a dynamic trial: its files"
-    )
-    settings: Settings = Field(default_factory=Settings, description="how to estimate")
+    subject: Subject
+    model: Model
+    trials: Trials = Field(alias="trial")
+    settings: Settings = Settings()
 
 
 def read_subject(path: str | Path) -> SubjectFile:
     """Read and check a subject file.
 
     Raises:
-        FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or wrong
-            value, no such trial file, two trials of one name, implausible mass or height); with the line.
+        FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or
+            wrong value, no such trial file, two trials of one name, implausible mass); with the line.
     """
     path = Path(path).resolve()
     text, content = _parsed(path)
@@ -185,8 +183,9 @@ def read_subject(path: str | Path) -> SubjectFile:
     try:
         result = SubjectFile.model_validate(content, context={"folder": path.parent})
     except ValidationError as error:
-        found = [(_line(lines, detail["loc"]), _sentence(detail)) for detail in error.errors()]
-        line, sentence = min(found, key=lambda item: item[0] or 0)
+        last = text.count("\n") + 1
+        found = [(_line(lines, detail["loc"]) or last, _sentence(detail)) for detail in error.errors()]
+        line, sentence = min(found)
         raise FileError(path, sentence, line) from None
     subject = result.subject
     try:
@@ -223,31 +222,32 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
         where = re.search(r" \(at line (\d+), column \d+\)$", message)
         line = int(where[1]) if where else text.count("\n") + 1
         what = message[: message.rindex(" (at ")] if " (at " in message else message
-        hint = "; write paths with / instead of \\" if "\\" in text.splitlines()[line - 1] else ""
+        hint = "; put text in quotes" if what == "Invalid value" else ""
+        if "\\" in what:
+            hint = "; write paths with / instead of \\"
         raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
 
 
 def _lines(text: str) -> dict[Location, int]:
     """Line number (from 1) of every table heading and key, by its place: ("trial", 1, "markers").
 
-    Reads one `[table]`, `[[table]]` or `key =` per line, which is how subject files are written; what stands inside an
-    inline table is found at the key that holds it.
+    Reads one `[table]`, `[[table]]` or `key =` per line, which is how subject files are written; what stands
+    inside an inline table is found at the key that holds it.
     """
     places: dict[Location, int] = {}
-    prefix: Location = ()
+    table: Location = ()
     counts: dict[Location, int] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         if heading := re.match(r"\s*(\[\[?)\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$", line):
-            prefix = _keys(heading[2])
+            place = table = _keys(heading[2])
             if heading[1] == "[[":
-                counts[prefix] = counts.get(prefix, -1) + 1
-                prefix = (*prefix, counts[prefix])
-            places.setdefault(prefix, number)
+                counts[place] = counts.get(place, -1) + 1
+                place = table = (*place, counts[place])
         elif key := re.match(r"\s*([\w.\"' -]+?)\s*=", line):
-            place = (*prefix, *_keys(key[1]))
-            places.setdefault(place, number)
-    for place, number in list(places.items()):
-        for size in range(1, len(place)):
+            place = (*table, *_keys(key[1]))
+        else:
+            continue
+        for size in range(1, len(place) + 1):
             places.setdefault(place[:size], number)
     return places
 
@@ -261,51 +261,158 @@ def _line(lines: dict[Location, int], place: Location) -> int | None:
     return next((lines[place[:size]] for size in range(len(place), 0, -1) if place[:size] in lines), None)
 
 
-_TABLES: dict[str, type[_Table]] = {
-    "subject": Subject,
-    "model": Model,
-    "trial": TrialFiles,
-    "settings": Settings,
-}
+_TABLES: dict[str, type[_Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)
 
 
 def _sentence(detail: Any) -> str:
     """One sentence for the user from one of pydantic's errors."""
     *holder, key = detail["loc"]
+    table, kind = str(holder[0] if holder else key), detail["type"]
+    if kind == "extra_forbidden":
+        known = list(_TABLES[table].model_fields) if holder else list(_TABLES)
+        near = difflib.get_close_matches(str(key), known, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+        return f"unknown key '{key}'{f' in [{table}]' if holder else ''}; {hint}"
+    if table == "trial" and (not holder or isinstance(key, int)) and kind != "missing":
+        return _DOUBLE_BRACKETS
     if not holder:
-        return _sentence_on_table(str(key), detail)
-    table = f"[{holder[0]}]"
-    fields = _TABLES[str(holder[0])].model_fields
-    value = json.dumps(detail["input"], default=str)
-    if isinstance(key, int):
-        return "every trial is a table of its own under the heading [[trial]], in double brackets"
-    match detail["type"]:
-        case "missing":
-            return f"{table} lacks '{key}' ({fields[key].description}); add it"
-        case "extra_forbidden":
-            return f"{table} knows no key '{key}'{_nearest(key, list(fields))}"
-        case "literal_error":
-            return f"{key} = {value}: must be {detail['ctx']['expected'].replace(chr(39), chr(34))}"
-        case "value_error":
-            return f"{key} = {value}: {detail['ctx']['error']}"
-        case _:
-            return f"{key} = {value}: {detail['msg'].replace('Input should be', 'must be')}"
+        heading = "[[trial]]" if table == "trial" else f"[{table}]"
+        return f"there is no heading {heading} with its entries below; add it"
+    if kind == "missing":
+        return f"[{table}] lacks '{key}' ({_TABLES[table].model_fields[key].description}); add it"
+    problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
+    if kind == "value_error":
+        problem = str(detail["ctx"]["error"])
+    return f"{key} = {json.dumps(detail['input'], default=str, ensure_ascii=False)}: {problem}"
 
 
-def _sentence_on_table(key: str, detail: Any) -> str:
-    heading = "[[trial]]" if key == "trial" else f"[{key}]"
-    match detail["type"]:
-        case "missing":
-            description = SubjectFile.model_fields["trials" if key == "trial" else key].description
-            return f"there is no {heading} ({description}); add it"
-        case "extra_forbidden":
-            return f"a subject file knows no '{key}'{_nearest(key, list(_TABLES))}"
-        case "value_error":
-            return str(detail["ctx"]["error"])
-        case _:
-            return f"'{key}' must be a table under the heading {heading}"
+_STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 
 
-def _nearest(key: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(key, known, n=1)
-    return f"; did you mean '{near[0]}'?" if near else f"; it knows {', '.join(known)}"
+def init_subject(folder: str | Path) -> str:
+    """Draft a subject file for the recordings in a folder (not its subfolders); writes nothing.
+
+    The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads are
+    matched to trials by the longest common part of their names; mass and height come from a C3D file that holds
+    them. What stays unknown is a commented line marked FILL IN. Recordings whose names begin like another static
+    trial's are left out and named in a comment.
+
+    Raises:
+        FileError: no such folder, or no .c3d or .trc file in it.
+    """
+    folder = Path(folder).resolve()
+    if not folder.is_dir():
+        raise FileError(folder, "no such folder; give the one that holds the recordings")
+    files = sorted(folder.iterdir())
+    c3d = [file for file in files if file.suffix.lower() == ".c3d"]
+    stems = {file.stem for file in c3d}
+    captures = c3d + [file for file in files if file.suffix.lower() == ".trc" and file.stem not in stems]
+    if not captures:
+        raise FileError(folder, "holds no .c3d or .trc file; give the folder that holds the recordings")
+    static, trials = _static_and_trials(captures)
+    others = [file.name for file in captures if file not in (static, *trials)]
+    forces = [file for file in files if _holds_forces(file)]
+    loads = [file for file in files if file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)]
+    chosen = _matched([trial for trial in trials if trial not in c3d], forces)
+    text = [
+        f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the others."
+    ]
+    if others:
+        text += [f"# Left out, as another subject's or another static trial: {', '.join(others)}."]
+    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
+    guessed = static is not None and not _STATIC_NAME.search(static.stem)
+    note = " (the shortest recording)" if guessed else ""
+    text += ["", "[model]", _entry(Model, "static", static and static.name, "static.trc", note)]
+    text += ["# " + _entry(Model, "markers", "plug-in-gait")]
+    for trial in trials:
+        text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
+        if trial in chosen:
+            text += [_entry(TrialFiles, "forces", chosen[trial].name, note=" (matched by name)")]
+            for file in _matched([chosen[trial]], loads).values():
+                text += [_entry(TrialFiles, "loads", file.name, note=" (matched by name)")]
+        elif trial not in c3d:
+            text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
+    if not trials:
+        text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
+    text += ["", "[settings]", *(_entry(Settings, *item) for item in Settings().model_dump().items()), ""]
+    return "\n".join(text)
+
+
+def _entry(table: type[_Table], key: str, value: object, example: object = None, note: str = "") -> str:
+    """`key = value  # what it is`; without a value a commented example to fill in."""
+    about = f"{table.model_fields[key].description}{note}"
+    if value is None:
+        return f"# {key} = {json.dumps(example)}  # FILL IN: {about}"
+    return f"{key} = {json.dumps(value, ensure_ascii=False)}  # {about}"
+
+
+def _subject_lines(c3d: Sequence[Path]) -> list[str]:
+    recordings = [recording for recording in map(_recording, c3d) if recording]
+    mass_kg = next((recording.mass_kg for recording in recordings if recording.mass_kg), None)
+    height_m = next((recording.height_m for recording in recordings if recording.height_m), None)
+    return [
+        _entry(Subject, "sex", None, "female"),
+        _entry(Subject, "mass_kg", mass_kg, 70.0, " (from C3D)" if mass_kg else ""),
+        _entry(Subject, "height_m", height_m, 1.7, " (from C3D)" if height_m else ""),
+    ]
+
+
+def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:
+    """The static trial and the dynamic trials that share most of the beginning of its name."""
+    statics = [file for file in captures if _STATIC_NAME.search(file.stem)]
+    if not statics and len(captures) > 1:
+        statics = [min(captures, key=_duration_s)]
+    dynamic = [file for file in captures if file not in statics]
+    if not statics or not dynamic:
+        return (statics[0] if statics else None), dynamic
+    # of equals `max` takes the first, so that unrelated names all go to the first static trial
+    owners = [max(statics, key=lambda s: _common_start(s.stem, file.stem)) for file in dynamic]
+    return owners[0], [file for file, owner in zip(dynamic, owners, strict=True) if owner == owners[0]]
+
+
+def _common_start(a: str, b: str) -> int:
+    return next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+
+
+def _recording(file: Path) -> Any:
+    """What a capture holds, or None where it cannot be read: reading the trial itself will say why."""
+    from kinertia.io.recording import read_recording
+
+    try:
+        return read_recording(file)
+    except KinertiaError:
+        return None
+
+
+def _duration_s(file: Path) -> float:
+    recording = _recording(file)
+    return recording.markers.time[-1] - recording.markers.time[0] if recording else float("inf")
+
+
+def _head(file: Path) -> str:
+    with file.open("rb") as stream:
+        return stream.read(20_000).decode("utf-8", errors="replace")
+
+
+def _holds_forces(file: Path) -> bool:
+    """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
+    motion = file.suffix.lower() in (".mot", ".sto") and not _STATIC_NAME.search(file.stem)
+    return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
+
+
+def _matched(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
+    """Pairs of files by the longest common part of their names, the best pair first; each file once.
+
+    At least four letters must agree, unless there is one file on each side.
+    """
+    scores = {}
+    for wants in wanting:
+        for offers in offered:
+            matcher = difflib.SequenceMatcher(None, wants.stem.lower(), offers.stem.lower(), autojunk=False)
+            scores[wants, offers] = (matcher.find_longest_match().size, matcher.ratio())
+    least = 0 if len(wanting) == len(offered) == 1 else 4
+    pairs: dict[Path, Path] = {}
+    for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):
+        if score[0] >= least and wants not in pairs and offers not in pairs.values():
+            pairs[wants] = offers
+    return pairs

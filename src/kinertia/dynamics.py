@@ -100,10 +100,12 @@ def consistent_root_acceleration(
 def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) -> np.ndarray:
     """Y (n, 6, 10 s) with P = Y phi - ground load, phi the dynamic parameters of `segments` in their own frames."""
     model, data = skeleton.model, skeleton.model.createData()
-    place = skeleton.placement_of_parameters(segments)
+    joints, place = skeleton.placement_of_parameters(segments)
+    columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
     rows = zip(motion.q, motion.qd, motion.qdd, strict=True)
-    joints = np.array([pin.computeJointTorqueRegressor(model, data, q, v, a)[:6] for q, v, a in rows])
-    return _generalised_to_load(motion.q, joints @ place)
+    tau = np.array([pin.computeJointTorqueRegressor(model, data, q, v, a)[:6, columns] for q, v, a in rows])
+    by_segment = tau.reshape(len(tau), 6, len(joints), 1, 10) @ place
+    return _generalised_to_load(motion.q, by_segment.reshape(len(tau), 6, -1))
 
 
 def root_derivatives(

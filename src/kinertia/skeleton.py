@@ -204,22 +204,26 @@ class Skeleton:
     def model_with(self, bsp: BodySegmentParameters) -> pin.Model:
         """A Pinocchio model that carries these body segment parameters."""
         model = self.model.copy()
-        params = (self.placement_of_parameters(bsp.segments) @ bsp.dynamic_parameters()).reshape(-1, 10)
-        for j in range(1, model.njoints):
-            model.inertias[j] = _inertia(params[j - 1])
+        joints, place = self.placement_of_parameters(bsp.segments)
+        moved = (place @ bsp.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
+        for j in set(joints.tolist()):
+            model.inertias[j] = pin.Inertia.FromDynamicParameters(moved[joints == j].sum(axis=0))
         return model
 
-    def placement_of_parameters(self, segments: Sequence[str]) -> np.ndarray:
-        """(10 c, 10 s): dynamic parameters in segment frames -> dynamic parameters of the Pinocchio joints.
+    def placement_of_parameters(self, segments: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Joint index (s,) that carries each segment, and (s, 10, 10) its dynamic parameters in that joint's frame.
 
-        Linear, so it also serves the regressor: Y_segments = Y_joints @ this.
+        Linear, so it also serves the regressor: Y_segment = Y_joint @ this.
         """
-        model, carrier, offset = self._built
-        result = np.zeros((10 * model.nv, 10 * len(segments)))
-        for i, segment in enumerate(segments):
-            j = carrier[segment] - 1
-            result[10 * j : 10 * j + 10, 10 * i : 10 * i + 10] = _moved_parameters(offset[segment])
-        return result
+        rows = [self.segments.index(segment) for segment in segments]
+        joints, place = self._parameter_places
+        return joints[rows], place[rows]
+
+    @cached_property
+    def _parameter_places(self) -> tuple[np.ndarray, np.ndarray]:
+        _, carrier, offset = self._built
+        joints = np.array([carrier[segment] for segment in self.segments], dtype=int)
+        return joints, np.array([_moved_parameters(offset[segment]) for segment in self.segments])
 
 
 def _motion(axis: Axis, value: float) -> pin.SE3:
@@ -245,12 +249,6 @@ def _pinocchio_joint(axis: Axis) -> pin.JointModel:
         return aligned()
     unaligned = pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
     return unaligned(*axis.direction)
-
-
-def _inertia(params: np.ndarray) -> pin.Inertia:
-    if not params.any():
-        return pin.Inertia.Zero()
-    return pin.Inertia.FromDynamicParameters(params)
 
 
 def _moved_parameters(place: pin.SE3) -> np.ndarray:

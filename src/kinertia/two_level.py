@@ -142,7 +142,7 @@ def estimate_two_level(
         x_scale="jac",
         method="trf",
         xtol=1e-12,
-        ftol=1e-10,
+        ftol=1e-7,
         gtol=1e-12,
         max_nfev=_MAX_EVALUATIONS,
     )
