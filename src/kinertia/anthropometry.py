@@ -13,7 +13,7 @@ The numbers are in `data/dumas2007.csv` and `data/deleva1996.csv`, with their un
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
@@ -30,6 +30,8 @@ SEGMENTS = (
 """The twelve segments with mass of the 27-DOF model; torso includes the head, forearm the hand."""
 
 _DUMAS_STATURE_M = {"male": 1.77, "female": 1.61}
+_DUMAS_TORSO_COM = {"male": (-0.036, -0.420, -0.002), "female": (-0.016, -0.436, -0.006)}
+"""CoM of the 2007 table's one-piece torso, in torso lengths from the cervical joint."""
 _DELEVA_STATURE_M = {"male": 1.741, "female": 1.735}
 
 
@@ -108,10 +110,10 @@ def literature_bsp(
       so that the total mass is exactly `mass_kg`.
     - Dumas: thorax and abdomen lie in line along the torso's y axis, thorax 334/477 (male) or 322/429
       (female) of its length, and the head stands upright along y above the cervical joint, 0.278/1.77 (male)
-      or 0.243/1.61 (female) of the stature high. In reality the thoracolumbar joint lies behind that line:
-      the 2007 table's one-piece torso has its CoM 3.6 % (male), 1.6 % (female) of the torso's length behind
-      it, here thorax + abdomen have it 0.4 % and 2.2 % before it. (The 2007 female one-piece torso is not
-      used: its tensor is not physically consistent.)
+      or 0.243/1.61 (female) of the stature high. In reality the thoracolumbar joint lies behind that line, so
+      that stacked in line their CoM would come 4 % of the torso's length too far forward: both are moved
+      together until it is where the 2007 table's one-piece torso has it. (Its tensor is not used: no source
+      for the female one; the one quoted from memory is not physically consistent.)
     - de Leva: pelvis is the lower trunk (omphalion to mid hip), torso the middle trunk, upper trunk (from
       cervicale, taken as the height of the cervical joint) and head. Their lengths are the reference
       subject's, scaled by the height of the cervical joint over the mid hip when the torso stands upright on
@@ -182,8 +184,15 @@ def _dumas_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator[
     lumbar = np.array(geometry.lumbar_joint_m, dtype=float)
     pelvis = float(np.linalg.norm(lumbar - geometry.mid_hip_m))
     yield _Part("pelvis", table["pelvis"], lumbar, pelvis)
-    yield _Part("torso", table["abdomen"], _along_y(torso - thorax), torso - thorax)
-    yield _Part("torso", table["thorax"], _along_y(torso), thorax)
+    trunk = [
+        _Part("torso", table["abdomen"], _along_y(torso - thorax), torso - thorax),
+        _Part("torso", table["thorax"], _along_y(torso), thorax),
+    ]
+    com = sum(p.row.mass * (p.origin_m + p.row.com * p.length_m) for p in trunk) / sum(
+        p.row.mass for p in trunk
+    )
+    shift = _along_y(torso) + torso * np.array(_DUMAS_TORSO_COM[sex]) - com
+    yield from (replace(part, origin_m=part.origin_m + shift) for part in trunk)
     yield _Part("torso", table["head"], _along_y(torso), head)
     for side in "rl":
         yield from _limb_parts(table, lengths, side, _hand_length(height_m, sex))

@@ -59,8 +59,9 @@ def adapt(
     kept = [marker for marker in skeleton.markers if marker.label in present]
     rest = [marker for marker in skeleton.markers if marker.label not in present]
     base = skeleton.with_markers(kept)
-    measured = np.concatenate([_sampled(base, markers) for markers in trials])
-    start = _start(base, trials)
+    few = [sampled(markers) for markers in trials]
+    measured = np.concatenate([_positions(base, markers) for markers in few])
+    start = np.concatenate([solve_ik(base, markers).q for markers in few])
     seen = np.isfinite(start).all(axis=1)
     measured, moving = measured[seen], start[seen]
 
@@ -78,36 +79,33 @@ def adapt(
         q = np.empty((len(moving), len(freed.coordinates)))
         q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
         placed = freed.with_markers(_relocated(kept, static[len(still) :]))
-        step, moving_step = _step(placed, measured, q, moving_at, still_at, (prior - static) / deviation**2, deviation)
+        step, moving_step = _step(
+            placed, measured, q, moving_at, still_at, (prior - static) / deviation**2, deviation
+        )
         static, moving = static + step, moving + moving_step
         if np.abs(step).max() < _TOLERANCE_M:
             break
     markers = _relocated(kept, static[len(still) :])
-    moved = {m.label: float(np.linalg.norm(m.position - k.position)) for m, k in zip(markers, kept, strict=True)}
+    moved = {
+        m.label: float(np.linalg.norm(m.position - k.position)) for m, k in zip(markers, kept, strict=True)
+    }
     values = {name: float(value) for name, value in zip(still, static[: len(still)], strict=True)}
     return Adaptation(skeleton.with_markers([*markers, *rest]).lock(values), moved, values)
 
 
-def _frames(markers: Markers) -> np.ndarray:
+def sampled(markers: Markers) -> Markers:
+    """A few frames, FRAME_SPACING_S apart, from all over the trial (at most sixty)."""
     every = max(1, round(FRAME_SPACING_S * markers.rate_hz), -(-len(markers.time) // _MAX_FRAMES))
-    return np.arange(0, len(markers.time), every)
+    return Markers(markers.time[::every], markers.labels, markers.positions[::every])
 
 
-def _sampled(skeleton: Skeleton, markers: Markers) -> np.ndarray:
-    frames = _frames(markers)
-    positions = np.full((len(frames), len(skeleton.markers), 3), np.nan)
+def _positions(skeleton: Skeleton, markers: Markers) -> np.ndarray:
+    """(n, m, 3) measured markers in the skeleton's order, NaN where the trial does not have one."""
+    positions = np.full((len(markers.time), len(skeleton.markers), 3), np.nan)
     for i, marker in enumerate(skeleton.markers):
         if marker.label in markers.labels:
-            positions[:, i] = markers.positions[frames, markers.labels.index(marker.label)]
+            positions[:, i] = markers.positions[:, markers.labels.index(marker.label)]
     return positions
-
-
-def _start(skeleton: Skeleton, trials: Sequence[Markers]) -> np.ndarray:
-    sampled = [
-        Markers(markers.time[_frames(markers)], markers.labels, markers.positions[_frames(markers)])
-        for markers in trials
-    ]
-    return np.concatenate([solve_ik(skeleton, markers).q for markers in sampled])
 
 
 def _relocated(markers: Sequence[Marker], positions: np.ndarray) -> list[Marker]:
@@ -138,7 +136,9 @@ def _step(
     turned = pose.rotation[:, skeleton.marker_segments] / MARKER_NOISE_M * seen[..., None]
     local[:, each, :, each, :] = turned.transpose(1, 0, 2, 3)
     jacobian = jacobian.reshape(len(q), residual.shape[1], -1)
-    by_static = np.concatenate([jacobian[..., still_at], local.reshape(len(q), residual.shape[1], -1)], axis=-1)
+    by_static = np.concatenate(
+        [jacobian[..., still_at], local.reshape(len(q), residual.shape[1], -1)], axis=-1
+    )
     by_moving = jacobian[..., moving_at]
     transposed = by_moving.transpose(0, 2, 1)
     normal = transposed @ by_moving + 1e-6 * np.eye(len(moving_at))

@@ -18,7 +18,7 @@
     [settings]                     # every one has a default, see `Settings`
     cutoff_hz = 6.0
 
-`read_subject` checks it whole and names the line of what is wrong; `init_subject` drafts one from a folder.
+`read_subject` checks it whole and names the line of what is wrong; `kinertia.subject_draft` drafts one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import difflib
 import json
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -42,12 +42,10 @@ from pydantic import (
 )
 
 from kinertia.anthropometry import check_subject
-from kinertia.errors import FileError, KinertiaError, SubjectError
+from kinertia.errors import FileError, SettingsError, SubjectError
 from kinertia.marker_set import preset_names
 
 Location = tuple[str | int, ...]
-
-_DOUBLE_BRACKETS = "every trial is a table of its own under the heading [[trial]], in double brackets"
 
 
 def _folder(info: ValidationInfo) -> Path:
@@ -76,12 +74,10 @@ def _marker_set(value: object, info: ValidationInfo) -> str | Path:
         raise ValueError(f"{error}; give a marker set's TOML file or one of the presets {presets}") from None
 
 
-def _cutoff(value: object) -> float | str:
-    if value == "gcv":
-        return "gcv"
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < float("inf"):
-        raise ValueError('must be "gcv" or a positive frequency in Hz')
-    return float(value)
+def _cutoff(value: object) -> object:
+    if value == "gcv" or (type(value) in (int, float) and 0 < value < float("inf")):  # type: ignore[operator]
+        return value
+    raise ValueError('must be "gcv" or a positive frequency in Hz')
 
 
 def _window(value: object) -> tuple[float, float]:
@@ -91,17 +87,10 @@ def _window(value: object) -> tuple[float, float]:
     raise ValueError("must be [start, end] in seconds, the start before the end")
 
 
-def _tables(value: object) -> tuple[object, ...]:
-    if isinstance(value, list | tuple) and value:
-        return tuple(value)
-    raise ValueError(_DOUBLE_BRACKETS)
-
-
 File = Annotated[Path, BeforeValidator(_file)]
 MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
-Trials = Annotated[tuple["TrialFiles", ...], BeforeValidator(_tables)]
 
 
 class _Table(BaseModel):
@@ -166,7 +155,7 @@ class SubjectFile(_Table):
 
     subject: Subject
     model: Model
-    trials: Trials = Field(alias="trial")
+    trials: tuple[TrialFiles, ...] = Field(alias="trial", strict=False, min_length=1)
     settings: Settings = Settings()
 
 
@@ -183,26 +172,50 @@ def read_subject(path: str | Path) -> SubjectFile:
     try:
         result = SubjectFile.model_validate(content, context={"folder": path.parent})
     except ValidationError as error:
-        last = text.count("\n") + 1
-        found = [(_line(lines, detail["loc"]) or last, _sentence(detail)) for detail in error.errors()]
-        line, sentence = min(found)
+        end = text.count("\n") + 1
+        # a trial with an error in it does not count, so that pydantic also finds too few trials
+        errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
+        line, sentence = min((_line(lines, one["loc"]) or end, _sentence(one)) for one in errors)
         raise FileError(path, sentence, line) from None
-    subject = result.subject
+    subject, names = result.subject, [trial.name for trial in result.trials]
+    mass_kg = 70.0 if subject.mass_kg is None else subject.mass_kg  # left open: any plausible value
+    height_m = 1.7 if subject.height_m is None else subject.height_m
     try:
-        # a value that the file leaves open is stood in for by a plausible one
-        check_subject(
-            70.0 if subject.mass_kg is None else subject.mass_kg,
-            1.7 if subject.height_m is None else subject.height_m,
-            subject.sex,
-        )
+        check_subject(mass_kg, height_m, subject.sex)
     except SubjectError as error:
         raise FileError(path, str(error), _line(lines, ("subject", error.field))) from error
-    names = [trial.name for trial in result.trials]
     for index, name in enumerate(names):
         if name in names[:index]:
             problem = f"trial '{name}' is there already; give this one a name = \"...\" of its own"
             raise FileError(path, problem, _line(lines, ("trial", index, "name")))
     return result
+
+
+def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
+    """The same from a dictionary of the subject file's form, as the command line makes it; paths from here.
+
+    Raises:
+        SettingsError: something is missing, wrong or not there; the message names the entry.
+    """
+    try:
+        result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
+    except ValidationError as error:
+        raise SettingsError(_sentence(error.errors()[0])) from None
+    return result
+
+
+def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
+    """The same with other settings.
+
+    Raises:
+        SettingsError: a value cannot be.
+    """
+    try:
+        settings = Settings.model_validate({**wanted.settings.model_dump(), **values})
+    except ValidationError as error:
+        detail = error.errors()[0]
+        raise SettingsError(_sentence({**detail, "loc": ("settings", *detail["loc"])})) from None
+    return wanted.model_copy(update={"settings": settings})
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
@@ -218,13 +231,11 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
     try:
         return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        message = str(error)
-        where = re.search(r" \(at line (\d+), column \d+\)$", message)
-        line = int(where[1]) if where else text.count("\n") + 1
-        what = message[: message.rindex(" (at ")] if " (at " in message else message
-        hint = "; put text in quotes" if what == "Invalid value" else ""
-        if "\\" in what:
-            hint = "; write paths with / instead of \\"
+        what, _, where = str(error).rpartition(" (at ")
+        number = re.match(r"line (\d+)", where)
+        line = int(number[1]) if number else text.count("\n") + 1
+        hints = {"Invalid value": "; put text in quotes", "Unescaped": "; write paths with / instead of \\"}
+        hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
         raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
 
 
@@ -237,7 +248,7 @@ def _lines(text: str) -> dict[Location, int]:
     places: dict[Location, int] = {}
     table: Location = ()
     counts: dict[Location, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if heading := re.match(r"\s*(\[\[?)\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$", line):
             place = table = _keys(heading[2])
             if heading[1] == "[[":
@@ -274,7 +285,7 @@ def _sentence(detail: Any) -> str:
         hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
         return f"unknown key '{key}'{f' in [{table}]' if holder else ''}; {hint}"
     if table == "trial" and (not holder or isinstance(key, int)) and kind != "missing":
-        return _DOUBLE_BRACKETS
+        return "every trial is a table of its own under the heading [[trial]], in double brackets"
     if not holder:
         heading = "[[trial]]" if table == "trial" else f"[{table}]"
         return f"there is no heading {heading} with its entries below; add it"
@@ -284,135 +295,3 @@ def _sentence(detail: Any) -> str:
     if kind == "value_error":
         problem = str(detail["ctx"]["error"])
     return f"{key} = {json.dumps(detail['input'], default=str, ensure_ascii=False)}: {problem}"
-
-
-_STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
-
-
-def init_subject(folder: str | Path) -> str:
-    """Draft a subject file for the recordings in a folder (not its subfolders); writes nothing.
-
-    The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads are
-    matched to trials by the longest common part of their names; mass and height come from a C3D file that holds
-    them. What stays unknown is a commented line marked FILL IN. Recordings whose names begin like another static
-    trial's are left out and named in a comment.
-
-    Raises:
-        FileError: no such folder, or no .c3d or .trc file in it.
-    """
-    folder = Path(folder).resolve()
-    if not folder.is_dir():
-        raise FileError(folder, "no such folder; give the one that holds the recordings")
-    files = sorted(folder.iterdir())
-    c3d = [file for file in files if file.suffix.lower() == ".c3d"]
-    stems = {file.stem for file in c3d}
-    captures = c3d + [file for file in files if file.suffix.lower() == ".trc" and file.stem not in stems]
-    if not captures:
-        raise FileError(folder, "holds no .c3d or .trc file; give the folder that holds the recordings")
-    static, trials = _static_and_trials(captures)
-    others = [file.name for file in captures if file not in (static, *trials)]
-    forces = [file for file in files if _holds_forces(file)]
-    loads = [file for file in files if file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)]
-    chosen = _matched([trial for trial in trials if trial not in c3d], forces)
-    text = [
-        f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the others."
-    ]
-    if others:
-        text += [f"# Left out, as another subject's or another static trial: {', '.join(others)}."]
-    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
-    guessed = static is not None and not _STATIC_NAME.search(static.stem)
-    note = " (the shortest recording)" if guessed else ""
-    text += ["", "[model]", _entry(Model, "static", static and static.name, "static.trc", note)]
-    text += ["# " + _entry(Model, "markers", "plug-in-gait")]
-    for trial in trials:
-        text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
-        if trial in chosen:
-            text += [_entry(TrialFiles, "forces", chosen[trial].name, note=" (matched by name)")]
-            for file in _matched([chosen[trial]], loads).values():
-                text += [_entry(TrialFiles, "loads", file.name, note=" (matched by name)")]
-        elif trial not in c3d:
-            text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
-    if not trials:
-        text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
-    text += ["", "[settings]", *(_entry(Settings, *item) for item in Settings().model_dump().items()), ""]
-    return "\n".join(text)
-
-
-def _entry(table: type[_Table], key: str, value: object, example: object = None, note: str = "") -> str:
-    """`key = value  # what it is`; without a value a commented example to fill in."""
-    about = f"{table.model_fields[key].description}{note}"
-    if value is None:
-        return f"# {key} = {json.dumps(example)}  # FILL IN: {about}"
-    return f"{key} = {json.dumps(value, ensure_ascii=False)}  # {about}"
-
-
-def _subject_lines(c3d: Sequence[Path]) -> list[str]:
-    recordings = [recording for recording in map(_recording, c3d) if recording]
-    mass_kg = next((recording.mass_kg for recording in recordings if recording.mass_kg), None)
-    height_m = next((recording.height_m for recording in recordings if recording.height_m), None)
-    return [
-        _entry(Subject, "sex", None, "female"),
-        _entry(Subject, "mass_kg", mass_kg, 70.0, " (from C3D)" if mass_kg else ""),
-        _entry(Subject, "height_m", height_m, 1.7, " (from C3D)" if height_m else ""),
-    ]
-
-
-def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:
-    """The static trial and the dynamic trials that share most of the beginning of its name."""
-    statics = [file for file in captures if _STATIC_NAME.search(file.stem)]
-    if not statics and len(captures) > 1:
-        statics = [min(captures, key=_duration_s)]
-    dynamic = [file for file in captures if file not in statics]
-    if not statics or not dynamic:
-        return (statics[0] if statics else None), dynamic
-    # of equals `max` takes the first, so that unrelated names all go to the first static trial
-    owners = [max(statics, key=lambda s: _common_start(s.stem, file.stem)) for file in dynamic]
-    return owners[0], [file for file, owner in zip(dynamic, owners, strict=True) if owner == owners[0]]
-
-
-def _common_start(a: str, b: str) -> int:
-    return next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
-
-
-def _recording(file: Path) -> Any:
-    """What a capture holds, or None where it cannot be read: reading the trial itself will say why."""
-    from kinertia.io.recording import read_recording
-
-    try:
-        return read_recording(file)
-    except KinertiaError:
-        return None
-
-
-def _duration_s(file: Path) -> float:
-    recording = _recording(file)
-    return recording.markers.time[-1] - recording.markers.time[0] if recording else float("inf")
-
-
-def _head(file: Path) -> str:
-    with file.open("rb") as stream:
-        return stream.read(20_000).decode("utf-8", errors="replace")
-
-
-def _holds_forces(file: Path) -> bool:
-    """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
-    motion = file.suffix.lower() in (".mot", ".sto") and not _STATIC_NAME.search(file.stem)
-    return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
-
-
-def _matched(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
-    """Pairs of files by the longest common part of their names, the best pair first; each file once.
-
-    At least four letters must agree, unless there is one file on each side.
-    """
-    scores = {}
-    for wants in wanting:
-        for offers in offered:
-            matcher = difflib.SequenceMatcher(None, wants.stem.lower(), offers.stem.lower(), autojunk=False)
-            scores[wants, offers] = (matcher.find_longest_match().size, matcher.ratio())
-    least = 0 if len(wanting) == len(offered) == 1 else 4
-    pairs: dict[Path, Path] = {}
-    for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):
-        if score[0] >= least and wants not in pairs and offers not in pairs.values():
-            pairs[wants] = offers
-    return pairs

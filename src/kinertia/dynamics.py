@@ -27,7 +27,16 @@ class Motion:
     def with_root(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> Motion:
         """The same motion with other root coordinates (each (n, 6))."""
         pairs = ((q, self.q), (qd, self.qd), (qdd, self.qdd))
-        return Motion(*(np.hstack([root, all_[:, 6:]]) for root, all_ in pairs))
+        return Motion(*(np.hstack([root, every[:, 6:]]) for root, every in pairs))
+
+    def cut(self, frames: slice) -> Motion:
+        """The motion at these frames."""
+        return Motion(self.q[frames], self.qd[frames], self.qdd[frames])
+
+
+def joined(parts: Sequence[Motion]) -> Motion:
+    """Stretches of one motion, one after the other."""
+    return Motion(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("q", "qd", "qdd")))
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,9 @@ def _ground_load_at_pelvis(q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     return np.concatenate([force, moment - np.cross(q[:, :3], force)], axis=1)
 
 
-def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
+def residual(
+    skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
+) -> np.ndarray:
     """Root residual P (n, 6), equation (1): inertial and gravity load minus the ground reactions.
 
     Args:

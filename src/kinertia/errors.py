@@ -39,7 +39,9 @@ class MarkerSetError(KinertiaError):
         nearest: for each missing item, the labels of the trial that look most like it.
     """
 
-    def __init__(self, problem: str, missing: Sequence[str] = (), nearest: dict[str, list[str]] | None = None):
+    def __init__(
+        self, problem: str, missing: Sequence[str] = (), nearest: dict[str, list[str]] | None = None
+    ):
         self.missing = tuple(missing)
         self.nearest = dict(nearest or {})
         super().__init__(problem)
@@ -71,3 +73,7 @@ class SubjectError(KinertiaError):
         self.field = field
         self.value = value
         super().__init__(f"{field} = {value}: {problem}")
+
+
+class SettingsError(KinertiaError):
+    """An entry of the subject file or an option of the command line is missing or cannot be."""

@@ -11,13 +11,13 @@ rotation of the upper arm and of the forearm, which this model does not move but
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia import joint_centres as jc
+from kinertia.anthropometry import BodyGeometry
 from kinertia.marker_set import MarkerSet
 from kinertia.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial import Recording
@@ -34,15 +34,11 @@ class Gait27:
 
     Attributes:
         skeleton: 27 free coordinates; markers at their places in the static trial.
-        lengths: m, what the anthropometric tables scale with: `pelvis_width`, and per segment the distance between its
-            joint centres (`torso` to the cervical joint, `foot_r` from ankle to metatarsals, `heel_toe_r` along the foot).
-        lumbar_in_pelvis, mid_hip_in_pelvis: (3,) m.
+        geometry: what the anthropometric tables scale with.
     """
 
     skeleton: Skeleton
-    lengths: Mapping[str, float]
-    lumbar_in_pelvis: np.ndarray
-    mid_hip_in_pelvis: np.ndarray
+    geometry: BodyGeometry
 
 
 def build_gait27(
@@ -64,12 +60,14 @@ def build_gait27(
     pelvis, origin, width, depth = jc.pelvis_frame(marks)
     frames = {"pelvis": (pelvis, origin)}
     joints = [_root()]
-    lengths = {"pelvis_width": width}
+    lengths: dict[str, float] = {}
     hips = {side: jc.hip_in_pelvis(width, depth, hip_centre, side) for side in "rl"}
     for side in "rl":
         joints += _leg(marks, frames, lengths, hips[side], side)
     lumbar = jc.lumbar_in_pelvis(width, sex)
-    joints.append(Joint("pelvis", "torso", np.eye(3), lumbar, _gimbal("lumbar_", "extension bending rotation".split())))
+    joints.append(
+        Joint("pelvis", "torso", np.eye(3), lumbar, _gimbal("lumbar_", ["extension", "bending", "rotation"]))
+    )
     at = origin + pelvis @ lumbar
     torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
     frames["torso"] = (torso, at)
@@ -77,9 +75,8 @@ def build_gait27(
     for side in "rl":
         joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, side)
     mid_hip = (hips["r"] + hips["l"]) / 2
-    lengths["pelvis"] = float(np.linalg.norm(lumbar - mid_hip))
     skeleton = Skeleton("gait27", tuple(joints), _markers(static, marker_set, frames), locked)
-    return Gait27(skeleton, lengths, lumbar, mid_hip)
+    return Gait27(skeleton, BodyGeometry(tuple(lumbar), tuple(mid_hip), lengths))
 
 
 def _root() -> Joint:
@@ -121,12 +118,12 @@ def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side
     ankle_at, _ = jc.ankle(marks, knee_at, rough, side)
     shank = jc.frame(knee_at - ankle_at, thigh[:, 2])
     _, ankle_axis = jc.ankle(marks, knee_at, shank, side)
-    foot, heel_to_metatarsals = jc.foot_frame(marks, side)
+    foot, foot_length = jc.foot_frame(marks, side)
     lengths[f"thigh_{side}"] = float(np.linalg.norm(hip_at - knee_at))
     lengths[f"shank_{side}"] = float(np.linalg.norm(knee_at - ankle_at))
     lengths[f"foot_{side}"] = float(np.linalg.norm(marks[f"metatarsal_{side}"] - ankle_at))
-    lengths[f"heel_toe_{side}"] = heel_to_metatarsals
-    drop = jc.subtalar_in_talus(heel_to_metatarsals)
+    lengths[f"foot_total_{side}"] = foot_length
+    drop = jc.subtalar_in_talus(foot_length)
     frames[f"thigh_{side}"] = (thigh, hip_at)
     frames[f"shank_{side}"] = (shank, knee_at)
     frames[f"foot_{side}"] = (foot, ankle_at + foot @ drop)
@@ -143,13 +140,26 @@ def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side
     return [
         Joint("pelvis", f"thigh_{side}", np.eye(3), hip, hip_axes),
         _pin(f"thigh_{side}", f"shank_{side}", lengths[f"thigh_{side}"] * down, in_thigh, knee_pin, flexion),
-        _pin(f"shank_{side}", f"talus_{side}", lengths[f"shank_{side}"] * down, in_shank, ankle_pin, dorsiflexion),
+        _pin(
+            f"shank_{side}",
+            f"talus_{side}",
+            lengths[f"shank_{side}"] * down,
+            in_shank,
+            ankle_pin,
+            dorsiflexion,
+        ),
         Joint(f"talus_{side}", f"foot_{side}", np.eye(3), drop, (subtalar_pin,)),
     ]
 
 
 def _arm(
-    marks: jc.Landmarks, frames: dict, lengths: dict, locked: dict, shoulder: np.ndarray, height_m: float, side: str
+    marks: jc.Landmarks,
+    frames: dict,
+    lengths: dict,
+    locked: dict,
+    shoulder: np.ndarray,
+    height_m: float,
+    side: str,
 ) -> list[Joint]:
     torso, torso_at = frames["torso"]
     elbow_at, wrist_at, elbow_axis = jc.arm(marks, shoulder, torso, height_m, side)

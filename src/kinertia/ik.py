@@ -78,7 +78,8 @@ def solve_ik(skeleton: Skeleton, markers: Markers, start: np.ndarray | None = No
     q[:, :6], placed = _place_root(model, measured)
     if not placed.any():
         raise TrialError(
-            "markers", "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers"
+            "markers",
+            "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
         )
     fine = np.flatnonzero(placed)
     coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
@@ -92,7 +93,9 @@ def solve_ik(skeleton: Skeleton, markers: Markers, start: np.ndarray | None = No
     errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
-    return InverseKinematics(markers.time, model.coordinates, _unwrap(q, model), model.labels, errors, converged)
+    return InverseKinematics(
+        markers.time, model.coordinates, _unwrap(q, model), model.labels, errors, converged
+    )
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> np.ndarray:

@@ -24,6 +24,7 @@ _ELBOW_WIDTH_OF_STATURE = 0.04
 _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
+_METATARSALS_OF_FOOT = 0.73
 _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
 _TORSO_OF_STATURE = {"male": 0.477 / 1.77, "female": 0.429 / 1.61}
 _CERVICAL = {"male": 0.55, "female": 0.53}
@@ -127,7 +128,9 @@ def knee(marks: Landmarks, hip: np.ndarray, side: str) -> tuple[np.ndarray, np.n
     return _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
 
 
-def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+def ankle(
+    marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Ankle centre and talocrural axis (unit, to the right).
 
     The axis runs through the malleoli where both are marked, else it is Inman's in the shank frame (3, 3).
@@ -193,14 +196,19 @@ def _chord(proximal: np.ndarray, lateral: np.ndarray, wand: np.ndarray, half: fl
 
 
 def foot_frame(marks: Landmarks, side: str) -> tuple[np.ndarray, float]:
-    """Rotation of the foot standing flat (x from heel to toe, y up) and its length from heel to the metatarsals, m."""
+    """Rotation of the foot standing flat (x from heel to toe, y up) and its length from heel to toe tip, m.
+
+    Without a marker on the toe tip the metatarsal heads are taken to be at 73 % of the foot's length.
+    """
     marks.require(f"foot_{side}", f"heel_{side}", f"metatarsal_{side}")
-    tip = marks[f"toe_{side}"] if f"toe_{side}" in marks else marks[f"metatarsal_{side}"]
-    x = (tip - marks[f"heel_{side}"]) * np.array([1.0, 0.0, 1.0])
-    x = x / np.linalg.norm(x)
+    heel, tip = marks[f"heel_{side}"], f"toe_{side}"
+    x = (marks[tip if tip in marks else f"metatarsal_{side}"] - heel) * np.array([1.0, 0.0, 1.0])
+    length = float(np.linalg.norm(x))
+    x = x / length
     up = np.array([0.0, 1.0, 0.0])
-    rotation = np.column_stack([x, up, np.cross(x, up)])
-    return rotation, float((marks[f"metatarsal_{side}"] - marks[f"heel_{side}"]) @ x)
+    return np.column_stack(
+        [x, up, np.cross(x, up)]
+    ), length if tip in marks else length / _METATARSALS_OF_FOOT
 
 
 def torso_frame(

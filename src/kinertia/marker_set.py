@@ -20,11 +20,14 @@ SEGMENTS = (
     "torso",
     *(f"{name}_{side}" for side in "rl" for name in ("thigh", "shank", "foot", "upper_arm", "forearm")),
 )
-_SIDED = (
-    "asis psis knee_lateral knee_medial thigh_wand ankle_lateral ankle_medial shank_wand heel metatarsal toe "
-    "acromion elbow_lateral elbow_medial wrist"
-).split()
-LANDMARKS = (*(f"{name}_{side}" for name in _SIDED for side in "rl"), "sacrum", "c7", "sternal_notch", "head_top")
+_SIDED = ["asis", "psis", "knee_lateral", "knee_medial", "thigh_wand", "ankle_lateral", "ankle_medial", "shank_wand", "heel", "metatarsal", "toe", "acromion", "elbow_lateral", "elbow_medial", "wrist"]
+LANDMARKS = (
+    *(f"{name}_{side}" for name in _SIDED for side in "rl"),
+    "sacrum",
+    "c7",
+    "sternal_notch",
+    "head_top",
+)
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
 
 
@@ -120,7 +123,9 @@ def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, l
     for label in labels:
         folded.setdefault(_fold(label), label)
     return {
-        label: [folded[near] for near in difflib.get_close_matches(_fold(label), list(folded), n=2, cutoff=0.6)]
+        label: [
+            folded[near] for near in difflib.get_close_matches(_fold(label), list(folded), n=2, cutoff=0.6)
+        ]
         for label in missing
     }
 
@@ -141,7 +146,9 @@ def _parse(text: str, path: Path) -> MarkerSet:
     known = {"name": None, "landmarks": LANDMARKS, "segments": SEGMENTS, "widths": WIDTHS}
     for table, entries in content.items():
         if table not in known:
-            raise FileError(path, f"unknown entry '{table}'; a marker set has {', '.join(known)}", _line(text, table))
+            raise FileError(
+                path, f"unknown entry '{table}'; a marker set has {', '.join(known)}", _line(text, table)
+            )
         names = known[table]
         if names is None:
             continue

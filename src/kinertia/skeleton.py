@@ -247,7 +247,9 @@ def _pinocchio_joint(axis: Axis) -> pin.JointModel:
     aligned = _ALIGNED.get((axis.kind, axis.direction))
     if aligned is not None:
         return aligned()
-    unaligned = pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
+    unaligned = (
+        pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
+    )
     return unaligned(*axis.direction)
 
 

@@ -1,8 +1,9 @@
 """What the files of one trial hold, and what the estimators take from it.
 
-`Recording` is what was read: markers, force plates and the subject's measurements, before anything is known about
-feet or models. `Trial` is what the estimators work on: the same markers, the loads sorted by foot, and for every
-marker frame whether all ground contact was measured. `kinertia.contacts` makes the second from the first.
+`Recording` is what was read: markers, force plates and the subject's measurements, before anything is known
+about feet or models. `Trial` is what the estimators work on: the same markers, the loads sorted by foot, and
+for every marker frame whether all ground contact was measured. `kinertia.contacts` makes the second from the
+first.
 
 Everything is in SI units and in the ground frame: X forward, Y up, Z right.
 """
@@ -27,8 +28,8 @@ FEET = ("r", "l")
 LOAD_THRESHOLD_N = 20.0
 """A plate that carries less than this vertical force counts as unloaded.
 
-Below it the centre of pressure is a quotient of two noises (346 m off the origin in one published trial), so the
-readers set force and moment of such samples to zero.
+Below it the centre of pressure is a quotient of two noises (346 m off the origin in one published trial), so
+the readers set force and moment of such samples to zero.
 """
 
 _TIME_TOLERANCE_S = 1e-6
@@ -74,7 +75,9 @@ class Markers:
         missing = [label for label in labels if label not in self.labels]
         if missing:
             nearest = {label: get_close_matches(label, self.labels, n=3) for label in missing}
-            hints = "; ".join(f"'{label}' (nearest: {', '.join(near) or 'none'})" for label, near in nearest.items())
+            hints = "; ".join(
+                f"'{label}' (nearest: {', '.join(near) or 'none'})" for label, near in nearest.items()
+            )
             raise MarkerSetError(
                 f"the trial has no marker {hints}; give labels that are among its {len(self.labels)} markers",
                 missing,
@@ -97,8 +100,8 @@ class PlateLoads:
         names: the p plate names.
         force: (k, p, 3) N, the force ON THE PERSON, in ground axes.
         moment: (k, p, 3) N m, its moment about the ground origin, in ground axes.
-        declared_feet: for each plate "r" or "l" where file or column names say so, else None. Only a claim: the
-            loads file may be wrong, `kinertia.contacts` decides by the data.
+        declared_feet: for each plate "r" or "l" where file or column names say so, else None. Only a claim:
+            the loads file may be wrong, `kinertia.contacts` decides by the data.
         corners: (p, 4, 3) m, or None where the file does not tell.
     """
 
@@ -192,14 +195,17 @@ class Trial:
         return windows(self.markers.time, self.measured)
 
     def rotated(self, rotation: FloatArray) -> Trial:
-        """The same trial in axes turned about the vertical: new = rotation @ old, for markers and loads alike.
+        """The same trial in axes turned about the vertical: new = rotation @ old, for markers and loads
+        alike.
 
         Raises:
             ValueError: `rotation` is not a rotation about the vertical (Y) axis.
         """
         proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) and np.linalg.det(rotation) > 0
         if not (proper and np.allclose(rotation[1], [0, 1, 0], atol=1e-9)):
-            raise ValueError(f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}")
+            raise ValueError(
+                f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}"
+            )
         return replace(self, markers=self.markers.rotated(rotation), loads=self.loads.rotated(rotation))
 
 

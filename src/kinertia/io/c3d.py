@@ -1,7 +1,8 @@
 """C3D files: markers, force plates and the subject's measurements in one binary file, read through ezc3d.
 
-The parts of a C3D file that are only conventions are checked against the data: which axis is vertical, whether plates
-tell the force on the person or the force on the plate, whether a plate lies where its corners say.
+The parts of a C3D file that are only conventions are checked against the data: which axis is vertical,
+whether plates tell the force on the person or the force on the plate, whether a plate lies where its corners
+say.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ from kinertia.errors import FileError
 from kinertia.io.c3d_plates import LabPlates, lab_plates, to_ground_plates
 from kinertia.io.rows import expect_file
 from kinertia.io.trc import METRES_PER_UNIT
-from kinertia.trial import FloatArray, Markers, Recording
+from kinertia.trial import BoolArray, FloatArray, Markers, Recording
 
+_AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
@@ -30,16 +32,18 @@ _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleD
 def read_c3d(path: str | Path) -> Recording:
     """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
 
-    Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual points
-    (joint centres, segment origins) are kept; `subject:` prefixes are stripped; of repeated labels the first one with
-    data is kept. Time counts from the first frame of the capture, so a cropped file does not begin at zero.
+    Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
+    points (joint centres, segment origins) are kept; `subject:` prefixes are stripped; of repeated labels the
+    first one with data is kept. Time counts from the first frame of the capture, so a cropped file does not
+    begin at zero.
 
     Plates: types 1 to 4 (ezc3d reads no others); moment about the ground origin; samples with less than
-    `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so `plates`
-    is None when none is left.
+    `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so
+    `plates` is None when none is left.
 
     Raises:
-        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit.
+        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length
+        unit.
     """
     path = Path(path)
     file, notes = _open(path)
@@ -72,20 +76,28 @@ def _open(path: Path) -> tuple[Any, list[str]]:
         raise FileError(path, f"broken or truncated C3D file ({error}); export it again") from None
     announced, frames = _announced_frames(path, start), file["data"]["points"].shape[2]
     if frames < announced:
-        raise FileError(path, f"truncated: its header announces {announced} frames, {frames} are there; export it again")
+        raise FileError(
+            path, f"truncated: its header announces {announced} frames, {frames} are there; export it again"
+        )
     if not file["data"]["points"].shape[1]:
-        raise FileError(path, "has no points; expected marker trajectories (a file of rotations or forces alone is not enough)")
+        raise FileError(
+            path,
+            "has no points; expected marker trajectories (a file of rotations or forces alone is not enough)",
+        )
     if _values(file["parameters"], "FORCE_PLATFORM", "USED", [0])[0]:
         try:
             file = ezc3d.c3d(str(path), extract_forceplat_data=True)
         except Exception as error:  # the same, for plate types and parameters that it does not know
             types = ", ".join(map(str, _values(file["parameters"], "FORCE_PLATFORM", "TYPE", [])))
-            notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {error}")
+            notes.append(
+                f"{path.name}: force plates (types {types}) were left out, they cannot be read: {error}"
+            )
     return file, notes
 
 
 def _announced_frames(path: Path, start: bytes) -> int:
-    """Number of frames by the header, which ezc3d replaces by what it finds; 0 where 16 bits do not hold it."""
+    """Number of frames by the header, which ezc3d replaces by what it finds; 0 where 16 bits do not hold
+    it."""
     with path.open("rb") as stream:
         stream.seek(512 * (start[0] - 1) + 3)
         processor = stream.read(1)
@@ -115,7 +127,9 @@ def _times(file: Any, kind: str) -> FloatArray:
     start = header["first_frame"] / header["frame_rate"]
     if kind == "points":
         return start + np.arange(file["data"]["points"].shape[2]) / header["frame_rate"]
-    return start + np.arange(file["data"]["analogs"].shape[2]) / (file["header"]["analogs"]["frame_rate"] or 1.0)
+    return start + np.arange(file["data"]["analogs"].shape[2]) / (
+        file["header"]["analogs"]["frame_rate"] or 1.0
+    )
 
 
 def _continued(parameters: Any, name: str) -> list[str]:
@@ -132,9 +146,9 @@ def _continued(parameters: Any, name: str) -> list[str]:
 def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[str]]:
     """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
-    zero = (positions == 0).all(axis=2)
+    zero = np.asarray((positions == 0).all(axis=2))
     positions[zero] = np.nan
-    seen = np.isfinite(positions).all(axis=2).any(axis=0)
+    seen = np.asarray(_seen(positions).any(axis=0))
     labels = _continued(file["parameters"], "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
     outputs = _outputs(file["parameters"], labels)
@@ -146,9 +160,14 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
         if name not in chosen or (not seen[chosen[name]] and seen[k]):
             chosen[name] = k
     if not chosen or not seen[list(chosen.values())].any():
-        raise FileError(path, "has no markers with data among its points; expected marker trajectories, export them too")
+        raise FileError(
+            path, "has no markers with data among its points; expected marker trajectories, export them too"
+        )
     if outputs:
-        notes.append(f"{path.name}: {len(outputs)} model outputs among the points were left out ({_some(sorted(outputs))})")
+        notes.append(
+            f"{path.name}: {len(outputs)} model outputs among the points were left out "
+            f"({_some(sorted(outputs))})"
+        )
     if unnamed:
         notes.append(f"{path.name}: {len(unnamed)} unnamed points were left out")
     repeated = [name for name, times in Counter(names).items() if times > 1]
@@ -172,7 +191,8 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
 
 
 def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[str]]:
-    """Labels without `subject:`; where there are several subjects only the one with most labels loses its prefix."""
+    """Labels without `subject:`; where there are several subjects only the one with most labels loses its
+    prefix."""
     prefixes = Counter(label.split(":", 1)[0] for label in labels if ":" in label)
     if not prefixes:
         return labels, []
@@ -180,37 +200,49 @@ def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[st
     notes = [f"{path.name}: the prefix '{subject}:' was taken off the labels"]
     if len(prefixes) > 1:
         others = ", ".join(name for name in prefixes if name != subject)
-        notes = [f"{path.name}: several subjects; '{subject}:' was taken off the labels, {others} keep theirs"]
+        notes = [
+            f"{path.name}: several subjects; '{subject}:' was taken off the labels, {others} keep theirs"
+        ]
     return [label.removeprefix(subject + ":") for label in labels], notes
 
 
-def _to_ground(path: Path, parameters: Any, positions: FloatArray, plates: LabPlates | None) -> tuple[FloatArray, list[str]]:
+def _to_ground(
+    path: Path, parameters: Any, positions: FloatArray, plates: LabPlates | None
+) -> tuple[FloatArray, list[str]]:
     """Rotation (3, 3) from lab to ground axes, from the file's word and from the data."""
-    told = re.fullmatch(r"([+-]?)([XYZ])", str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper())
-    told_up = None if told is None else ("XYZ".index(told[2]), -1 if told[1] == "-" else 1)
-    seen = positions[np.isfinite(positions).all(axis=2).any(axis=1)]
-    extent = (np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)).mean(axis=0)
+    told = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
+    told_up = _AXES.get(told)
+    seen = positions[_seen(positions).any(axis=1)]
+    extent = np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=0)
     floor = np.zeros(3) if plates is None else plates.corners.mean(axis=(0, 1))
     force = np.zeros(3) if plates is None else plates.loaded_direction()
     if np.abs(force).max() > 0.8:
         axis, why = int(np.argmax(np.abs(force))), "the plates' forces"
     else:
-        axis, why = int(np.argmax(extent)), "the extent of the markers"
+        axis, why = int(np.argmax(extent)), "the markers' extents"
         if told_up is not None and extent[told_up[0]] > 0.5 * extent[axis]:
             axis = told_up[0]
-    middle = np.nanmean(seen, axis=(0, 1))[axis] - floor[axis]
+    middle = np.nanmedian(seen, axis=(0, 1))[axis] - floor[axis]
     found_up = (axis, 1 if middle >= 0 else -1)
-    rotation = _rotation(*found_up)
     up = f"{'+-'[found_up[1] < 0]}{'XYZ'[axis]}"
+    notes = []
     if told_up is None:
-        return rotation, [f"{path.name}: no vertical axis given (POINT:Y_SCREEN); {up} was found from {why}"]
-    if told_up != found_up:
-        return rotation, [f"{path.name}: POINT:Y_SCREEN says {told[0]} is up but {why} say {up}; {up} was believed"]  # type: ignore[index]
-    return rotation, [] if up == "+Y" else [f"{path.name}: lab axes with {up} up were turned to Y up"]
+        notes.append(f"{path.name}: no vertical axis given (POINT:Y_SCREEN); {up} was found from {why}")
+    elif told_up != found_up:
+        notes.append(f"{path.name}: POINT:Y_SCREEN says {told} is up but {why} say {up}; {up} was believed")
+    if up != "+Y":
+        notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
+    return _rotation(*found_up), notes
+
+
+def _seen(positions: FloatArray) -> BoolArray:
+    """(n, m) True where all three coordinates are there."""
+    return np.asarray(np.isfinite(positions).all(axis=2))
 
 
 def _rotation(axis: int, sign: int) -> FloatArray:
-    """Rotation (3, 3) that turns the signed lab axis to +Y and keeps lab X where it can: (x, y, z) -> (x, z, -y)."""
+    """Rotation (3, 3) that turns the signed lab axis to +Y and keeps lab X where it can: (x, y, z) -> (x, z,
+    -y)."""
     up = np.zeros(3)
     up[axis] = sign
     forward = np.eye(3)[1 if axis == 0 else 0]
@@ -220,7 +252,7 @@ def _rotation(axis: int, sign: int) -> FloatArray:
 def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[str]]:
     """Mass (kg), height (m) and other lengths (m) from the PROCESSING group that Plug-in Gait writes."""
     numbers: dict[str, float] = {}
-    for key in parameters["PROCESSING"] if "PROCESSING" in parameters else ():
+    for key in parameters.get("PROCESSING", ()):
         value = _values(parameters, "PROCESSING", key, [""]) if key != "__METADATA__" else [""]
         if np.size(value) == 1 and isinstance(value[0], (int, float, np.number)) and value[0] > 0:
             numbers[key] = float(value[0])

@@ -1,8 +1,8 @@
 """Force plates of a C3D file, from what ezc3d gives to loads about the ground origin.
 
-ezc3d gives each plate's force in lab axes and, for types 2 to 4, its moment about the middle of the plate's four
-corners, also in lab axes, in units made of POINT:UNITS. For type 1 the file holds the centre of pressure and the free
-moment; ezc3d's moment has the opposite sign there, so the moment is made from those two.
+ezc3d gives each plate's force in lab axes and, for types 2 to 4, its moment about the middle of the plate's
+four corners, also in lab axes, in units made of POINT:UNITS. For type 1 the file holds the centre of pressure
+and the free moment; ezc3d's moment has the opposite sign there, so the moment is made from those two.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ class LabPlates:
     corners: FloatArray
 
     def loaded_direction(self) -> FloatArray:
-        """Mean direction (3,) of the loaded samples, each counted without sign; zero when nothing is loaded."""
+        """Mean direction (3,) of the loaded samples, each counted without sign; zero when nothing is
+        loaded."""
         size = np.linalg.norm(self.force, axis=2)
         loaded = self.force[size > 5 * LOAD_THRESHOLD_N]
         if len(loaded) < 10:
@@ -49,8 +50,8 @@ class LabPlates:
 
 def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, list[str]]:
     """The plates that can be used, in lab axes; None where there is none. `unit` is metres per file unit."""
-    platforms = file["data"]["platform"] if "platform" in file["data"] else []
-    group = file["parameters"]["FORCE_PLATFORM"] if platforms else None
+    platforms = file["data"].get("platform", [])
+    group = file["parameters"].get("FORCE_PLATFORM", {})
     names, forces, moments, corners, notes = [], [], [], [], []
     for number, platform in enumerate(platforms, start=1):
         name = f"plate {number}"
@@ -70,7 +71,9 @@ def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, li
         corners.append(places)
     if not names:
         return None, notes
-    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners)), notes
+    return LabPlates(
+        tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners)
+    ), notes
 
 
 def to_ground_plates(
@@ -87,7 +90,9 @@ def to_ground_plates(
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
             moment[:, p] *= -1
-            notes.append(f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed")
+            notes.append(
+                f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed"
+            )
         loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
         force[~loaded, p] = 0.0
         moment[~loaded, p] = 0.0
@@ -95,7 +100,8 @@ def to_ground_plates(
             notes.append(f"{path.name}: {name} never carries {LOAD_THRESHOLD_N:g} N")
         elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
             notes.append(
-                f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its corners; check "
+                f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
+                "corners; check "
                 "the plate's corners, origin and units"
             )
     return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners), notes
@@ -104,7 +110,12 @@ def to_ground_plates(
 def _corner_trouble(corners: FloatArray) -> str:
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     low, high = _EDGE_LIMITS_M
-    if np.isfinite(corners).all() and np.abs(corners).max() < _CORNER_LIMIT_M and low < edges.min() and edges.max() < high:
+    if (
+        np.isfinite(corners).all()
+        and np.abs(corners).max() < _CORNER_LIMIT_M
+        and low < edges.min()
+        and edges.max() < high
+    ):
         return ""
     return f"its corners are no plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
 

@@ -33,17 +33,18 @@ class _Columns:
 def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = None) -> PlateLoads:
     """Read force plates from a MOT or STO file: force and point of application in ground axes, N, m, N m.
 
-    With an ExternalLoads file its identifiers say which column is what and its bodies which foot it claims (a claim
-    only); its own `datafile` is used only when `mot_path` is None. Without one, columns are recognised by name:
-    `ground_force_vx`, `1_ground_force_vx`, `ground_force_r_vx`, `ground_force_1_vx` and the like, with the point
-    `..._px` and the torque `..._mx`, `ground_torque_...x` or `ground_moment_...mx`.
+    With an ExternalLoads file its identifiers say which column is what and its bodies which foot it claims (a
+    claim only); its own `datafile` is used only when `mot_path` is None. Without one, columns are recognised
+    by name: `ground_force_vx`, `1_ground_force_vx`, `ground_force_r_vx`, `ground_force_1_vx` and the like,
+    with the point `..._px` and the torque `..._mx`, `ground_torque_...x` or `ground_moment_...mx`.
 
     Samples with less than `LOAD_THRESHOLD_N` of vertical force are set to zero: their point of application is
-    garbage. Where no torque is given, the free moment is zero. `read_forces_with_notes` tells what was assumed.
+    garbage. Where no torque is given, the free moment is zero. `read_forces_with_notes` tells what was
+    assumed.
 
     Raises:
-        FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed in
-            ground, time does not grow, a loaded sample is NaN, or the forces point down.
+        FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
+            in ground, time does not grow, a loaded sample is NaN, or the forces point down.
     """
     return read_forces_with_notes(mot_path, loads_path)[0]
 
@@ -52,12 +53,13 @@ def read_forces_with_notes(
     mot_path: str | Path | None, loads_path: str | Path | None = None
 ) -> tuple[PlateLoads, tuple[str, ...]]:
     """`read_forces` and the assumptions made while reading, one sentence each."""
+    notes: tuple[str, ...] = ()
     if loads_path is None:
         if mot_path is None:
             raise ValueError("read_forces needs a force file or an ExternalLoads file")
         path = Path(mot_path)
         table = read_sto(path)
-        groups, notes = _groups_by_name(path, table), ()
+        groups = _groups_by_name(path, table)
     else:
         loads_path = Path(loads_path)
         root = _external_loads(loads_path)
@@ -87,7 +89,8 @@ def _expect_steady_time(path: Path, time: FloatArray) -> None:
         before, after = time[odd[0]], time[odd[0] + 1]
         raise FileError(
             path,
-            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal steps, export "
+            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal "
+            "steps, export "
             "the forces without gaps",
         )
 
@@ -99,7 +102,8 @@ def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArra
     if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
         raise FileError(
             path,
-            f"the largest vertical force in {group.force}y is {force[:, 1].min():.0f} N, downward; expected Y up and "
+            f"the largest vertical force in {group.force}y is {force[:, 1].min():.0f} N, downward; expected "
+            "Y up and "
             "the force on the person, turn the sign or the axes before export",
         )
     loaded = force[:, 1] >= LOAD_THRESHOLD_N
@@ -121,19 +125,24 @@ def _expect_numbers(path: Path, table: pd.DataFrame, identifier: str, where: np.
         row, axis = broken[0]
         raise FileError(
             path,
-            f"column {identifier}{'xyz'[axis]} has no number at {table.index[row]:g} s; expected one for every loaded "
+            f"column {identifier}{'xyz'[axis]} has no number at {table.index[row]:g} s; expected one for "
+            "every loaded "
             "sample, fill the gap or cut the trial before export",
         )
 
 
 def _remarks(path: Path, loads: PlateLoads, groups: Sequence[_Columns]) -> list[str]:
-    idle = [name for name, force in zip(loads.names, loads.force.swapaxes(0, 1), strict=True) if not force.any()]
+    idle = [
+        name for name, force in zip(loads.names, loads.force.swapaxes(0, 1), strict=True) if not force.any()
+    ]
     still = [group.name for group in groups if group.torque is None]
     notes = []
     if idle:
         notes.append(f"{path.name}: {', '.join(idle)} never carries {LOAD_THRESHOLD_N:g} N")
     if still:
-        notes.append(f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero")
+        notes.append(
+            f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero"
+        )
     return notes
 
 
@@ -145,18 +154,25 @@ def _groups_by_name(path: Path, table: pd.DataFrame) -> list[_Columns]:
         stem = force[:-1]
         if not _has(table, stem + "p"):
             raise FileError(
-                path, f"{force}x has no point of application; expected {stem}px, {stem}py and {stem}pz, or an ExternalLoads file"
+                path,
+                f"{force}x has no point of application; expected {stem}px, {stem}py and {stem}pz, or an "
+                "ExternalLoads file",
             )
         candidates = [stem + "m", stem + "t"]
-        candidates += [stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")]
+        candidates += [
+            stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")
+        ]
         torque = next((c for c in candidates if c != stem and _has(table, c)), None)
         words = re.split(r"[_\W]+", stem.lower())
         feet = {_FOOT_WORDS[word] for word in words if word in _FOOT_WORDS}
-        groups.append(_Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None))
+        groups.append(
+            _Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None)
+        )
     if not groups:
         raise FileError(
             path,
-            "no ground reaction forces: expected columns like ground_force_vx, ground_force_vy, ground_force_vz, but "
+            "no ground reaction forces: expected columns like ground_force_vx, ground_force_vy, "
+            "ground_force_vz, but "
             f"it has {_listed(columns)}; rename them or give an ExternalLoads file",
         )
     return groups
@@ -175,7 +191,9 @@ def _external_loads(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
-        raise FileError(path, f"not XML ({error}); expected an ExternalLoads file, export it again", error.position[0]) from None
+        raise FileError(
+            path, f"not XML ({error}); expected an ExternalLoads file, export it again", error.position[0]
+        ) from None
     if root.find(".//ExternalForce") is None:
         raise FileError(path, "no ExternalForce in it; expected an OpenSim ExternalLoads file")
     return root
@@ -187,7 +205,9 @@ def _datafile(root: ElementTree.Element, loads_path: Path) -> Path:
         raise FileError(loads_path, "names no datafile; give the MOT or STO file of the forces beside it")
     path = loads_path.parent / name.replace("\\", "/")
     if not path.is_file():
-        raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
+        raise FileError(
+            loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it"
+        )
     return path
 
 
@@ -201,14 +221,20 @@ def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_
         for tag in ("force_expressed_in_body", "point_expressed_in_body"):
             body = _text(element, tag) or "ground"
             if body.rsplit("/", 1)[-1] != "ground":
-                raise FileError(path, f"{name} has {tag} = {body}; expected ground, transform the load before export")
+                raise FileError(
+                    path, f"{name} has {tag} = {body}; expected ground, transform the load before export"
+                )
         force, point = _text(element, "force_identifier"), _text(element, "point_identifier")
         for tag, identifier in (("force_identifier", force), ("point_identifier", point)):
             if not identifier:
-                raise FileError(path, f"{name} has no {tag}; expected the beginning of its three column names")
+                raise FileError(
+                    path, f"{name} has no {tag}; expected the beginning of its three column names"
+                )
         side = re.search(r"_([rl])$", _text(element, "applied_to_body"))
         groups.append(
-            _Columns(name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None)
+            _Columns(
+                name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None
+            )
         )
     if not groups:
         raise FileError(path, "all its external forces are disabled; expected at least one that applies")
@@ -227,6 +253,7 @@ def _expect_columns(groups: Sequence[_Columns], table: pd.DataFrame, path: Path,
             if missing:
                 raise FileError(
                     path,
-                    f"no column {', '.join(missing)}, which {loads_path.name} names for {group.name} by the identifier "
+                    f"no column {', '.join(missing)}, which {loads_path.name} names for {group.name} by the "
+                    "identifier "
                     f"'{identifier}'; the columns are {_listed(list(table.columns))}; correct the identifier",
                 )

@@ -21,8 +21,8 @@ def read_recording(
     Args:
         markers_path: a .trc or .c3d file.
         forces_path: a .mot or .sto file; its forces go before those of a C3D file.
-        loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without `forces_path`
-            its own datafile is read.
+        loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without
+            `forces_path` its own datafile is read.
 
     Returns:
         the recording; its `plates` is None where no file holds usable force plates.
@@ -53,7 +53,9 @@ def read_recording(
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
     if path.suffix.lower() not in suffixes:
-        raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}")
+        raise FileError(
+            path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}"
+        )
     expect_file(path)
 
 
@@ -64,6 +66,7 @@ def _expect_overlap(recording: Recording) -> None:
     if forces[0] > markers[-1] or forces[-1] < markers[0]:
         raise TrialError(
             recording.name,
-            f"forces from {forces[0]:.3f} to {forces[-1]:.3f} s and markers from {markers[0]:.3f} to {markers[-1]:.3f} s "
+            f"forces from {forces[0]:.3f} to {forces[-1]:.3f} s and markers from {markers[0]:.3f} to "
+            f"{markers[-1]:.3f} s "
             "do not overlap; give files of the same trial on the same clock",
         )

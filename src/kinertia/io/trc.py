@@ -22,8 +22,8 @@ _TIME_TOLERANCE_FRAMES = 0.1
 def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
-    Empty cells, NaN and the triple 0 0 0 are missing markers. Frame times that were rounded when written are put
-    back on the uniform grid they came from. `read_trc_with_notes` tells when either was needed.
+    Empty cells, NaN and the triple 0 0 0 are missing markers. Frame times that were rounded when written are
+    put back on the uniform grid they came from. `read_trc_with_notes` tells when either was needed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
@@ -42,7 +42,8 @@ def read_trc_with_notes(path: str | Path) -> tuple[Markers, tuple[str, ...]]:
     if len(values) != frames or not frames:
         raise FileError(
             path,
-            f"the header announces {frames} frames but the file has {len(values)}; export the file again or correct "
+            f"the header announces {frames} frames but the file has {len(values)}; export the file again or "
+            "correct "
             "NumFrames",
             3,
         )
@@ -82,11 +83,11 @@ def write_trc(path: str | Path, markers: Markers) -> None:
 
 def _header(path: Path, lines: list[str]) -> dict[str, str]:
     if not lines[0].lstrip().startswith("PathFileType"):
-        raise FileError(path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1)
-    if len(lines) < _FIRST_ROW_LINE:
         raise FileError(
-            path, f"ends within its header after {len(lines)} lines; export it again", len(lines)
+            path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1
         )
+    if len(lines) < _FIRST_ROW_LINE:
+        raise FileError(path, f"ends within its header after {len(lines)} lines; export it again", len(lines))
     names, values = lines[1].split(), lines[2].split()
     missing = [key for key in _HEADER_KEYS if key not in names]
     if missing:
@@ -100,7 +101,9 @@ def _number(path: Path, header: dict[str, str], key: str) -> float:
     try:
         return float(header[key])
     except ValueError:
-        raise FileError(path, f"{key} is '{header[key]}', expected a number; export the file again", 3) from None
+        raise FileError(
+            path, f"{key} is '{header[key]}', expected a number; export the file again", 3
+        ) from None
 
 
 def _count(path: Path, header: dict[str, str], key: str) -> int:
@@ -116,12 +119,16 @@ def _labels(path: Path, lines: list[str], count: int) -> tuple[str, ...]:
     labels = tuple(cell.strip() for cell in cells if cell.strip())[2:]
     if len(labels) != count or not count:
         raise FileError(
-            path, f"{len(labels)} marker labels, expected {count} as NumMarkers says; correct or export it again", 4
+            path,
+            f"{len(labels)} marker labels, expected {count} as NumMarkers says; correct or export it again",
+            4,
         )
     repeated = [label for label, times in Counter(labels).items() if times > 1]
     if repeated:
         raise FileError(
-            path, f"repeated marker labels {', '.join(repeated)}; expected each once, rename or remove the others", 4
+            path,
+            f"repeated marker labels {', '.join(repeated)}; expected each once, rename or remove the others",
+            4,
         )
     return labels
 
@@ -135,19 +142,26 @@ def _uniform_time(
     path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
 ) -> tuple[FloatArray, tuple[str, ...]]:
     if np.isnan(time).any():
-        raise FileError(path, "the row has no time; expected it in column 2", line_numbers[int(np.argmax(np.isnan(time)))])
+        raise FileError(
+            path, "the row has no time; expected it in column 2", line_numbers[int(np.argmax(np.isnan(time)))]
+        )
     if len(time) == 1:
         return time, ()
     late = np.flatnonzero(np.diff(time) <= 0)
     if late.size:
         row = int(late[0]) + 1
         raise FileError(
-            path, f"time {time[row]:g} s does not come after {time[row - 1]:g} s; expected time to grow", line_numbers[row]
+            path,
+            f"time {time[row]:g} s does not come after {time[row - 1]:g} s; expected time to grow",
+            line_numbers[row],
         )
     step = (time[-1] - time[0]) / (len(time) - 1)
     if abs(rate_hz * step - 1) > 0.01:
         raise FileError(
-            path, f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz; correct the wrong one", 3
+            path,
+            f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz; correct the wrong "
+            "one",
+            3,
         )
     frames = np.arange(len(time))
     uniform = time[0] + frames / rate_hz
@@ -160,7 +174,8 @@ def _uniform_time(
         row = int(off[0])
         raise FileError(
             path,
-            f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s; Kinertia takes uniform "
+            f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s; Kinertia "
+            "takes uniform "
             "frames only, so export every frame (gaps as empty cells)",
             line_numbers[row],
         )
@@ -183,7 +198,8 @@ def _positions(
         row, marker = partly[0]
         raise FileError(
             path,
-            f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair the row",
+            f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair "
+            "the row",
             line_numbers[row],
         )
     zero = (positions == 0).all(axis=2)
@@ -191,4 +207,6 @@ def _positions(
         return positions, ()
     positions[zero] = np.nan
     named = ", ".join(label for label, hit in zip(labels, zero.any(axis=0), strict=True) if hit)
-    return positions, (f"{path.name}: {int(zero.sum())} marker positions 0 0 0 were taken as missing ({named})",)
+    return positions, (
+        f"{path.name}: {int(zero.sum())} marker positions 0 0 0 were taken as missing ({named})",
+    )

@@ -1,0 +1,132 @@
+"""What can be wrong with a subject, a trial or a result, and how to say it: errors before, warnings after estimation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinertia.anthropometry import check_subject
+from kinertia.bsp import BodySegmentParameters
+from kinertia.config import Subject
+from kinertia.errors import SubjectError, TrialError
+from kinertia.skeleton import Skeleton
+from kinertia.trial import Recording, Trial
+from kinertia.two_level import TwoLevelResult
+
+if TYPE_CHECKING:
+    from kinertia.fit import TrialFit
+
+FORCE_MASS_TOLERANCE = 0.02
+"""Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
+ESTIMATE_TOLERANCE = 0.03
+"""Scale and estimated total mass may differ by this share before a warning."""
+
+
+def known(value: float | None) -> float:
+    """The value of a field that `complete_subject` has filled in."""
+    if value is None:
+        raise ValueError("complete_subject must come first")
+    return value
+
+
+def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple[Subject, list[str]]:
+    """Mass and height from the files where the user gave none; warnings where both are given and disagree.
+
+    Raises:
+        SubjectError: neither the user nor a file gives mass or height, or the value cannot be true.
+    """
+    warnings = []
+    found: dict[str, float] = {}
+    for quantity, option in (("mass_kg", "--mass"), ("height_m", "--height")):
+        told = [(r.name, getattr(r, quantity)) for r in recordings if getattr(r, quantity) is not None]
+        given = getattr(subject, quantity)
+        if given is None and not told:
+            raise SubjectError(
+                quantity, None, f"no file carries it; give it with {option} or as {quantity} under [subject]"
+            )
+        found[quantity] = told[0][1] if given is None else given
+        for name, value in told:
+            if abs(value - found[quantity]) > 0.01 * found[quantity]:
+                warnings.append(
+                    f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}"
+                )
+    check_subject(found["mass_kg"], found["height_m"], subject.sex)
+    return subject.model_copy(update=found), warnings
+
+
+def check_visible(skeleton: Skeleton, trial: Trial) -> None:
+    """Raise TrialError when a marker is never seen, or a segment has no marker in the trial."""
+    lost = [
+        marker.label
+        for marker in skeleton.markers
+        if marker.label in trial.markers.labels
+        and not np.isfinite(trial.markers.select([marker.label]).positions).any()
+    ]
+    if lost:
+        raise TrialError(
+            trial.name,
+            f"no frame shows the marker{'s' if len(lost) > 1 else ''} {', '.join(lost)}; label them, or remove them from "
+            f"the file if they were not worn",
+        )
+    for segment in skeleton.segments:
+        worn = [m.label for m in skeleton.markers if m.segment == segment]
+        if worn and not set(worn) & set(trial.markers.labels):
+            raise TrialError(
+                trial.name,
+                f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are unknown; "
+                f"use a trial that has them",
+            )
+
+
+def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
+    """Body mass by the vertical ground reaction over the window, whatever the CoM's acceleration.
+
+    The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no mean
+    vertical residual is m F / (F + P), with means over the window.
+    """
+    force = float(trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean())
+    excess = float(trial.residuals["literature"][:, 1].mean())
+    return literature.total_mass_kg * force / (force + excess)
+
+
+def fit_warnings(
+    mass_kg: float, literature: BodySegmentParameters, result: TwoLevelResult, trials: Sequence[TrialFit]
+) -> list[str]:
+    """What the user should know before using the numbers."""
+    found = []
+    for trial in trials:
+        by_force = mass_from_force_kg(literature, trial)
+        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
+            found.append(
+                f"{trial.name}: the mean vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg "
+                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
+            )
+    if not result.converged:
+        found.append(
+            f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is reported"
+        )
+    total = result.bsp.total_mass_kg
+    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
+        found.append(
+            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg ({100 * (total / mass_kg - 1):+.1f} %): "
+            f"the two-level estimate leaves the total mass free, and it follows the plates' gain and the noise of the motion"
+        )
+    impossible = result.bsp.inconsistencies()
+    if impossible:
+        consistent = result.bsp.physically_consistent()
+        names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
+        found.append(
+            f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
+            f"({', '.join(names)}): it explains the forces, but skin-motion noise decides single parameters; "
+            f"do not use them as this person's"
+        )
+    moved = np.linalg.norm(result.bsp.com_m - literature.com_m, axis=1)
+    worst = int(np.argmax(moved))
+    if moved[worst] > 0.1:
+        found.append(
+            f"the estimate contradicts the literature: the centre of mass of {result.bsp.segments[worst]} "
+            f"moved by {moved[worst] * 1e3:.0f} mm"
+        )
+    return found

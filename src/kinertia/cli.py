@@ -1,0 +1,254 @@
+"""The command line: `kinertia fit`, `kinertia init`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from kinertia import __version__
+from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
+from kinertia.errors import FileError, KinertiaError
+from kinertia.fit import Fit, TrialInput, estimate_bsp
+from kinertia.io.recording import read_recording
+from kinertia.marker_set import read_marker_set
+from kinertia.results import save_fit, summary
+from kinertia.subject_draft import init_subject
+
+app = typer.Typer(
+    name="kinertia",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="Body segment parameters from gait: markers and ground reaction forces in; masses, centres of mass and "
+    "inertias of all segments out.",
+)
+_out = Console()
+_err = Console(stderr=True)
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line and exit status 2."""
+    try:
+        app()
+    except KinertiaError as error:
+        _err.print(f"[bold red]error:[/] {error}", soft_wrap=True, highlight=False, markup=True)
+        raise SystemExit(2) from error
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        _out.print(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def fit(
+    trial: Annotated[
+        Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
+    forces: Annotated[
+        Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")
+    ] = None,
+    loads: Annotated[
+        Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may carry it.")] = None,
+    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may carry it.")] = None,
+    sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
+    markers: Annotated[
+        str | None,
+        typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
+    ] = None,
+    method: Annotated[str | None, typer.Option(help="Estimator: two-level.")] = None,
+) -> None:
+    """Estimate body segment parameters from gait.
+
+    [bold]Examples[/]
+
+    kinertia fit subject.toml -o out
+
+    kinertia fit walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male -o out
+
+    kinertia fit walk.trc --forces walk_grf.mot --static static.trc --mass 72.6 --height 1.803 --sex male -o out
+    """
+    options = {
+        "--static": static,
+        "--forces": forces,
+        "--loads": loads,
+        "--mass": mass,
+        "--height": height,
+        "--sex": sex,
+        "--markers": markers,
+    }
+    if trial.suffix.lower() == ".toml":
+        given = [name for name, value in options.items() if value is not None]
+        if given:
+            raise FileError(
+                trial,
+                f"a subject file says it all; put {', '.join(given)} into it instead of the command line",
+            )
+        wanted = read_subject(trial)
+    else:
+        wanted = _from_options(trial, options)
+    if method is not None:
+        wanted = with_settings(wanted, method=method)
+    result = _run(wanted)
+    folder = save_fit(result, output)
+    _report(result, folder)
+
+
+@app.command()
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder with the files of one person.")],
+) -> None:
+    """Write a first subject.toml from the files in a folder.
+
+    [bold]Example[/]
+
+    kinertia init data/subject01
+    """
+    path = folder / "subject.toml"
+    if path.exists():
+        raise FileError(path, "exists already and is left alone; remove it to draft a new one")
+    text = init_subject(folder)
+    path.write_text(text, encoding="utf-8")
+    _out.print(f"wrote {path}: fill in what it asks for, then run [bold]kinertia fit {path} -o out[/]")
+
+
+def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
+    """The subject file that these options stand for."""
+    given = {
+        key: str(value) if isinstance(value, Path) else value
+        for key, value in options.items()
+        if value is not None
+    }
+    for name in ("--static", "--sex"):
+        if name not in given:
+            raise FileError(
+                trial, f"a trial on its own needs {name}; or write a subject file (kinertia init FOLDER)"
+            )
+    names = {
+        "subject": {"--mass": "mass_kg", "--height": "height_m", "--sex": "sex"},
+        "model": {"--static": "static", "--markers": "markers"},
+        "trial": {"--forces": "forces", "--loads": "loads"},
+    }
+    tables = {
+        table: {key: given[option] for option, key in entries.items() if option in given}
+        for table, entries in names.items()
+    }
+    trials = [{"markers": str(trial), **tables["trial"]}]
+    return subject_from_options(
+        {"subject": {"name": trial.stem, **tables["subject"]}, "model": tables["model"], "trial": trials}
+    )
+
+
+def _run(wanted: SubjectFile) -> Fit:
+    with _progress() as progress:
+        started = time.perf_counter()
+        progress("reading", 0.0)
+        static = read_recording(wanted.model.static)
+        inputs = []
+        for k, files in enumerate(wanted.trials):
+            progress("reading", k / len(wanted.trials))
+            recording = read_recording(files.markers, files.forces, files.loads)
+            seconds = time.perf_counter() - started
+            inputs.append(TrialInput(replace(recording, name=files.name), files.window_s, seconds))
+            started = time.perf_counter()
+        marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
+        return estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """A progress bar on a terminal, a line per stage elsewhere."""
+    if not _err.is_terminal:
+        seen: list[str] = []
+
+        def line(stage: str, share: float) -> None:
+            if stage not in seen:
+                seen.append(stage)
+                _err.print(stage, highlight=False)
+
+        yield line
+        return
+    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=_err, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda stage, share: bar.update(task, description=stage, completed=share)
+
+
+def _report(fit: Fit, folder: Path) -> None:
+    told = summary(fit)
+    subject, mass = told["subject"], told["total_mass_kg"]
+    _out.print(
+        f"\n[bold]{subject['name']}[/]: {subject['mass_kg']:g} kg, {subject['height_m']:g} m, {subject['sex']}; "
+        f"method {told['method']}, {fit.notes[0]}",
+        highlight=False,
+    )
+    residuals = Table(title="Residuals at the pelvis, RMS (largest)", title_justify="left")
+    for heading in ("trial", "used (s)", "frames", "markers (mm)", "", "literature", "corrected", "estimate"):
+        residuals.add_column(heading, justify="left" if heading in ("trial", "") else "right")
+    for trial in told["trials"]:
+        first, last = trial["window_s"]
+        markers = trial["marker_rms_m"]
+        for kind, unit in (("force", "N"), ("moment", "Nm")):
+            rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
+            values = [
+                f"{rms[stage]:.1f} ({top[stage]:.0f})" for stage in ("literature", "corrected", "estimate")
+            ]
+            head = (
+                [
+                    trial["name"],
+                    f"{first:.2f}-{last:.2f}",
+                    str(trial["n_dynamic_frames"]),
+                    f"{markers['final'] * 1e3:.1f}",
+                ]
+                if kind == "force"
+                else [""] * 4
+            )
+            residuals.add_row(*head, f"{kind} ({unit.replace('Nm', 'N m')})", *values)
+    _out.print(residuals)
+    _out.print(_bsp_table(fit))
+    _out.print(
+        f"total mass: scale {mass['measured']:.1f} kg, estimate {mass['estimate']:.1f} kg", highlight=False
+    )
+    for warning in fit.warnings:
+        _out.print(f"[bold yellow]warning:[/] {warning}", highlight=False)
+    _out.print(f"results in {folder}", highlight=False)
+
+
+def _bsp_table(fit: Fit) -> Table:
+    table = Table(title="Body segment parameters, literature > estimate", title_justify="left")
+    table.add_column("segment")
+    for heading in ("mass (kg)", "CoM x, y, z (mm)", "Ixx, Iyy, Izz (kg m2)"):
+        table.add_column(heading, justify="right")
+    for i, segment in enumerate(fit.literature.segments):
+        sets = (fit.literature, fit.estimate)
+        mass = " > ".join(f"{bsp.mass_kg[i]:.2f}" for bsp in sets)
+        com = " > ".join(", ".join(f"{value * 1e3:.0f}" for value in bsp.com_m[i]) for bsp in sets)
+        inertia = " > ".join(
+            ", ".join(f"{value:.3g}" for value in bsp.inertia_kgm2[i].diagonal()) for bsp in sets
+        )
+        table.add_row(segment, mass, com, inertia)
+    return table

@@ -1,0 +1,180 @@
+"""From a trial to smooth coordinates: facing +X, inverse kinematics, GCV splines, and ground reactions to match.
+
+The splines of the coordinates and those of the ground reactions carry the same band: the forces are smoothed at the median
+cutoff that cross-validation chose for the pelvis translations, whose accelerations they balance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from kinertia.dynamics import Motion
+from kinertia.errors import TrialError
+from kinertia.ik import InverseKinematics, rms, solve_ik
+from kinertia.marker_set import MarkerSet
+from kinertia.skeleton import Skeleton
+from kinertia.splines import SmoothedSpline, smooth
+from kinertia.trial import Markers, Trial, runs
+
+LONGEST_BRIDGE_S = 0.1
+"""The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
+_SWAP_M = 0.05
+_SWAP_GAIN = 0.3
+_LOST_M = 0.08
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """A trial with its coordinates.
+
+    Attributes:
+        trial: turned so that the person faces +X.
+        turned_deg: by how much, about the vertical.
+        ik: coordinates frame by frame.
+        spline: smoothed coordinates over the frames that inverse kinematics solved.
+        cutoff_hz: of the ground reactions.
+        window_s: first and last time at which all ground contact is measured and all coordinates are known.
+        notes: assumptions made on the way.
+    """
+
+    trial: Trial
+    turned_deg: float
+    ik: InverseKinematics
+    spline: SmoothedSpline
+    cutoff_hz: float
+    window_s: tuple[float, float]
+    notes: tuple[str, ...]
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """Indices of the marker frames inside the window."""
+        time = self.trial.markers.time
+        return np.flatnonzero((time >= self.window_s[0] - 1e-9) & (time <= self.window_s[1] + 1e-9))
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """(w,) s, the frames inside the window."""
+        return self.trial.markers.time[self.frames]
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Smoothed coordinates and derivatives inside the window."""
+        return Motion(*(self.spline(self.time, order) for order in range(3)))
+
+    @cached_property
+    def foot_loads(self) -> np.ndarray:
+        """(w, 2, 6) ground reactions on the right and left foot inside the window: force, moment about the ground origin.
+
+        Smoothed from the window's own samples only: what a plate saw outside it may not be all of the ground contact.
+        """
+        loads = self.trial.loads
+        inside = (loads.time >= self.window_s[0] - 1e-9) & (loads.time <= self.window_s[1] + 1e-9)
+        columns = np.concatenate([loads.force, loads.moment], axis=-1)[inside].reshape(-1, 12)
+        return smooth(loads.time[inside], columns, self.cutoff_hz)(self.time).reshape(-1, 2, 6)
+
+
+def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
+    """Rotation about the vertical, by a multiple of 90 degrees, that makes the person face +X; and that angle."""
+    sides = [
+        np.nanmean(markers.select(marker_set.landmarks[f"asis_{side}"]).positions, axis=(0, 1))
+        for side in "rl"
+    ]
+    right = sides[0] - sides[1]
+    quarter = int(np.round(np.arctan2(right[0], right[2]) / (np.pi / 2)))
+    cosine, sine = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarter % 4]
+    return np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]), -90.0 * quarter
+
+
+def solve_kinematics(
+    skeleton: Skeleton, trial: Trial, turned_deg: float, smoothing: float | Literal["gcv"]
+) -> Kinematics:
+    """Inverse kinematics and smoothing of a trial that already faces +X.
+
+    Raises:
+        TrialError: no stretch in which all ground contact is measured and all coordinates are known.
+    """
+    ik = solve_ik(skeleton, trial.markers)
+    solved = np.flatnonzero(np.isfinite(ik.q).any(axis=1))
+    inside = slice(solved[0], solved[-1] + 1)
+    spline = smooth(ik.time[inside], ik.q[inside], smoothing)
+    known = _bridged(np.isfinite(ik.q), ik.time).all(axis=1)
+    usable = known & trial.measured
+    window, notes = _longest(trial, usable, known)
+    cutoff_hz = float(np.median(spline.cutoff_hz[:3]))
+    return Kinematics(trial, turned_deg, ik, spline, cutoff_hz, window, (*trial.notes, *notes))
+
+
+def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """`known` (n, c) with gaps up to LONGEST_BRIDGE_S between known frames filled."""
+    filled = known.copy()
+    for c in range(known.shape[1]):
+        for first, last in runs(~known[:, c]):
+            inner = first > 0 and last < len(time) - 1
+            if inner and time[last + 1] - time[first - 1] <= LONGEST_BRIDGE_S:
+                filled[first : last + 1, c] = True
+    return filled
+
+
+def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple[float, float], list[str]]:
+    time = trial.markers.time
+    stretches = sorted(runs(usable), key=lambda run: run[0] - run[1])
+    if not stretches:
+        raise TrialError(
+            trial.name,
+            f"no frame has both measured ground contact (frames with it: {int(trial.measured.sum())}) and enough visible "
+            f"markers for all coordinates (frames with them: {int(known.sum())}); fill marker gaps or use another trial",
+        )
+    first, last = stretches[0]
+    if last - first < 10:
+        raise TrialError(
+            trial.name,
+            f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} frames "
+            f"({time[first]:.3f} to {time[last]:.3f} s); at least 11 are needed",
+        )
+    notes = []
+    left_out = sum(end - start + 1 for start, end in stretches[1:])
+    if left_out:
+        notes.append(
+            f"{trial.name}: only the longest measured stretch, {time[first]:.3f} to {time[last]:.3f} s, is used; "
+            f"{left_out} frames of {len(stretches) - 1} shorter ones are left out"
+        )
+    return (float(time[first]), float(time[last])), notes
+
+
+def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
+    """Raise TrialError when two markers look swapped, or the model cannot follow the markers at all.
+
+    Args:
+        skeleton: the static model, with free arm rotations.
+        name: the trial's, for the message.
+        markers: a few frames suffice.
+    """
+    ik = solve_ik(skeleton, markers)
+    used = skeleton.with_markers([m for m in skeleton.markers if m.label in ik.labels])
+    solved = np.isfinite(ik.q).all(axis=1)
+    modelled = used.marker_positions(used.pose(ik.q[solved]))
+    measured = markers.select(ik.labels).positions[solved]
+    between = np.nanmean(np.square(measured[:, :, None] - modelled[:, None]).sum(axis=-1), axis=0)
+    now = np.diag(between)[:, None] + np.diag(between)
+    gain = np.where(now / 2 > _SWAP_M**2, (between + between.T) / np.maximum(now, 1e-12), np.inf)
+    np.fill_diagonal(gain, np.inf)
+    i, j = np.unravel_index(np.argmin(gain), gain.shape)
+    if gain[i, j] < _SWAP_GAIN:
+        before, after = np.sqrt(now[i, j] / 2), np.sqrt((between[i, j] + between[j, i]) / 2)
+        raise TrialError(
+            name,
+            f"the markers '{ik.labels[i]}' and '{ik.labels[j]}' look swapped: they are {before * 1e3:.0f} mm from where the "
+            f"static trial puts them, and {after * 1e3:.0f} mm if exchanged; correct the labels",
+        )
+    if rms(ik.errors_m) > _LOST_M:
+        worst = np.argsort(-np.diag(between))[:3]
+        listed = ", ".join(f"'{ik.labels[k]}' ({np.sqrt(between[k, k]) * 1e3:.0f} mm)" for k in worst)
+        raise TrialError(
+            name,
+            f"the model of the static trial misses the markers by {rms(ik.errors_m) * 1e3:.0f} mm RMS, most of all {listed}; "
+            f"check labels, units, and that both trials show the same person",
+        )

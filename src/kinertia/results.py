@@ -1,0 +1,121 @@
+"""Writes a `Fit` to a folder: `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
+
+Everything is written beside the folder first and moved into it when complete, so a run never leaves half a result.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from kinertia import __version__
+from kinertia.checks import mass_from_force_kg
+from kinertia.fit import Fit, TrialFit
+from kinertia.io.sto import write_sto
+
+_RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
+
+
+def save_fit(fit: Fit, folder: str | Path) -> Path:
+    """Write all result files of a fit into a folder, which is made if need be; returns the folder.
+
+    With one trial its files stand in the folder itself, with several in a sub-folder per trial.
+    """
+    folder = Path(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    try:
+        (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
+        fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
+        for trial in fit.trials:
+            into = work if len(fit.trials) == 1 else work / trial.name
+            into.mkdir(exist_ok=True)
+            _write_trial(fit, trial, into)
+        for path in sorted(work.rglob("*")):
+            target = folder / path.relative_to(work)
+            if path.is_dir():
+                target.mkdir(parents=True, exist_ok=True)
+            else:
+                target.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(path, target)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return folder
+
+
+def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
+    names = list(fit.skeleton.coordinates)
+    rotational = fit.skeleton.rotational
+    degrees = np.where(rotational, np.degrees(trial.motion.q), trial.motion.q)
+    write_sto(folder / "kinematics.mot", _table(trial, names, degrees), True, "kinematics")
+    loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
+    for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
+        write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage]), False, file)
+    columns = [f"{stage}_{name}" for stage in trial.residuals for name in _RESIDUALS]
+    residuals = np.hstack(list(trial.residuals.values()))
+    write_sto(folder / "residuals.sto", _table(trial, columns, residuals), False, "residuals")
+
+
+def _table(trial: TrialFit, columns: Sequence[str], values: np.ndarray) -> pd.DataFrame:
+    return pd.DataFrame(values, index=pd.Index(trial.time, name="time"), columns=list(columns))
+
+
+def summary(fit: Fit) -> dict[str, Any]:
+    """What `fit.json` says."""
+    return {
+        "kinertia": __version__,
+        "method": fit.settings.method,
+        "subject": fit.subject.model_dump(),
+        "settings": fit.settings.model_dump(),
+        "total_mass_kg": {
+            "measured": fit.subject.mass_kg,
+            "literature": fit.literature.total_mass_kg,
+            "estimate": fit.estimate.total_mass_kg,
+        },
+        "converged": fit.converged,
+        "trials": [_trial_summary(fit, trial) for trial in fit.trials],
+        "warnings": list(fit.warnings),
+        "notes": list(fit.notes),
+    }
+
+
+def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
+    force = {stage: values[:, :3] for stage, values in trial.residuals.items()}
+    moment = {stage: values[:, 3:] for stage, values in trial.residuals.items()}
+    return {
+        "name": trial.name,
+        "n_frames": len(trial.kinematics.trial.markers.time),
+        "n_dynamic_frames": len(trial.time),
+        "window_s": list(trial.kinematics.window_s),
+        "turned_deg": trial.kinematics.turned_deg,
+        "cutoff_hz": trial.kinematics.cutoff_hz,
+        "mass_from_force_kg": mass_from_force_kg(fit.literature, trial),
+        "seconds": {stage: round(value, 4) for stage, value in trial.seconds.items()},
+        "marker_rms_m": {stage: _rms(values[..., None]) for stage, values in trial.marker_errors_m.items()},
+        "residual_force_rms_N": _each(force, _rms),
+        "residual_force_max_N": _each(force, _max),
+        "residual_moment_rms_Nm": _each(moment, _rms),
+        "residual_moment_max_Nm": _each(moment, _max),
+    }
+
+
+def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float]:
+    return {stage: statistic(values) for stage, values in vectors.items()}
+
+
+def _rms(vectors: np.ndarray) -> float:
+    """Root mean square length of vectors (..., k) over everything that is not NaN."""
+    return math.sqrt(float(np.nanmean(np.square(vectors).sum(axis=-1))))
+
+
+def _max(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=-1).max())
