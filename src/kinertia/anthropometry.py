@@ -150,9 +150,7 @@ def literature_bsp(
         bodies.append(combine(mass, com, inertia))
     right = BodySegmentParameters(SEGMENTS, *(np.array(values) for values in zip(*bodies, strict=True)))
     left = np.array([segment.endswith("_l") for segment in SEGMENTS])
-    return BodySegmentParameters.from_table(
-        SEGMENTS, np.where(left[:, None], MIRROR_SIGNS, 1.0) * right.table()
-    )
+    return BodySegmentParameters.from_table(SEGMENTS, np.where(left[:, None], MIRROR_SIGNS, 1.0) * right.table())
 
 
 def _check_geometry(geometry: BodyGeometry, height_m: float, source: str) -> None:
@@ -160,13 +158,9 @@ def _check_geometry(geometry: BodyGeometry, height_m: float, source: str) -> Non
     for name in ["torso", *(f"{name}_{side}" for name in names for side in "rl")]:
         length = geometry.lengths_m.get(name)
         if length is None:
-            raise SubjectError(
-                name, length, f"this length is missing; the '{source}' table needs it, in metres."
-            )
+            raise SubjectError(name, length, f"this length is missing; the '{source}' table needs it, in metres.")
         if not 0.0 < length < height_m:
-            raise SubjectError(
-                name, length, "a segment length must lie between 0 and the stature; give it in metres."
-            )
+            raise SubjectError(name, length, "a segment length must lie between 0 and the stature; give it in metres.")
     rise = geometry.lumbar_joint_m[1] - geometry.mid_hip_m[1]
     if not 0.0 < rise < height_m:
         raise SubjectError(
@@ -188,9 +182,7 @@ def _dumas_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator[
         _Part("torso", table["abdomen"], _along_y(torso - thorax), torso - thorax),
         _Part("torso", table["thorax"], _along_y(torso), thorax),
     ]
-    com = sum(p.row.mass * (p.origin_m + p.row.com * p.length_m) for p in trunk) / sum(
-        p.row.mass for p in trunk
-    )
+    com = sum(p.row.mass * (p.origin_m + p.row.com * p.length_m) for p in trunk) / sum(p.row.mass for p in trunk)
     shift = _along_y(torso) + torso * np.array(_DUMAS_TORSO_COM[sex]) - com
     yield from (replace(part, origin_m=part.origin_m + shift) for part in trunk)
     yield _Part("torso", table["head"], _along_y(torso), head)
@@ -223,9 +215,7 @@ def _deleva_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator
 _SOURCES = {"dumas": _dumas_parts, "deleva": _deleva_parts}
 
 
-def _limb_parts(
-    table: Mapping[str, _Row], lengths: Mapping[str, float], side: str, hand: float
-) -> Iterator[_Part]:
+def _limb_parts(table: Mapping[str, _Row], lengths: Mapping[str, float], side: str, hand: float) -> Iterator[_Part]:
     for name in ("thigh", "shank", "upper_arm", "forearm"):
         yield _Part(f"{name}_{side}", table[name], np.zeros(3), lengths[f"{name}_{side}"])
     yield _Part(f"forearm_{side}", table["hand"], _along_y(-lengths[f"forearm_{side}"]), hand)
@@ -256,9 +246,7 @@ def _deleva_table(sex: str) -> dict[str, _Row]:
     table = {}
     for name, row in _read("deleva1996.csv", sex).iterrows():
         sagittal, transverse, longitudinal = row["r_sagittal"], row["r_transverse"], row["r_longitudinal"]
-        if (
-            name == "foot"
-        ):  # long axis x, heel to toe; the paper's sagittal column about z, transverse about y
+        if name == "foot":  # long axis x, heel to toe; the paper's sagittal column about z, transverse about y
             com, radii = [row["com"], 0.0, 0.0], [longitudinal, transverse, sagittal]
         else:  # long axis y, downwards
             com, radii = [0.0, -row["com"], 0.0], [sagittal, longitudinal, transverse]

@@ -108,9 +108,7 @@ class BodySegmentParameters:
         return np.column_stack([self.mass_kg, self.mass_kg[:, None] * self.com_m, moments]).ravel()
 
     @classmethod
-    def from_dynamic_parameters(
-        cls, segments: Sequence[str], parameters: npt.ArrayLike
-    ) -> BodySegmentParameters:
+    def from_dynamic_parameters(cls, segments: Sequence[str], parameters: npt.ArrayLike) -> BodySegmentParameters:
         """Inverse of `dynamic_parameters`; a segment without mass gets its CoM at its origin.
 
         Raises:
@@ -172,9 +170,7 @@ class BodySegmentParameters:
         """
         first_moment = self.mass_kg[:, None] * self.com_m
         pseudo = np.empty((len(self.segments), 4, 4))
-        pseudo[:, :3, :3] = (
-            _second_moments(self.inertia_kgm2) + first_moment[:, :, None] * self.com_m[:, None, :]
-        )
+        pseudo[:, :3, :3] = _second_moments(self.inertia_kgm2) + first_moment[:, :, None] * self.com_m[:, None, :]
         pseudo[:, :3, 3] = pseudo[:, 3, :3] = first_moment
         pseudo[:, 3, 3] = self.mass_kg
         return pseudo
@@ -185,9 +181,7 @@ class BodySegmentParameters:
 
     def inconsistencies(self) -> list[str]:
         """One sentence for each physical condition that a segment violates; empty if all are consistent."""
-        return [
-            f"{name}: {problem}." for i, name in enumerate(self.segments) for problem in self._problems(i)
-        ]
+        return [f"{name}: {problem}." for i, name in enumerate(self.segments) for problem in self._problems(i)]
 
     def _problems(self, i: int) -> list[str]:
         # about the CoM: the pseudo-inertia is positive definite about one point or else about none
@@ -243,9 +237,7 @@ class ParameterVector:
         # (s,) segments whose values mirror their partner's
         segments = self.reference.segments
         paired = _partners(segments) != np.arange(len(segments))
-        return np.array(
-            [self.symmetric and p and n.endswith("_l") for n, p in zip(segments, paired, strict=True)]
-        )
+        return np.array([self.symmetric and p and n.endswith("_l") for n, p in zip(segments, paired, strict=True)])
 
     @cached_property
     def _group(self) -> npt.NDArray[np.intp]:
@@ -310,9 +302,7 @@ class ParameterVector:
     def _symmetrised(self, bsp: BodySegmentParameters) -> FloatArray:
         # (s, 10) table in which, under symmetry, pairs are the mean of either side and the mirrored other
         if bsp.segments != self.reference.segments:
-            raise ValueError(
-                f"segments {bsp.segments} are not those of the reference {self.reference.segments}"
-            )
+            raise ValueError(f"segments {bsp.segments} are not those of the reference {self.reference.segments}")
         table = bsp.table()
         if self.symmetric:
             paired = _partners(bsp.segments) != np.arange(len(bsp.segments))
@@ -348,17 +338,13 @@ def _partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:
     """(s,) index of each segment's `_l`/`_r` partner, or its own."""
     index = {name: i for i, name in enumerate(segments)}
     other = {"_r": "_l", "_l": "_r"}
-    return np.array(
-        [index.get(name[:-2] + other.get(name[-2:], ""), i) for name, i in index.items()], dtype=np.intp
-    )
+    return np.array([index.get(name[:-2] + other.get(name[-2:], ""), i) for name, i in index.items()], dtype=np.intp)
 
 
 def _rows(segments: Sequence[str], values: npt.ArrayLike) -> FloatArray:
     array = np.asarray(values, dtype=float)
     if array.size != 10 * len(segments):
-        raise ValueError(
-            f"{array.size} values were given; ten for each of {len(segments)} segments were expected"
-        )
+        raise ValueError(f"{array.size} values were given; ten for each of {len(segments)} segments were expected")
     return array.reshape(len(segments), 10)
 
 
@@ -371,9 +357,7 @@ def _tensors(moments: FloatArray, rows: list[int], columns: list[int]) -> FloatA
 def _point_mass_inertia(mass: FloatArray, position: FloatArray) -> FloatArray:
     """(n, 3, 3) inertia about the origin of point masses (n,) at positions (n, 3)."""
     squares = np.einsum("ni,ni->n", position, position)
-    return mass[:, None, None] * (
-        squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :]
-    )
+    return mass[:, None, None] * (squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :])
 
 
 def _second_moments(inertia: FloatArray) -> FloatArray:

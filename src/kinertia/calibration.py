@@ -1,22 +1,23 @@
 """Adapting a static model to the trials it will be used for: marker positions and coordinates that stand still.
 
-A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the acromia
-by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and calibration
-that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together by
-Gauss-Newton; the static trial is the prior. Frames are eliminated one by one (Schur complement), so the cost grows linearly
-with their number.
+A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the
+acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and
+calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
+by Gauss-Newton; the static trial is the prior. Frames are eliminated one by one (Schur complement), so the cost grows
+linearly with their number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.errors import TrialError
 from kinertia.ik import solve_ik
 from kinertia.skeleton import Marker, Pose, Skeleton
-from kinertia.trial import Markers
+from kinertia.trial import Markers, Trial
 
 MARKER_NOISE_M = 0.01
 """Deviation of one marker coordinate in one frame; the frames used stand 0.1 s apart and count as independent."""
@@ -54,6 +55,8 @@ def adapt(
         trials: the markers of the trials.
         marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
         coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
+
+    Frames whose visible markers do not determine every coordinate are left out; at least one must remain.
     """
     present = {label for markers in trials for label in markers.labels}
     kept = [marker for marker in skeleton.markers if marker.label in present]
@@ -79,23 +82,58 @@ def adapt(
         q = np.empty((len(moving), len(freed.coordinates)))
         q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
         placed = freed.with_markers(_relocated(kept, static[len(still) :]))
-        step, moving_step = _step(
-            placed, measured, q, moving_at, still_at, (prior - static) / deviation**2, deviation
-        )
+        step, moving_step = _step(placed, measured, q, moving_at, still_at, (prior - static) / deviation**2, deviation)
         static, moving = static + step, moving + moving_step
         if np.abs(step).max() < _TOLERANCE_M:
             break
     markers = _relocated(kept, static[len(still) :])
-    moved = {
-        m.label: float(np.linalg.norm(m.position - k.position)) for m, k in zip(markers, kept, strict=True)
-    }
+    moved = {m.label: float(np.linalg.norm(m.position - k.position)) for m, k in zip(markers, kept, strict=True)}
     values = {name: float(value) for name, value in zip(still, static[: len(still)], strict=True)}
     return Adaptation(skeleton.with_markers([*markers, *rest]).lock(values), moved, values)
 
 
+def hold_uninformed(
+    skeleton: Skeleton, trials: Sequence[Trial], may_hold: Collection[str]
+) -> tuple[Skeleton, tuple[str, ...]]:
+    """The skeleton with those coordinates held at zero that no marker shows, and their names.
+
+    Args:
+        skeleton: from the static trial.
+        trials: the trials it will be used for.
+        may_hold: the coordinates that need not be shown.
+
+    Raises:
+        TrialError: a trial never shows another coordinate, or one that another trial shows.
+    """
+    never = []
+    for trial in trials:
+        ik = solve_ik(skeleton, sampled(trial.markers), trial.name)
+        shown = np.isfinite(ik.q).any(axis=0)
+        never.append([name for name, known in zip(ik.coordinates, shown, strict=True) if not known])
+    held = [name for name in skeleton.coordinates if all(name in names for names in never) and name in may_hold]
+    for trial, names in zip(trials, never, strict=True):
+        lost = [name for name in names if name not in held]
+        if lost:
+            raise TrialError(trial.name, _not_shown(skeleton, trial.markers, lost))
+    return skeleton.lock(dict.fromkeys(held, 0.0)), tuple(held)
+
+
+def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str]) -> str:
+    children = [joint.child for joint in skeleton.joints if {axis.coordinate for axis in joint.axes} & set(coordinates)]
+    worn = [m.label for m in skeleton.markers if m.segment in children]
+    gone = [label for label in worn if label not in markers.labels]
+    missing = f"; not in the file: {', '.join(gone)}" if gone else ""
+    return (
+        f"in no frame do enough markers show {', '.join(coordinates)} (markers of {', '.join(children)}: "
+        f"{', '.join(worn) or 'none'}{missing}); use a trial that has them"
+    )
+
+
 def sampled(markers: Markers) -> Markers:
     """A few frames, FRAME_SPACING_S apart, from all over the trial (at most sixty)."""
-    every = max(1, round(FRAME_SPACING_S * markers.rate_hz), -(-len(markers.time) // _MAX_FRAMES))
+    duration = float(markers.time[-1] - markers.time[0])
+    count = min(_MAX_FRAMES, len(markers.time), 1 + int(duration / FRAME_SPACING_S))
+    every = -(-len(markers.time) // count)
     return Markers(markers.time[::every], markers.labels, markers.positions[::every])
 
 
@@ -136,9 +174,7 @@ def _step(
     turned = pose.rotation[:, skeleton.marker_segments] / MARKER_NOISE_M * seen[..., None]
     local[:, each, :, each, :] = turned.transpose(1, 0, 2, 3)
     jacobian = jacobian.reshape(len(q), residual.shape[1], -1)
-    by_static = np.concatenate(
-        [jacobian[..., still_at], local.reshape(len(q), residual.shape[1], -1)], axis=-1
-    )
+    by_static = np.concatenate([jacobian[..., still_at], local.reshape(len(q), residual.shape[1], -1)], axis=-1)
     by_moving = jacobian[..., moving_at]
     transposed = by_moving.transpose(0, 2, 1)
     normal = transposed @ by_moving + 1e-6 * np.eye(len(moving_at))

@@ -1,4 +1,7 @@
-"""What can be wrong with a subject, a trial or a result, and how to say it: errors before, warnings after estimation."""
+"""What can be wrong with a subject, a trial or a result, and how to say it.
+
+Errors come before the estimation, warnings after it.
+"""
 
 from __future__ import annotations
 
@@ -49,15 +52,13 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple
         found[quantity] = told[0][1] if given is None else given
         for name, value in told:
             if abs(value - found[quantity]) > 0.01 * found[quantity]:
-                warnings.append(
-                    f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}"
-                )
+                warnings.append(f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}")
     check_subject(found["mass_kg"], found["height_m"], subject.sex)
     return subject.model_copy(update=found), warnings
 
 
 def check_visible(skeleton: Skeleton, trial: Trial) -> None:
-    """Raise TrialError when a marker is never seen, or a segment has no marker in the trial."""
+    """Raise TrialError when a marker is never seen, or a segment other than the arms' has no marker in the trial."""
     lost = [
         marker.label
         for marker in skeleton.markers
@@ -67,24 +68,25 @@ def check_visible(skeleton: Skeleton, trial: Trial) -> None:
     if lost:
         raise TrialError(
             trial.name,
-            f"no frame shows the marker{'s' if len(lost) > 1 else ''} {', '.join(lost)}; label them, or remove them from "
-            f"the file if they were not worn",
+            f"no frame shows the marker{'s' if len(lost) > 1 else ''} {', '.join(lost)}; label them, or remove them "
+            f"from the file if they were not worn",
         )
-    for segment in skeleton.segments:
+    arms = tuple(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))
+    for segment in set(skeleton.segments) - set(arms):
         worn = [m.label for m in skeleton.markers if m.segment == segment]
         if worn and not set(worn) & set(trial.markers.labels):
             raise TrialError(
                 trial.name,
-                f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are unknown; "
-                f"use a trial that has them",
+                f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are "
+                f"unknown; use a trial that has them",
             )
 
 
 def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
     """Body mass by the vertical ground reaction over the window, whatever the CoM's acceleration.
 
-    The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no mean
-    vertical residual is m F / (F + P), with means over the window.
+    The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no
+    mean vertical residual is m F / (F + P), with means over the window.
     """
     force = float(trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean())
     excess = float(trial.residuals["literature"][:, 1].mean())
@@ -105,13 +107,15 @@ def fit_warnings(
             )
     if not result.converged:
         found.append(
-            f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is reported"
+            f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is "
+            f"reported"
         )
     total = result.bsp.total_mass_kg
     if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
         found.append(
-            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg ({100 * (total / mass_kg - 1):+.1f} %): "
-            f"the two-level estimate leaves the total mass free, and it follows the plates' gain and the noise of the motion"
+            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
+            f"({100 * (total / mass_kg - 1):+.1f} %): the two-level estimate leaves the total mass free, and it "
+            f"follows the plates' gain and the noise of the motion"
         )
     impossible = result.bsp.inconsistencies()
     if impossible:

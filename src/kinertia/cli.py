@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from kinertia import __version__
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
@@ -20,7 +22,7 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.fit import Fit, TrialInput, estimate_bsp
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import read_marker_set
-from kinertia.results import save_fit, summary
+from kinertia.results import check_folder, save_fit, summary
 from kinertia.subject_draft import init_subject
 
 app = typer.Typer(
@@ -32,17 +34,28 @@ app = typer.Typer(
     help="Body segment parameters from gait: markers and ground reaction forces in; masses, centres of mass and "
     "inertias of all segments out.",
 )
-_out = Console()
-_err = Console(stderr=True)
+# names of files and trials may contain what rich takes for markup
+_out = Console(markup=False, emoji=False, highlight=False)
+_err = Console(markup=False, emoji=False, highlight=False, stderr=True)
+_STAGES = ("literature", "corrected", "estimate")
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
     try:
-        app()
+        app(args=arguments)
     except KinertiaError as error:
-        _err.print(f"[bold red]error:[/] {error}", soft_wrap=True, highlight=False, markup=True)
-        raise SystemExit(2) from error
+        _fail(str(error))
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}; check the path, its permissions and the space on the disk")
+
+
+def _fail(message: str) -> NoReturn:
+    _err.print(
+        Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default"),
+        soft_wrap=True,
+    )
+    raise SystemExit(2)
 
 
 def _version(wanted: bool) -> None:
@@ -62,14 +75,10 @@ def _root(
 
 @app.command()
 def fit(
-    trial: Annotated[
-        Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")
-    ],
+    trial: Annotated[Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
     static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
-    forces: Annotated[
-        Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")
-    ] = None,
+    forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
     ] = None,
@@ -113,6 +122,7 @@ def fit(
         wanted = _from_options(trial, options)
     if method is not None:
         wanted = with_settings(wanted, method=method)
+    check_folder(output)
     result = _run(wanted)
     folder = save_fit(result, output)
     _report(result, folder)
@@ -133,21 +143,17 @@ def init(
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
     text = init_subject(folder)
     path.write_text(text, encoding="utf-8")
-    _out.print(f"wrote {path}: fill in what it asks for, then run [bold]kinertia fit {path} -o out[/]")
+    _out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
 
 
 def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
     """The subject file that these options stand for."""
     given = {
-        key: str(value) if isinstance(value, Path) else value
-        for key, value in options.items()
-        if value is not None
+        key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }
     for name in ("--static", "--sex"):
         if name not in given:
-            raise FileError(
-                trial, f"a trial on its own needs {name}; or write a subject file (kinertia init FOLDER)"
-            )
+            raise FileError(trial, f"a trial on its own needs {name}; or write a subject file (kinertia init FOLDER)")
     names = {
         "subject": {"--mass": "mass_kg", "--height": "height_m", "--sex": "sex"},
         "model": {"--static": "static", "--markers": "markers"},
@@ -188,7 +194,7 @@ def _progress() -> Iterator[Callable[[str, float], None]]:
         def line(stage: str, share: float) -> None:
             if stage not in seen:
                 seen.append(stage)
-                _err.print(stage, highlight=False)
+                _err.print(stage)
 
         yield line
         return
@@ -202,53 +208,50 @@ def _report(fit: Fit, folder: Path) -> None:
     told = summary(fit)
     subject, mass = told["subject"], told["total_mass_kg"]
     _out.print(
-        f"\n[bold]{subject['name']}[/]: {subject['mass_kg']:g} kg, {subject['height_m']:g} m, {subject['sex']}; "
-        f"method {told['method']}, {fit.notes[0]}",
-        highlight=False,
+        f"\n{subject['name']}: {subject['mass_kg']:g} kg, {subject['height_m']:g} m, {subject['sex']}; "
+        f"method {told['method']}; {fit.notes[0]}"
     )
-    residuals = Table(title="Residuals at the pelvis, RMS (largest)", title_justify="left")
-    for heading in ("trial", "used (s)", "frames", "markers (mm)", "", "literature", "corrected", "estimate"):
-        residuals.add_column(heading, justify="left" if heading in ("trial", "") else "right")
     for trial in told["trials"]:
-        first, last = trial["window_s"]
-        markers = trial["marker_rms_m"]
-        for kind, unit in (("force", "N"), ("moment", "Nm")):
-            rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
-            values = [
-                f"{rms[stage]:.1f} ({top[stage]:.0f})" for stage in ("literature", "corrected", "estimate")
-            ]
-            head = (
-                [
-                    trial["name"],
-                    f"{first:.2f}-{last:.2f}",
-                    str(trial["n_dynamic_frames"]),
-                    f"{markers['final'] * 1e3:.1f}",
-                ]
-                if kind == "force"
-                else [""] * 4
-            )
-            residuals.add_row(*head, f"{kind} ({unit.replace('Nm', 'N m')})", *values)
-    _out.print(residuals)
+        _report_trial(trial)
     _out.print(_bsp_table(fit))
-    _out.print(
-        f"total mass: scale {mass['measured']:.1f} kg, estimate {mass['estimate']:.1f} kg", highlight=False
-    )
+    _out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
-        _out.print(f"[bold yellow]warning:[/] {warning}", highlight=False)
-    _out.print(f"results in {folder}", highlight=False)
+        _out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
+    _out.print(f"results in {folder}")
+
+
+def _report_trial(trial: dict[str, Any]) -> None:
+    first, last = trial["window_s"]
+    markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
+    _out.print(
+        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used, {trial['n_dynamic_frames']} of "
+        f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
+        f"{markers['final']} (estimate)"
+    )
+    table = _table("residual at the pelvis, RMS (max)", *_STAGES)
+    for kind, unit in (("force", "N"), ("moment", "Nm")):
+        rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
+        table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
+    _out.print(table)
 
 
 def _bsp_table(fit: Fit) -> Table:
-    table = Table(title="Body segment parameters, literature > estimate", title_justify="left")
-    table.add_column("segment")
-    for heading in ("mass (kg)", "CoM x, y, z (mm)", "Ixx, Iyy, Izz (kg m2)"):
-        table.add_column(heading, justify="right")
+    """Two rows per segment; where left mirrors right, the right side stands for both."""
+    table = _table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
     for i, segment in enumerate(fit.literature.segments):
-        sets = (fit.literature, fit.estimate)
-        mass = " > ".join(f"{bsp.mass_kg[i]:.2f}" for bsp in sets)
-        com = " > ".join(", ".join(f"{value * 1e3:.0f}" for value in bsp.com_m[i]) for bsp in sets)
-        inertia = " > ".join(
-            ", ".join(f"{value:.3g}" for value in bsp.inertia_kgm2[i].diagonal()) for bsp in sets
-        )
-        table.add_row(segment, mass, com, inertia)
+        if fit.settings.symmetry and segment.endswith("_l"):
+            continue
+        for source, bsp in (("literature", fit.literature), ("estimate", fit.estimate)):
+            com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
+            inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
+            table.add_row(segment, source, f"{bsp.mass_kg[i]:.2f}", *com, *inertia)
+            segment = ""
+    return table
+
+
+def _table(*headings: str) -> Table:
+    """First two columns to the left if the second has no heading, the numbers to the right."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if k == 0 or not heading else "right")
     return table

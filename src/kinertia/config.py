@@ -59,6 +59,8 @@ def _file(value: object, info: ValidationInfo) -> Path:
     path = (_folder(info) / Path(value).expanduser()).resolve()
     if path.is_file():
         return path
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder; give a file")
     names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
     near = difflib.get_close_matches(path.name, names, n=1)
     raise ValueError(f"no such file in {path.parent}" + (f"; did you mean '{near[0]}'?" if near else ""))
@@ -80,6 +82,13 @@ def _cutoff(value: object) -> object:
     raise ValueError('must be "gcv" or a positive frequency in Hz')
 
 
+def _trial_name(value: object) -> str:
+    """A name that can be a folder's: the results of several trials go to one folder each."""
+    if isinstance(value, str) and value.strip(" .") and not set(value) & set("/\\\0"):
+        return value
+    raise ValueError("must be a name that a folder can have: not empty, and without / and \\")
+
+
 def _window(value: object) -> tuple[float, float]:
     match value:
         case [int() | float() as start, int() | float() as end] if start < end:
@@ -90,14 +99,17 @@ def _window(value: object) -> tuple[float, float]:
 File = Annotated[Path, BeforeValidator(_file)]
 MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
+TrialName = Annotated[str, BeforeValidator(_trial_name)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
 
 
-class _Table(BaseModel):
+class Table(BaseModel):
+    """A table of the subject file: unknown keys are errors, values are never converted, nothing changes afterwards."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
-class Subject(_Table):
+class Subject(Table):
     """Who walked. Mass (kg) and height (m) are None where the file leaves them to the C3D files."""
 
     name: str = Field(min_length=1, description="name in files and report; left out: the folder's name")
@@ -111,17 +123,17 @@ class Subject(_Table):
         return {"name": _folder(info).name or "subject", **data} if isinstance(data, dict) else data
 
 
-class Model(_Table):
+class Model(Table):
     """What the skeleton is built from. `markers` is a preset's name, an absolute path, or None: detect it."""
 
     static: File = Field(description="static trial, .c3d or .trc")
     markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
 
 
-class TrialFiles(_Table):
+class TrialFiles(Table):
     """Files of one dynamic trial; `window_s` (start, end) overrides the measured window, s."""
 
-    name: str = Field(min_length=1, description="name in files and report; left out: the marker file's")
+    name: TrialName = Field(description="name in files and report; left out: the marker file's")
     markers: File = Field(description="markers, .c3d or .trc")
     forces: File | None = Field(default=None, description="plate forces, .mot or .sto; C3D has its own")
     loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
@@ -136,21 +148,19 @@ class TrialFiles(_Table):
         return {"name": Path(markers).stem if isinstance(markers, str | Path) else "trial", **data}
 
 
-class Settings(_Table):
+class Settings(Table):
     """How to estimate."""
 
     method: Literal["two-level"] = Field(default="two-level", description='estimator: "two-level"')
     bsp: Literal["dumas", "deleva"] = Field(default="dumas", description='first guess: "dumas" or "deleva"')
     symmetry: bool = Field(default=True, description="true: left mirrors right, 49 parameters; false: 84")
-    cutoff_hz: Cutoff = Field(
-        default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz'
-    )
+    cutoff_hz: Cutoff = Field(default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz')
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
     )
 
 
-class SubjectFile(_Table):
+class SubjectFile(Table):
     """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist."""
 
     subject: Subject
@@ -272,7 +282,7 @@ def _line(lines: dict[Location, int], place: Location) -> int | None:
     return next((lines[place[:size]] for size in range(len(place), 0, -1) if place[:size] in lines), None)
 
 
-_TABLES: dict[str, type[_Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)
+_TABLES: dict[str, type[Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)
 
 
 def _sentence(detail: Any) -> str:

@@ -1,10 +1,8 @@
 """Which foot stands on which plate, and in which frames all ground contact is measured.
 
-Dynamics hold only where every foot on the ground stands on a plate that works. Both questions are answered
-from the
-data: a load belongs to the foot that is nearest to its centre of pressure, and a foot without load is taken
-to be on the ground by the heights and speeds that its markers have when a plate is seen to be loaded or
-unloaded.
+Dynamics hold only where every foot on the ground stands on a plate that works. Both questions are answered from
+the data: a load belongs to the foot that is nearest to its centre of pressure, and a foot without load is on the
+ground by the heights and speeds of its markers (`kinertia.ground_contact`).
 
 A hand on a rail, a chair or a second person is not seen.
 """
@@ -41,9 +39,7 @@ SHARED_FRACTION = 0.15
 _FOOT_NAMES = ("right", "left")
 
 
-def build_trial(
-    recording: Recording, feet: FootMarkers, window_s: tuple[float, float] | None = None
-) -> Trial:
+def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, float] | None = None) -> Trial:
     """Sort the loads by foot and find the measured frames.
 
     Args:
@@ -52,10 +48,12 @@ def build_trial(
         window_s: first and last time (s) that the user vouches for, in place of what the data say.
 
     Raises:
-        TrialError: no force plates, no load in the recording, or no measured frame; the message tells when
-            each foot was on the ground and when on a plate.
+        TrialError: fewer than two frames, no force plates, or no measured frame; the last message tells when each
+            foot was on the ground and when on a plate.
         MarkerSetError: a foot label is not among the markers.
     """
+    if len(recording.markers.time) < 2:
+        raise TrialError(recording.name, "only one frame; expected a motion, or use the file as a static trial")
     loads, notes = assign_plates(recording, feet)
     contact = ground_contact(recording.markers, loads, feet)
     measured = contact.measured(recording.markers.time)
@@ -65,8 +63,7 @@ def build_trial(
         measured = contact.inside & (time >= window_s[0] - 1e-6) & (time <= window_s[1] + 1e-6)
         notes += (
             f"{recording.name}: the window {window_s[0]:.3f} to {window_s[1]:.3f} s was given by the user; "
-            "by the data, "
-            f"all ground contact is measured in {found}",
+            f"by the data, all ground contact is measured in {found}",
         )
     if not measured.any():
         raise TrialError(recording.name, _nothing_measured(recording.markers.time, contact, window_s))
@@ -91,9 +88,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     """
     plates = recording.plates
     if plates is None:
-        raise TrialError(
-            recording.name, "no force plates; give a force file (.mot, .sto) or a C3D file with plates"
-        )
+        raise TrialError(recording.name, "no force plates; give a force file (.mot, .sto) or a C3D file with plates")
     centres = [_centre(recording.markers.select(feet[foot]), plates.time) for foot in FEET]
     covered = (plates.time >= recording.markers.time[0]) & (plates.time <= recording.markers.time[-1])
     force = np.zeros((len(plates.time), 2, 3))
@@ -103,9 +98,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
         where = f"{recording.name}: {name}"
         contacts, noise = _contacts(plates.time, plates.force[:, p, 1] > 0)
         if noise:
-            notes.append(
-                f"{where} has {noise} loads shorter than {1000 * SHORTEST_CONTACT_S:g} ms, taken as noise"
-            )
+            notes.append(f"{where} has {noise} loads shorter than {1000 * SHORTEST_CONTACT_S:g} ms, taken as noise")
         for first, last in contacts:
             piece = slice(first, last + 1)
             nearer, told = _nearer_foot(
@@ -163,14 +156,13 @@ def _nearer_foot(
     pressure = np.column_stack((moment[:, 2] / load, -moment[:, 0] / load))
     distance = np.stack([np.linalg.norm(pressure - centre, axis=1) for centre in centres], axis=1)
     distance = np.where(np.isfinite(distance), distance, 1e3)
-    mean = weight @ distance / weight.sum()
-    foot = int(np.argmin(mean))
+    foot = int(np.argmin(weight @ distance))
+    nearest = float(weight @ distance.min(axis=1) / weight.sum())
     span = f"from {time[0]:.3f} to {time[-1]:.3f} s"
     notes = []
-    if mean[foot] > FAR_FROM_FEET_M:
+    if nearest > FAR_FROM_FEET_M:
         notes.append(
-            f"{where} is loaded {span} at {mean[foot]:.2f} m from the nearest foot; check that it is the "
-            "person's"
+            f"{where} is loaded {span} at {nearest:.2f} m from the nearest foot; check that it is the person's"
         )
     nearer = np.argmin(distance, axis=1)
     active = weight > 0
@@ -180,8 +172,7 @@ def _nearer_foot(
     if declared is not None and declared != FEET[foot]:
         notes.append(
             f"{where} is declared for the {_FOOT_NAMES[FEET.index(declared)]} foot, but {span} its load is "
-            "under the "
-            f"{_FOOT_NAMES[foot]} foot and was given to it"
+            f"under the {_FOOT_NAMES[foot]} foot and was given to it"
         )
     return np.full(len(time), foot), notes
 
@@ -203,6 +194,5 @@ def _nothing_measured(time: FloatArray, contact: GroundContact, window_s: tuple[
         for foot, name in enumerate(_FOOT_NAMES)
     )
     return (
-        f"in no frame does every foot on the ground stand on a loaded plate ({feet}); use a trial that "
-        "hits the plates"
+        f"in no frame does every foot on the ground stand on a loaded plate ({feet}); use a trial that hits the plates"
     )

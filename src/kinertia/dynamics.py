@@ -78,9 +78,7 @@ def _ground_load_at_pelvis(q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     return np.concatenate([force, moment - np.cross(q[:, :3], force)], axis=1)
 
 
-def residual(
-    skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
-) -> np.ndarray:
+def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
     """Root residual P (n, 6), equation (1): inertial and gravity load minus the ground reactions.
 
     Args:

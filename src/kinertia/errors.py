@@ -39,9 +39,7 @@ class MarkerSetError(KinertiaError):
         nearest: for each missing item, the labels of the trial that look most like it.
     """
 
-    def __init__(
-        self, problem: str, missing: Sequence[str] = (), nearest: dict[str, list[str]] | None = None
-    ):
+    def __init__(self, problem: str, missing: Sequence[str] = (), nearest: dict[str, list[str]] | None = None):
         self.missing = tuple(missing)
         self.nearest = dict(nearest or {})
         super().__init__(problem)

@@ -12,13 +12,13 @@ import pandas as pd
 
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
-from kinertia.calibration import adapt, sampled
+from kinertia.calibration import adapt, hold_uninformed, sampled
 from kinertia.checks import check_visible, complete_subject, fit_warnings, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.errors import TrialError
-from kinertia.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
+from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
 from kinertia.kinematics import Kinematics, check_labels, facing, solve_kinematics
 from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set
 from kinertia.skeleton import Skeleton
@@ -121,25 +121,27 @@ def calibrate(
 ) -> tuple[Gait27, Skeleton, list[str]]:
     """The 27-DOF model of the static trial, adapted to the trials.
 
-    Returns the model as the static trial gives it, the adapted skeleton, and notes. Markers of pelvis, legs and feet are
-    held to the static trial by a deviation of 10 mm, those of torso and arms and the shoulder centres by 40 mm.
+    Returns the model as the static trial gives it, the adapted skeleton, and notes. Markers of pelvis, legs and feet
+    are held to the static trial by a deviation of 10 mm, those of torso and arms and the shoulder centres by 40 mm.
     """
     model = build_gait27(static, marker_set, known(subject.height_m), subject.sex, hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
-        check_labels(model.skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
+    skeleton, held = hold_uninformed(model.skeleton, trials, ARM_COORDINATES)
+    for trial in trials:
+        check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
     upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
     marker_sd = {s: _UPPER_BODY_SD_M if s in upper else _LOWER_BODY_SD_M for s in model.skeleton.segments}
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, _UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
-    adapted = adapt(model.skeleton, [trial.markers for trial in trials], marker_sd, coordinate_sd)
+    adapted = adapt(skeleton, [trial.markers for trial in trials], marker_sd, coordinate_sd)
     far = {label: moved for label, moved in adapted.moved_m.items() if moved > 0.03}
     notes = []
+    if held:
+        notes.append(f"no marker shows {', '.join(held)}: held at 0 (the arm hangs along the torso)")
     if far:
-        listed = ", ".join(
-            f"{label} {moved * 1e3:.0f} mm" for label, moved in sorted(far.items(), key=lambda i: -i[1])
-        )
+        listed = ", ".join(f"{label} {moved * 1e3:.0f} mm" for label, moved in sorted(far.items(), key=lambda i: -i[1]))
         notes.append(f"markers that sit elsewhere in the trials than in the static trial (adapted): {listed}")
     return model, adapted.skeleton, notes
 
@@ -176,9 +178,7 @@ def estimate_bsp(
     progress("calibration", 0.0)
     started = time.perf_counter()
     turned = [_turned(item, marker_set) for item in inputs]
-    model, skeleton, notes = calibrate(
-        static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre
-    )
+    model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
     literature = literature_bsp(
         known(subject.mass_kg), known(subject.height_m), subject.sex, model.geometry, settings.bsp
     )
@@ -216,14 +216,9 @@ def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
     for side in "rl":
         label = marker_set.landmarks[f"asis_{side}"][0]
         if label not in recording.markers.labels:
-            raise TrialError(
-                recording.name, f"the marker {label} is missing; it tells which way the person faces"
-            )
+            raise TrialError(recording.name, f"the marker {label} is missing; it tells which way the person faces")
     present = set(recording.markers.labels)
-    feet = {
-        side: [label for label in labels if label in present]
-        for side, labels in marker_set.foot_labels().items()
-    }
+    feet = {side: [label for label in labels if label in present] for side, labels in marker_set.foot_labels().items()}
     for side, labels in feet.items():
         if not labels:
             raise TrialError(

@@ -1,12 +1,13 @@
 """The 14-segment, 27-DOF gait model (DESIGN section 4), built from a static trial.
 
-Four open chains leave the pelvis: hip (3), knee (1), ankle (2: talocrural and subtalar, with a massless talus between), back
-(3), shoulder (2), elbow (1). Twelve of the fourteen segments carry mass. Signs are OpenSim's (Rajagopal): flexion of
-hip, knee and elbow, dorsiflexion, adduction, internal rotation and inversion are positive; hip, knee and
-shoulder angles are zero when segments are aligned, the ankle's when foot and shank are square.
+Four open chains leave the pelvis: hip (3), knee (1), ankle (2: talocrural and subtalar, with a massless talus
+between), back (3), shoulder (2), elbow (1). Twelve of the fourteen segments carry mass. Signs are OpenSim's
+(Rajagopal): flexion of hip, knee and elbow, dorsiflexion, adduction, internal rotation and inversion are positive; hip,
+knee and shoulder angles are zero when segments are aligned, the ankle's when foot and shank are square.
 
-Eight more axes are locked unless they are calibrated (`calibration.py`): the shoulder centres in the torso, and the axial
-rotation of the upper arm and of the forearm, which this model does not move but which differ between a T-pose and walking.
+Ten more axes are locked unless they are calibrated (`calibration.py`): the shoulder centres in the torso, and the axial
+rotation of the upper arm and of the forearm, which this model does not move but which differ between a T-pose and
+walking.
 """
 
 from __future__ import annotations
@@ -14,16 +15,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kinertia import joint_centres as jc
 from kinertia.anthropometry import BodyGeometry
+from kinertia.errors import MarkerSetError
 from kinertia.marker_set import MarkerSet
 from kinertia.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial import Recording
 
 SHOULDER_OFFSETS = tuple(f"shoulder_{axis}_{side}" for side in "rl" for axis in "xyz")
 ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", "pro_sup"))
+
+ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
+"""Held still where no marker shows them, as with a lower-body marker set; all others a trial must show."""
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -47,16 +53,22 @@ def build_gait27(
     """Segment frames, joint centres and axes, and marker positions in their segments, from a static trial.
 
     Args:
-        static: a person standing; arms hanging or raised. Feet flat on the ground.
+        static: a person standing; arms hanging or raised. Feet flat on the ground. An arm without any marker is
+            taken to hang along the torso, with lengths by stature.
         marker_set: which label is which landmark, and which marker moves with which segment.
-        height_m: stature, for lengths that markers do not show (head, and the torso without C7).
+        height_m: stature, for lengths that markers do not show (arms, and the torso without C7).
         sex: "male" or "female", for the lumbar and cervical joints.
         hip_centre: "bell" (1990) or "harrington" (2007).
 
     Raises:
-        MarkerSetError: a landmark that a joint needs is missing; names the joint and the nearest labels.
+        MarkerSetError: a landmark that a joint needs is missing (names the joint and the nearest labels), or landmarks
+            coincide or lie in line, so that they make no frame.
     """
-    marks = jc.find_landmarks(static, marker_set)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return _built(jc.find_landmarks(static, marker_set), height_m, sex, hip_centre)
+
+
+def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> Gait27:
     pelvis, origin, width, depth = jc.pelvis_frame(marks)
     frames = {"pelvis": (pelvis, origin)}
     joints = [_root()]
@@ -65,18 +77,23 @@ def build_gait27(
     for side in "rl":
         joints += _leg(marks, frames, lengths, hips[side], side)
     lumbar = jc.lumbar_in_pelvis(width, sex)
-    joints.append(
-        Joint("pelvis", "torso", np.eye(3), lumbar, _gimbal("lumbar_", ["extension", "bending", "rotation"]))
-    )
+    joints.append(Joint("pelvis", "torso", np.eye(3), lumbar, _gimbal("lumbar_", ["extension", "bending", "rotation"])))
     at = origin + pelvis @ lumbar
     torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
     frames["torso"] = (torso, at)
     locked = dict.fromkeys(SHOULDER_OFFSETS, 0.0)
     for side in "rl":
-        joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, side)
+        joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, sex, side)
     mid_hip = (hips["r"] + hips["l"]) / 2
-    skeleton = Skeleton("gait27", tuple(joints), _markers(static, marker_set, frames), locked)
-    return Gait27(skeleton, BodyGeometry(tuple(lumbar), tuple(mid_hip), lengths))
+    for joint in joints:
+        directions = [axis.direction for axis in joint.axes]
+        if not all(np.isfinite(part).all() for part in (joint.rotation, joint.translation, directions)):
+            raise MarkerSetError(
+                f"the static trial gives no frame for the {joint.child}: landmarks of it or of the {joint.parent} "
+                f"coincide or lie in line; check the labels in the marker set '{marks.marker_set.name}' and the static trial"
+            )
+    skeleton = Skeleton("gait27", tuple(joints), _markers(marks, frames), locked)
+    return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
 
 
 def _root() -> Joint:
@@ -89,8 +106,7 @@ def _root() -> Joint:
 def _gimbal(prefix: str, names: list[str], suffix: str = "", side: str = "r") -> tuple[Axis, ...]:
     directions = (np.array(_Z), *(jc.mirrored_axis(np.array(d), side) for d in (_X, _Y)))
     return tuple(
-        Axis(f"{prefix}{name}{suffix}", "rotation", tuple(map(float, d)))
-        for name, d in zip(names, directions, strict=False)
+        Axis(f"{prefix}{name}{suffix}", "rotation", _triple(d)) for name, d in zip(names, directions, strict=False)
     )
 
 
@@ -105,7 +121,12 @@ def _pin(parent: str, child: str, at: np.ndarray, relative: np.ndarray, axis: Ax
 
 def _axis(coordinate: str, direction: np.ndarray) -> Axis:
     unit = direction / np.linalg.norm(direction)
-    return Axis(coordinate, "rotation", tuple(map(float, unit)))
+    return Axis(coordinate, "rotation", _triple(unit))
+
+
+def _triple(vector: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = map(float, np.asarray(vector))
+    return x, y, z
 
 
 def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side: str) -> list[Joint]:
@@ -159,10 +180,17 @@ def _arm(
     locked: dict,
     shoulder: np.ndarray,
     height_m: float,
+    sex: str,
     side: str,
 ) -> list[Joint]:
     torso, torso_at = frames["torso"]
-    elbow_at, wrist_at, elbow_axis = jc.arm(marks, shoulder, torso, height_m, side)
+    worn = marks.marker_set.segments[f"upper_arm_{side}"] + marks.marker_set.segments[f"forearm_{side}"]
+    shown = any(f"{name}_{side}" in marks for name in ("elbow_lateral", "elbow_medial", "wrist"))
+    if shown or any(label in marks.markers for label in worn):
+        elbow_at, wrist_at, elbow_axis = jc.arm(marks, shoulder, torso, height_m, side)
+    else:
+        elbow_at, wrist_at = jc.hanging_arm(shoulder, torso, height_m, sex)
+        elbow_axis = torso[:, 2]
     upper = jc.frame(shoulder - elbow_at, elbow_axis)
     lower = jc.frame(elbow_at - wrist_at, upper[:, 2])
     frames[f"upper_arm_{side}"] = (upper, shoulder)
@@ -188,23 +216,18 @@ def _arm(
         elbow_pin,
         flexion,
     )
-    twist = Axis(f"pro_sup_{side}", "rotation", tuple(map(float, jc.mirrored_axis(np.array(_Y), side))))
+    twist = _axis(f"pro_sup_{side}", jc.mirrored_axis(np.array(_Y), side))
     return [
         Joint("torso", f"upper_arm_{side}", np.eye(3), torso.T @ (shoulder - torso_at), shoulder_axes),
         Joint(elbow.parent, elbow.child, elbow.rotation, elbow.translation, (elbow_pin, twist)),
     ]
 
 
-def _markers(static: Recording, marker_set: MarkerSet, frames: dict) -> tuple[Marker, ...]:
-    positions = static.markers.positions
-    seen = np.isfinite(positions).all(axis=-1)
-    column = {label: i for i, label in enumerate(static.markers.labels)}
+def _markers(marks: jc.Landmarks, frames: dict) -> tuple[Marker, ...]:
     placed = []
-    for segment, labels in marker_set.segments.items():
+    for segment, labels in marks.marker_set.segments.items():
         rotation, origin = frames[segment]
         for label in labels:
-            if label in column and seen[:, column[label]].any():
-                i = column[label]
-                at = np.median(positions[seen[:, i], i], axis=0)
-                placed.append(Marker(label, segment, rotation.T @ (at - origin)))
+            if label in marks.markers:
+                placed.append(Marker(label, segment, rotation.T @ (marks.markers[label] - origin)))
     return tuple(placed)

@@ -18,8 +18,7 @@ BRIDGED_GAP_S = 0.02
 """A load that vanishes for less than this is one contact."""
 
 CONTACT_SLACK_S = 0.04
-"""Largest error of the time that markers give for landing or leaving, seen against plates (usual: 0.015
-s)."""
+"""Largest error of the time that markers give for landing or leaving, seen against plates (usual 0.015 s)."""
 
 CONTACT_MARGIN_S = 0.02
 """Ground contact off the plates is widened by this on both sides: a missed first contact spoils dynamics."""
@@ -27,6 +26,7 @@ CONTACT_MARGIN_S = 0.02
 LONGEST_FLIGHT_S = 1.0
 """Nobody is in the air for longer: then something else than the feet carries the person."""
 
+# Below these, markers of a foot that stands still differ by noise only.
 _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
 _SPEED_SPAN_S = 0.01
@@ -84,9 +84,7 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Gro
     nearest = np.clip(np.searchsorted(loads.time, markers.time), 1, len(loads.time) - 1)
     nearest -= markers.time - loads.time[nearest - 1] < loads.time[nearest] - markers.time
     inside = (markers.time >= loads.time[0] - 1e-6) & (markers.time <= loads.time[-1] + 1e-6)
-    loaded = np.stack(
-        [bridged(loads.time, loads.force[:, foot, 1] > 0)[nearest] & inside for foot in range(2)], axis=1
-    )
+    loaded = np.stack([bridged(loads.time, loads.force[:, foot, 1] > 0)[nearest] & inside for foot in range(2)], axis=1)
     ground = loaded.copy()
     moves = [_foot_motion(markers.select(feet[foot])) for foot in FEET]
     if loaded.any():
@@ -121,8 +119,7 @@ def _foot_motion(markers: Markers) -> _FootMotion:
 
 
 def _against_ground(moves: Sequence[_FootMotion], loaded: BoolArray) -> list[_FootMotion]:
-    """The same motions with heights above each marker's lowest and velocities against the ground under loaded
-    feet.
+    """Heights above each marker's own lowest, and velocities against the ground under the loaded feet.
 
     The ground's velocity is the median of the lowest marker's: zero on a floor, the belt's on a treadmill. A
     foot that is never loaded takes the other's.
@@ -134,11 +131,12 @@ def _against_ground(moves: Sequence[_FootMotion], loaded: BoolArray) -> list[_Fo
             stance = move.height
         height = move.height - np.nanpercentile(stance, 2, axis=0)
         frames = np.flatnonzero(loaded[:, foot] & np.isfinite(height).any(axis=1))
-        if frames.size:
-            lowest = np.nanargmin(height[frames], axis=1)
-            ground.append(np.nanmedian(move.velocity[frames, lowest], axis=0) * [1, 0, 1])
         against.append(height)
-    velocities = ground if len(ground) == 2 else ground * 2
+        if frames.size:
+            velocity = move.velocity[frames, np.nanargmin(height[frames], axis=1)]
+            velocity = velocity[np.isfinite(velocity).all(axis=1)]
+            ground += [np.median(velocity, axis=0) * [1, 0, 1]] if len(velocity) else []
+    velocities = ground if len(ground) == 2 else (ground or [np.zeros(3)]) * 2
     return [
         _FootMotion(height, move.velocity - velocity)
         for height, move, velocity in zip(against, moves, velocities, strict=True)
@@ -146,8 +144,7 @@ def _against_ground(moves: Sequence[_FootMotion], loaded: BoolArray) -> list[_Fo
 
 
 def _short_gaps_filled(markers: Markers) -> FloatArray:
-    """Positions of the markers seen in at least half the frames, gaps up to `_FILLED_GAP_S` bridged by a
-    line.
+    """Positions of the markers seen in at least half the frames, short gaps bridged by a line.
 
     Only for telling whether a foot is on the ground.
     """
@@ -156,8 +153,7 @@ def _short_gaps_filled(markers: Markers) -> FloatArray:
     if not kept.size:
         raise MarkerSetError(
             f"the foot markers {', '.join(markers.labels)} are each seen in less than half of the frames; "
-            "use a trial "
-            "that shows the feet or give other markers",
+            "use a trial that shows the feet or give other markers",
             markers.labels,
         )
     positions = markers.positions[:, kept].copy()
@@ -206,8 +202,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def _planted(move: _FootMotion, clearance: float, landing: float, leaving: float) -> BoolArray:
-    """(n,) True from landing to leaving, and where a marker is missing and the others do not say
-    otherwise."""
+    """(n,) True from landing to leaving, and where a marker is missing."""
     slowest = move.slowest(clearance)
     planted = np.zeros(len(slowest), dtype=bool)
     for first, last in runs(slowest <= leaving):

@@ -1,12 +1,12 @@
 """Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
-once, by Gauss-Newton steps with an analytic Jacobian. Frames are independent problems, so they are computed together: one
-Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over every tenth frame gives the warm start of all
-the others.
+once, by Gauss-Newton steps with an analytic Jacobian. Frames are independent problems, so they are computed together:
+one Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over every tenth frame gives the warm start
+of all the others.
 
-The normal matrix of a tree of markers is the mass matrix of the same tree with a unit mass at every marker, and is built
-the same way: per segment one 6 x 6 matrix of its markers, summed over what each coordinate carries.
+The normal matrix of a tree of markers is the mass matrix of the same tree with a unit mass at every marker, and is
+built the same way: per segment one 6 x 6 matrix of its markers, summed over what each coordinate carries.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(np.square(values))))
 
 
-def solve_ik(skeleton: Skeleton, markers: Markers, start: np.ndarray | None = None) -> InverseKinematics:
+def solve_ik(skeleton: Skeleton, markers: Markers, name: str = "markers") -> InverseKinematics:
     """All coordinates at every frame, by least squares on all visible markers.
 
     Args:
         skeleton: the model; its markers and those of the trial are matched by label.
         markers: measured markers.
-        start: (c,) coordinates to start from; zero if not given. The root is placed on the pelvis markers in any case.
+        name: the trial's, for messages.
 
     Raises:
         MarkerSetError: fewer than three root markers of the skeleton are in the trial.
@@ -74,11 +74,11 @@ def solve_ik(skeleton: Skeleton, markers: Markers, start: np.ndarray | None = No
     used = [m for m in skeleton.markers if m.label in markers.labels]
     model = skeleton.with_markers(used)
     measured = markers.positions[:, [markers.labels.index(m.label) for m in used]]
-    q = np.tile(np.zeros(len(model.coordinates)) if start is None else start, (len(measured), 1))
-    q[:, :6], placed = _place_root(model, measured)
+    q = np.zeros((len(measured), len(model.coordinates)))
+    q[:, :6], placed = _place_root(model, measured, name)
     if not placed.any():
         raise TrialError(
-            "markers",
+            name,
             "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
         )
     fine = np.flatnonzero(placed)
@@ -93,9 +93,7 @@ def solve_ik(skeleton: Skeleton, markers: Markers, start: np.ndarray | None = No
     errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
-    return InverseKinematics(
-        markers.time, model.coordinates, _unwrap(q, model), model.labels, errors, converged
-    )
+    return InverseKinematics(markers.time, model.coordinates, _unwrap(q, model), model.labels, errors, converged)
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> np.ndarray:
@@ -105,13 +103,12 @@ def _unwrap(q: np.ndarray, model: Skeleton) -> np.ndarray:
     return q
 
 
-def _place_root(model: Skeleton, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Root coordinates (n, 6) by fitting the root segment to its markers, and (n,) whether three were visible."""
     root = np.flatnonzero(model.marker_segments == 0)
     if len(root) < 3:
         raise MarkerSetError(
-            f"the trial has {len(root)} of the markers on the {model.segments[0]}; at least 3 are needed",
-            missing=[m.label for m in model.markers if m.segment == model.segments[0]],
+            f"trial '{name}' has {len(root)} of the markers on the {model.segments[0]}; at least 3 are needed"
         )
     here, there = model.marker_locals[root], measured[:, root]
     seen = np.isfinite(there).all(axis=-1)
@@ -133,9 +130,7 @@ def _place_root(model: Skeleton, measured: np.ndarray) -> tuple[np.ndarray, np.n
     return q, placed
 
 
-def _gauss_newton(
-    model: Skeleton, measured: np.ndarray, q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _gauss_newton(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minimise the squared marker distances frame by frame; returns q (n, c), (n,) converged, J^T J (n, c, c).
 
     Steps are damped (Levenberg) per frame: a step that makes the fit worse is taken back and the damping raised.

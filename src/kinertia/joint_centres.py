@@ -25,26 +25,29 @@ _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
 _METATARSALS_OF_FOOT = 0.73
+_CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
 _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
 _TORSO_OF_STATURE = {"male": 0.477 / 1.77, "female": 0.429 / 1.61}
 _CERVICAL = {"male": 0.55, "female": 0.53}
+_UPPER_ARM_OF_STATURE = {"male": 0.2817 / 1.741, "female": 0.2751 / 1.735}
+_FOREARM_OF_STATURE = {"male": 0.2689 / 1.741, "female": 0.2643 / 1.735}
 
 
 @dataclass(frozen=True)
 class Landmarks:
-    """Mean landmark positions of a static trial.
+    """Where the markers and landmarks of a static trial are.
 
     Attributes:
+        markers: label -> (3,) m in ground axes, the median over the frames; only those that the trial shows.
         points: landmark -> (3,) m in ground axes; only those that the trial shows.
         widths: joint -> width in m; only those that the trial carries.
         marker_set: where the names come from.
-        labels: what the trial has, for messages.
     """
 
+    markers: Mapping[str, np.ndarray]
     points: Mapping[str, np.ndarray]
     widths: Mapping[str, float]
     marker_set: MarkerSet
-    labels: tuple[str, ...]
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.points[name]
@@ -58,7 +61,7 @@ class Landmarks:
         if not missing:
             return
         wanted = [label for name in missing for label in self.marker_set.landmarks.get(name, ())]
-        near = nearest_labels(wanted, self.labels)
+        near = nearest_labels(wanted, list(self.markers))
         hints = [f"{label} (nearest: {' or '.join(n)})" if n else label for label, n in near.items()]
         labels = f" (labels {', '.join(hints)})" if hints else " (not named in the marker set)"
         raise MarkerSetError(
@@ -70,9 +73,9 @@ class Landmarks:
 
 
 def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
-    """Median position of every landmark over the frames of a static trial."""
+    """Median position of every marker and landmark over the frames of a static trial."""
     markers = static.markers
-    seen = np.isfinite(markers.positions).all(axis=-1)
+    seen = np.all(np.isfinite(markers.positions), axis=-1)
     median = {
         label: np.median(markers.positions[seen[:, i], i], axis=0)
         for i, label in enumerate(markers.labels)
@@ -88,7 +91,7 @@ def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
         for joint, name in marker_set.widths.items()
         if static.measurements.get(name, 0.0) > 0.0
     }
-    return Landmarks(points, widths, marker_set, markers.labels)
+    return Landmarks(median, points, widths, marker_set)
 
 
 def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -128,9 +131,7 @@ def knee(marks: Landmarks, hip: np.ndarray, side: str) -> tuple[np.ndarray, np.n
     return _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
 
 
-def ankle(
-    marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str
-) -> tuple[np.ndarray, np.ndarray]:
+def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
     """Ankle centre and talocrural axis (unit, to the right).
 
     The axis runs through the malleoli where both are marked, else it is Inman's in the shank frame (3, 3).
@@ -158,9 +159,7 @@ def mirrored_axis(right: np.ndarray, side: str) -> np.ndarray:
     return right if side == "r" else right * np.array([-1.0, -1.0, 1.0])
 
 
-def _hinge(
-    marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: str) -> tuple[np.ndarray, np.ndarray]:
     name, _, _ = joint.rpartition("_")
     lateral, medial = f"{name}_lateral_{side}", f"{name}_medial_{side}"
     sign = 1.0 if side == "r" else -1.0
@@ -206,9 +205,7 @@ def foot_frame(marks: Landmarks, side: str) -> tuple[np.ndarray, float]:
     length = float(np.linalg.norm(x))
     x = x / length
     up = np.array([0.0, 1.0, 0.0])
-    return np.column_stack(
-        [x, up, np.cross(x, up)]
-    ), length if tip in marks else length / _METATARSALS_OF_FOOT
+    return np.column_stack([x, up, np.cross(x, up)]), length if tip in marks else length / _METATARSALS_OF_FOOT
 
 
 def torso_frame(
@@ -216,14 +213,14 @@ def torso_frame(
 ) -> tuple[np.ndarray, float, dict[str, np.ndarray]]:
     """Rotation of the torso (origin: lumbar joint), its length to the cervical joint (m), and the shoulder centres.
 
-    With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the acromia
-    and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
+    With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the
+    acromia and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
     """
     marks.require("torso and shoulders", "acromion_r", "acromion_l")
     across = marks["acromion_r"] - marks["acromion_l"]
     if "c7" in marks and "sternal_notch" in marks:
         depth = marks["sternal_notch"] - marks["c7"]
-        upward = Rotation.from_rotvec(np.radians(8.0) * across / np.linalg.norm(across))
+        upward = Rotation.from_rotvec(_CERVICAL_RAISED[sex] * across / np.linalg.norm(across))
         top = marks["c7"] + _CERVICAL[sex] * upward.apply(depth)
         length = float(np.linalg.norm(top - lumbar))
     else:
@@ -239,9 +236,9 @@ def arm(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Elbow centre, wrist centre and elbow flexion axis (unit, to the right when the arm hangs).
 
-    The axis runs through the epicondyles where both are marked; else it is square to the plane of upper arm and forearm, or,
-    with a straight elbow, the torso's z axis swung along with the arm. Without a medial marker the centre lies half
-    an elbow width (measured, or 4 % of the stature) inward from the lateral one.
+    The axis runs through the epicondyles where both are marked; else it is square to the plane of upper arm and
+    forearm, or, with a straight elbow, the torso's z axis swung along with the arm. Without a medial marker the centre
+    lies half an elbow width (measured, or 4 % of the stature) inward from the lateral one.
     """
     lateral, medial, wrist_name = f"elbow_lateral_{side}", f"elbow_medial_{side}", f"wrist_{side}"
     marks.require(f"elbow_{side}", lateral, wrist_name)
@@ -256,6 +253,12 @@ def arm(
         axis = _elbow_axis(shoulder, elbow, wrist, torso)
         elbow = marks[lateral] - sign * half * axis
     return elbow, wrist, axis
+
+
+def hanging_arm(shoulder: np.ndarray, torso: np.ndarray, height_m: float, sex: str) -> tuple[np.ndarray, np.ndarray]:
+    """Elbow and wrist centres of an arm without markers: it hangs along the torso, as long as de Leva's (1996)."""
+    elbow = shoulder - _UPPER_ARM_OF_STATURE[sex] * height_m * torso[:, 1]
+    return elbow, elbow - _FOREARM_OF_STATURE[sex] * height_m * torso[:, 1]
 
 
 def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, torso: np.ndarray) -> np.ndarray:

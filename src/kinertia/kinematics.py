@@ -1,7 +1,7 @@
 """From a trial to smooth coordinates: facing +X, inverse kinematics, GCV splines, and ground reactions to match.
 
-The splines of the coordinates and those of the ground reactions carry the same band: the forces are smoothed at the median
-cutoff that cross-validation chose for the pelvis translations, whose accelerations they balance.
+The splines of the coordinates and those of the ground reactions carry the same band: the forces are smoothed at the
+median cutoff that cross-validation chose for the pelvis translations, whose accelerations they balance.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Literal
 import numpy as np
 
 from kinertia.dynamics import Motion
-from kinertia.errors import TrialError
+from kinertia.errors import MarkerSetError, TrialError
 from kinertia.ik import InverseKinematics, rms, solve_ik
 from kinertia.marker_set import MarkerSet
 from kinertia.skeleton import Skeleton
-from kinertia.splines import SmoothedSpline, smooth
+from kinertia.splines import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial import Markers, Trial, runs
 
 LONGEST_BRIDGE_S = 0.1
@@ -67,7 +67,7 @@ class Kinematics:
 
     @cached_property
     def foot_loads(self) -> np.ndarray:
-        """(w, 2, 6) ground reactions on the right and left foot inside the window: force, moment about the ground origin.
+        """(w, 2, 6) ground reactions on the right and left foot inside the window: force, moment about ground origin.
 
         Smoothed from the window's own samples only: what a plate saw outside it may not be all of the ground contact.
         """
@@ -78,12 +78,22 @@ class Kinematics:
 
 
 def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
-    """Rotation about the vertical, by a multiple of 90 degrees, that makes the person face +X; and that angle."""
-    sides = [
-        np.nanmean(markers.select(marker_set.landmarks[f"asis_{side}"]).positions, axis=(0, 1))
-        for side in "rl"
-    ]
-    right = sides[0] - sides[1]
+    """Rotation about the vertical, by a multiple of 90 degrees, that makes the person face +X; and that angle.
+
+    Raises:
+        MarkerSetError: the markers of the ASIS are not in the trial, or never visible together.
+    """
+    sides = [markers.select(marker_set.landmarks[f"asis_{side}"]).positions.mean(axis=1) for side in "rl"]
+    across = sides[0] - sides[1]
+    across = across[np.isfinite(across[:, 0])]
+    if not len(across):
+        labels = [label for side in "rl" for label in marker_set.landmarks[f"asis_{side}"]]
+        raise MarkerSetError(
+            f"no frame shows the markers {' and '.join(labels)} together, so it is unknown which way the person faces; "
+            f"use a trial that does",
+            labels,
+        )
+    right = across.mean(axis=0)
     quarter = int(np.round(np.arctan2(right[0], right[2]) / (np.pi / 2)))
     cosine, sine = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarter % 4]
     return np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]), -90.0 * quarter
@@ -95,15 +105,26 @@ def solve_kinematics(
     """Inverse kinematics and smoothing of a trial that already faces +X.
 
     Raises:
-        TrialError: no stretch in which all ground contact is measured and all coordinates are known.
+        TrialError: no stretch in which all ground contact is measured and all coordinates are known, or a coordinate
+            is known in too few frames to be smoothed.
     """
-    ik = solve_ik(skeleton, trial.markers)
+    ik = solve_ik(skeleton, trial.markers, trial.name)
     solved = np.flatnonzero(np.isfinite(ik.q).any(axis=1))
     inside = slice(solved[0], solved[-1] + 1)
-    spline = smooth(ik.time[inside], ik.q[inside], smoothing)
-    known = _bridged(np.isfinite(ik.q), ik.time).all(axis=1)
+    try:
+        spline = smooth(ik.time[inside], ik.q[inside], smoothing)
+    except SmoothingError as error:
+        raise TrialError(
+            trial.name,
+            f"enough markers to know {ik.coordinates[error.column]} are visible in {error.n_visible} frames only, too "
+            f"few to smooth it; fill the gaps of the markers or use a longer trial",
+        ) from error
+    known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
     usable = known & trial.measured
     window, notes = _longest(trial, usable, known)
+    stuck = int((~ik.converged[solved]).sum())
+    if stuck:
+        notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
     cutoff_hz = float(np.median(spline.cutoff_hz[:3]))
     return Kinematics(trial, turned_deg, ik, spline, cutoff_hz, window, (*trial.notes, *notes))
 
@@ -125,15 +146,16 @@ def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple
     if not stretches:
         raise TrialError(
             trial.name,
-            f"no frame has both measured ground contact (frames with it: {int(trial.measured.sum())}) and enough visible "
-            f"markers for all coordinates (frames with them: {int(known.sum())}); fill marker gaps or use another trial",
+            f"no frame has both measured ground contact (frames with it: {int(trial.measured.sum())}) and enough "
+            f"visible markers for all coordinates (frames with them: {int(known.sum())}); fill marker gaps or use "
+            f"another trial",
         )
     first, last = stretches[0]
     if last - first < 10:
         raise TrialError(
             trial.name,
-            f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} frames "
-            f"({time[first]:.3f} to {time[last]:.3f} s); at least 11 are needed",
+            f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} "
+            f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least 11 are needed",
         )
     notes = []
     left_out = sum(end - start + 1 for start, end in stretches[1:])
@@ -153,9 +175,21 @@ def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
         name: the trial's, for the message.
         markers: a few frames suffice.
     """
-    ik = solve_ik(skeleton, markers)
+    ik = solve_ik(skeleton, markers, name)
+    shown = np.isfinite(ik.q).any(axis=0)
+    if not shown.all():
+        never = [c for c, known in zip(ik.coordinates, shown, strict=True) if not known]
+        skeleton = skeleton.lock(dict.fromkeys(never, 0.0))
+        ik = solve_ik(skeleton, markers, name)
     used = skeleton.with_markers([m for m in skeleton.markers if m.label in ik.labels])
     solved = np.isfinite(ik.q).all(axis=1)
+    if not solved.any():
+        rare = np.argsort(np.isfinite(ik.q).sum(axis=0))[:3]
+        raise TrialError(
+            name,
+            f"in none of {len(solved)} frames looked at are enough markers visible for all coordinates (rarest: "
+            f"{', '.join(ik.coordinates[c] for c in rare)}); fill the gaps of the markers or use another trial",
+        )
     modelled = used.marker_positions(used.pose(ik.q[solved]))
     measured = markers.select(ik.labels).positions[solved]
     between = np.nanmean(np.square(measured[:, :, None] - modelled[:, None]).sum(axis=-1), axis=0)
@@ -167,14 +201,14 @@ def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
         before, after = np.sqrt(now[i, j] / 2), np.sqrt((between[i, j] + between[j, i]) / 2)
         raise TrialError(
             name,
-            f"the markers '{ik.labels[i]}' and '{ik.labels[j]}' look swapped: they are {before * 1e3:.0f} mm from where the "
-            f"static trial puts them, and {after * 1e3:.0f} mm if exchanged; correct the labels",
+            f"the markers '{ik.labels[i]}' and '{ik.labels[j]}' look swapped: they are {before * 1e3:.0f} mm from "
+            f"where the static trial puts them, and {after * 1e3:.0f} mm if exchanged; correct the labels",
         )
     if rms(ik.errors_m) > _LOST_M:
         worst = np.argsort(-np.diag(between))[:3]
         listed = ", ".join(f"'{ik.labels[k]}' ({np.sqrt(between[k, k]) * 1e3:.0f} mm)" for k in worst)
         raise TrialError(
             name,
-            f"the model of the static trial misses the markers by {rms(ik.errors_m) * 1e3:.0f} mm RMS, most of all {listed}; "
-            f"check labels, units, and that both trials show the same person",
+            f"the model of the static trial misses the markers by {rms(ik.errors_m) * 1e3:.0f} mm RMS, most of all "
+            f"{listed}; check labels, units, and that both trials show the same person",
         )

@@ -20,7 +20,23 @@ SEGMENTS = (
     "torso",
     *(f"{name}_{side}" for side in "rl" for name in ("thigh", "shank", "foot", "upper_arm", "forearm")),
 )
-_SIDED = ["asis", "psis", "knee_lateral", "knee_medial", "thigh_wand", "ankle_lateral", "ankle_medial", "shank_wand", "heel", "metatarsal", "toe", "acromion", "elbow_lateral", "elbow_medial", "wrist"]
+_SIDED = [
+    "asis",
+    "psis",
+    "knee_lateral",
+    "knee_medial",
+    "thigh_wand",
+    "ankle_lateral",
+    "ankle_medial",
+    "shank_wand",
+    "heel",
+    "metatarsal",
+    "toe",
+    "acromion",
+    "elbow_lateral",
+    "elbow_medial",
+    "wrist",
+]
 LANDMARKS = (
     *(f"{name}_{side}" for name in _SIDED for side in "rl"),
     "sacrum",
@@ -75,9 +91,7 @@ def read_marker_set(name: str | Path) -> MarkerSet:
         return _parse(text, Path(f"{name}.toml"))
     path = Path(name)
     if not path.is_file():
-        raise FileError(
-            path, f"no such marker set; give a TOML file or one of the presets {', '.join(preset_names())}"
-        )
+        raise FileError(path, f"no such marker set; give a TOML file or one of the presets {', '.join(preset_names())}")
     return _parse(path.read_text(encoding="utf-8"), path)
 
 
@@ -123,9 +137,7 @@ def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, l
     for label in labels:
         folded.setdefault(_fold(label), label)
     return {
-        label: [
-            folded[near] for near in difflib.get_close_matches(_fold(label), list(folded), n=2, cutoff=0.6)
-        ]
+        label: [folded[near] for near in difflib.get_close_matches(_fold(label), list(folded), n=2, cutoff=0.6)]
         for label in missing
     }
 
@@ -146,9 +158,7 @@ def _parse(text: str, path: Path) -> MarkerSet:
     known = {"name": None, "landmarks": LANDMARKS, "segments": SEGMENTS, "widths": WIDTHS}
     for table, entries in content.items():
         if table not in known:
-            raise FileError(
-                path, f"unknown entry '{table}'; a marker set has {', '.join(known)}", _line(text, table)
-            )
+            raise FileError(path, f"unknown entry '{table}'; a marker set has {', '.join(known)}", _line(text, table))
         names = known[table]
         if names is None:
             continue
@@ -159,6 +169,11 @@ def _parse(text: str, path: Path) -> MarkerSet:
     segments = {segment: _labels(content.get("segments", {}).get(segment, ())) for segment in SEGMENTS}
     if len(segments["pelvis"]) < 3:
         raise FileError(path, "[segments] pelvis must list at least three markers")
+    for side in ("asis_r", "asis_l"):
+        if side not in content.get("landmarks", {}):
+            raise FileError(
+                path, f"[landmarks] must name {side}: it makes the pelvis frame, and tells which way one faces"
+            )
     return MarkerSet(
         name=str(content.get("name", path.stem)),
         landmarks={key: _labels(value) for key, value in content.get("landmarks", {}).items()},

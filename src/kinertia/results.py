@@ -19,18 +19,36 @@ import pandas as pd
 
 from kinertia import __version__
 from kinertia.checks import mass_from_force_kg
+from kinertia.errors import FileError
 from kinertia.fit import Fit, TrialFit
 from kinertia.io.sto import write_sto
 
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
 
+def check_folder(folder: str | Path) -> None:
+    """Raise FileError unless results can be written to `folder`, which need not exist yet.
+
+    Worth calling before a long computation.
+    """
+    folder = Path(folder).absolute()
+    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    if not existing.is_dir():
+        raise FileError(existing, "is a file; give a folder for the results")
+    if not os.access(existing, os.W_OK):
+        raise FileError(existing, "cannot be written to; give another folder for the results")
+
+
 def save_fit(fit: Fit, folder: str | Path) -> Path:
     """Write all result files of a fit into a folder, which is made if need be; returns the folder.
 
     With one trial its files stand in the folder itself, with several in a sub-folder per trial.
+
+    Raises:
+        FileError: the folder cannot be written to.
     """
     folder = Path(folder)
+    check_folder(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     work = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     try:

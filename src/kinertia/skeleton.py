@@ -131,7 +131,7 @@ class Skeleton:
 
     @cached_property
     def _built(self) -> tuple[pin.Model, dict[str, int], dict[str, pin.SE3]]:
-        """Pinocchio model without masses, the joint that carries each segment, and the segment's place in that joint."""
+        """Pinocchio model without masses, the joint that carries each segment, and each segment's place in it."""
         model = pin.Model()
         model.gravity.linear = np.array([0.0, -GRAVITY_M_S2, 0.0])
         carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
@@ -247,9 +247,7 @@ def _pinocchio_joint(axis: Axis) -> pin.JointModel:
     aligned = _ALIGNED.get((axis.kind, axis.direction))
     if aligned is not None:
         return aligned()
-    unaligned = (
-        pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
-    )
+    unaligned = pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
     return unaligned(*axis.direction)
 
 

@@ -181,9 +181,7 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
     if not shape:
         spline = BSpline.construct_fast(spline.t, spline.c[:, 0], 5)
     p = (2 * np.pi * cutoff) ** -6.0 / spacing
-    return SmoothedSpline(
-        time, p.reshape(shape), cutoff.reshape(shape), sigma.reshape(shape), spline, spacing
-    )
+    return SmoothedSpline(time, p.reshape(shape), cutoff.reshape(shape), sigma.reshape(shape), spline, spacing)
 
 
 def _validated(
@@ -296,9 +294,7 @@ class _System:
         trace = 1.5 + float((diagonal.imag / diagonal.real).sum()) / _STEP
         return y - residual, (residual[visible] ** 2).sum(axis=0), trace
 
-    def _matrix(
-        self, root: complex, visible: NDArray[np.bool_], places: NDArray[np.int_]
-    ) -> NDArray[np.complex128]:
+    def _matrix(self, root: complex, visible: NDArray[np.bool_], places: NDArray[np.int_]) -> NDArray[np.complex128]:
         """LAPACK band storage, element (r, c) at [2 _BAND + r - c, c], of the matrix for sqrt(m) = root."""
         n = len(visible)
         main = 2 * _BAND

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from kinertia.config import Model, Settings, Subject, TrialFiles, _Table
+from kinertia.config import Model, Settings, Subject, Table, TrialFiles
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.recording import read_recording
 
 _STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 
@@ -41,9 +43,7 @@ def init_subject(folder: str | Path) -> str:
     chosen = _matched([trial for trial in trials if trial not in c3d], forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
-        text += [
-            f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."
-        ]
+        text += [f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
     guessed = static is not None and not _STATIC_NAME.search(static.stem)
     note = " (the shortest recording)" if guessed else ""
@@ -63,7 +63,7 @@ def init_subject(folder: str | Path) -> str:
     return "\n".join(text)
 
 
-def _entry(table: type[_Table], key: str, value: object, example: object = None, note: str = "") -> str:
+def _entry(table: type[Table], key: str, value: object, example: object = None, note: str = "") -> str:
     """`key = value  # what it is`; without a value a commented example to fill in."""
     about = f"{table.model_fields[key].description}{note}"
     if value is None:
@@ -99,8 +99,6 @@ def _common_start(a: str, b: str) -> int:
 
 def _recording(file: Path) -> Any:
     """What a capture holds, or None where it cannot be read: reading the trial itself will say why."""
-    from kinertia.io.recording import read_recording
-
     try:
         return read_recording(file)
     except KinertiaError:

@@ -75,9 +75,7 @@ class Markers:
         missing = [label for label in labels if label not in self.labels]
         if missing:
             nearest = {label: get_close_matches(label, self.labels, n=3) for label in missing}
-            hints = "; ".join(
-                f"'{label}' (nearest: {', '.join(near) or 'none'})" for label, near in nearest.items()
-            )
+            hints = "; ".join(f"'{label}' (nearest: {', '.join(near) or 'none'})" for label, near in nearest.items())
             raise MarkerSetError(
                 f"the trial has no marker {hints}; give labels that are among its {len(self.labels)} markers",
                 missing,
@@ -203,9 +201,7 @@ class Trial:
         """
         proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) and np.linalg.det(rotation) > 0
         if not (proper and np.allclose(rotation[1], [0, 1, 0], atol=1e-9)):
-            raise ValueError(
-                f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}"
-            )
+            raise ValueError(f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}")
         return replace(self, markers=self.markers.rotated(rotation), loads=self.loads.rotated(rotation))
 
 

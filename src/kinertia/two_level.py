@@ -1,11 +1,12 @@
 """The study's estimator: pelvis correction (inner level) and body segment parameters (outer level); DESIGN section 5.
 
-Inner level: equation (2) gives the pelvis acceleration that needs no residual at the measured state; integrated twice by the
-trapezoid rule, with the two constants per coordinate that track the measured pelvis best (linear least squares, closed form).
+Inner level: equation (2) gives the pelvis acceleration that needs no residual at the measured state; integrated twice
+by the trapezoid rule, with the two constants per coordinate that track the measured pelvis best (linear least squares,
+closed form).
 Outer level: bounded nonlinear least squares on the residual P at the corrected motion, over all frames of all trials.
 
-Deviations from the study: no finite differences (the derivative is chained through (2), the integration and the fit), and
-moments are divided by the body's radius of gyration about the pelvis, so that N and N m add up.
+Deviations from the study: no finite differences (the derivative is chained through (2), the integration and the fit),
+and moments are divided by the body's radius of gyration about the pelvis, so that N and N m add up.
 """
 
 from __future__ import annotations
@@ -56,8 +57,8 @@ class Window:
 def stretches(window: Window) -> list[Window]:
     """The window in equal parts of at most MAX_STRETCH_S, about a stride.
 
-    The two constants per coordinate hold the corrected pelvis near the measured one only for so long: literature BSPs are off
-    by some 10 N m, which over 2.4 s turns the pelvis away by 0.3 rad. The study's trials were one stride.
+    The two constants per coordinate hold the corrected pelvis near the measured one only for so long: literature BSPs
+    are off by some 10 N m, which over 2.4 s turns the pelvis away by 0.3 rad. The study's trials were one stride.
     """
     count = int(np.ceil((window.time[-1] - window.time[0]) / MAX_STRETCH_S))
     edges = np.linspace(0, len(window.time), max(count, 1) + 1).round().astype(int)
@@ -83,9 +84,7 @@ class Integration:
         np.cumsum((flat[:-1] + flat[1:]) / 2 * self._step, axis=0, out=total[1:])
         return total.reshape(rate.shape)
 
-    def track(
-        self, acceleration: np.ndarray, measured: np.ndarray | float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def track(self, acceleration: np.ndarray, measured: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity (n, ...) with this acceleration, nearest to the measured position.
 
         With `measured` zero it is the derivative of the result with respect to anything that moves the acceleration.
@@ -196,9 +195,7 @@ class _Problem:
 
     def residuals(self, theta: np.ndarray) -> np.ndarray:
         bsp = self.vector.bsp(theta)
-        parts = [
-            residual(self.skeleton, bsp, self.motion(bsp, w), w.wrench) * self._scale for w in self.windows
-        ]
+        parts = [residual(self.skeleton, bsp, self.motion(bsp, w), w.wrench) * self._scale for w in self.windows]
         return np.concatenate([part.ravel() for part in parts])
 
     def jacobian(self, theta: np.ndarray) -> np.ndarray:

@@ -24,6 +24,9 @@ from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial import BoolArray, FloatArray, Markers, Recording
 
 _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
+_BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}
+"""By processor (Intel, DEC, MIPS): byte order of integers, and the header byte with the sign of POINT:SCALE,
+which is negative where numbers are stored as floats."""
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
@@ -42,8 +45,7 @@ def read_c3d(path: str | Path) -> Recording:
     `plates` is None when none is left.
 
     Raises:
-        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length
-        unit.
+        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit.
     """
     path = Path(path)
     file, notes = _open(path)
@@ -63,22 +65,12 @@ def read_c3d(path: str | Path) -> Recording:
 def _open(path: Path) -> tuple[Any, list[str]]:
     """The file as ezc3d holds it, with forces where ezc3d can work them out."""
     expect_file(path)
-    with path.open("rb") as stream:
-        start = stream.read(512)
-    if not start:
-        raise FileError(path, "the file is empty; expected a C3D file, export it again")
-    if len(start) < 2 or start[1] != 0x50:
-        raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
+    _expect_complete(path)
     notes = []
     try:
         file = ezc3d.c3d(str(path))
     except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
-        raise FileError(path, f"broken or truncated C3D file ({error}); export it again") from None
-    announced, frames = _announced_frames(path, start), file["data"]["points"].shape[2]
-    if frames < announced:
-        raise FileError(
-            path, f"truncated: its header announces {announced} frames, {frames} are there; export it again"
-        )
+        raise FileError(path, f"broken C3D file ({error}); export it again") from None
     if not file["data"]["points"].shape[1]:
         raise FileError(
             path,
@@ -89,21 +81,31 @@ def _open(path: Path) -> tuple[Any, list[str]]:
             file = ezc3d.c3d(str(path), extract_forceplat_data=True)
         except Exception as error:  # the same, for plate types and parameters that it does not know
             types = ", ".join(map(str, _values(file["parameters"], "FORCE_PLATFORM", "TYPE", [])))
-            notes.append(
-                f"{path.name}: force plates (types {types}) were left out, they cannot be read: {error}"
-            )
+            notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {error}")
     return file, notes
 
 
-def _announced_frames(path: Path, start: bytes) -> int:
-    """Number of frames by the header, which ezc3d replaces by what it finds; 0 where 16 bits do not hold
-    it."""
+def _expect_complete(path: Path) -> None:
+    """Compare the size with what the header announces: ezc3d reads a truncated file as a shorter one, or as noise."""
     with path.open("rb") as stream:
-        stream.seek(512 * (start[0] - 1) + 3)
-        processor = stream.read(1)
-    order = ">H" if processor == b"\x56" else "<H"
-    first, last = (struct.unpack_from(order, start, offset)[0] for offset in (6, 8))
-    return 0 if last in (0, 0xFFFF) else 1 + last - first
+        header = stream.read(512)
+        if not header:
+            raise FileError(path, "the file is empty; expected a C3D file, export it again")
+        if len(header) < 2 or header[1] != 0x50:
+            raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
+        stream.seek(512 * (header[0] - 1))
+        parameters = stream.read(4)
+    size, needed = path.stat().st_size, 512
+    if len(header) == 512 and len(parameters) == 4:
+        order, sign_byte = _BYTE_ORDERS.get(parameters[3], ("<", 15))
+        points, analogs, first, last = struct.unpack_from(f"{order}4H", header, 2)
+        data_block = struct.unpack_from(f"{order}H", header, 16)[0]
+        number = 4 if header[sign_byte] & 0x80 else 2
+        frames = last - first + 1 if first <= last < 0xFFFF else 0  # 16 bits do not hold more
+        data = 512 * (data_block - 1) + number * (4 * points + analogs) * frames
+        needed = max(512 * (header[0] - 1 + parameters[2]), data)
+    if size < needed:
+        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
 
 
 def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
@@ -127,9 +129,7 @@ def _times(file: Any, kind: str) -> FloatArray:
     start = header["first_frame"] / header["frame_rate"]
     if kind == "points":
         return start + np.arange(file["data"]["points"].shape[2]) / header["frame_rate"]
-    return start + np.arange(file["data"]["analogs"].shape[2]) / (
-        file["header"]["analogs"]["frame_rate"] or 1.0
-    )
+    return start + np.arange(file["data"]["analogs"].shape[2]) / (file["header"]["analogs"]["frame_rate"] or 1.0)
 
 
 def _continued(parameters: Any, name: str) -> list[str]:
@@ -165,8 +165,7 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
         )
     if outputs:
         notes.append(
-            f"{path.name}: {len(outputs)} model outputs among the points were left out "
-            f"({_some(sorted(outputs))})"
+            f"{path.name}: {len(outputs)} model outputs among the points were left out ({_some(sorted(outputs))})"
         )
     if unnamed:
         notes.append(f"{path.name}: {len(unnamed)} unnamed points were left out")
@@ -191,8 +190,7 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
 
 
 def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[str]]:
-    """Labels without `subject:`; where there are several subjects only the one with most labels loses its
-    prefix."""
+    """Labels without `subject:`; of several subjects only the one with most labels loses its prefix."""
     prefixes = Counter(label.split(":", 1)[0] for label in labels if ":" in label)
     if not prefixes:
         return labels, []
@@ -200,9 +198,7 @@ def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[st
     notes = [f"{path.name}: the prefix '{subject}:' was taken off the labels"]
     if len(prefixes) > 1:
         others = ", ".join(name for name in prefixes if name != subject)
-        notes = [
-            f"{path.name}: several subjects; '{subject}:' was taken off the labels, {others} keep theirs"
-        ]
+        notes = [f"{path.name}: several subjects; '{subject}:' was taken off the labels, {others} keep theirs"]
     return [label.removeprefix(subject + ":") for label in labels], notes
 
 
@@ -241,8 +237,7 @@ def _seen(positions: FloatArray) -> BoolArray:
 
 
 def _rotation(axis: int, sign: int) -> FloatArray:
-    """Rotation (3, 3) that turns the signed lab axis to +Y and keeps lab X where it can: (x, y, z) -> (x, z,
-    -y)."""
+    """Rotation (3, 3) that turns a lab axis to +Y and keeps lab X where it can; for Z up (x, y, z) -> (x, z, -y)."""
     up = np.zeros(3)
     up[axis] = sign
     forward = np.eye(3)[1 if axis == 0 else 0]
@@ -261,10 +256,11 @@ def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, d
     lengths = {key: value for key, value in numbers.items() if _LENGTH_KEY.search(key)}
     if height is None and not lengths:
         return mass, None, {}, []
-    unit, word = 0.001, "mm"
+    per_metre, word = 1000.0, "mm"
     if height is not None and height < 3:
-        unit, word = 1.0, "m"
+        per_metre, word = 1.0, "m"
     elif height is not None and height < 300:
-        unit, word = 0.01, "cm"
+        per_metre, word = 100.0, "cm"
     note = f"{path.name}: the lengths in PROCESSING were taken as {word}"
-    return mass, None if height is None else unit * height, {k: unit * v for k, v in lengths.items()}, [note]
+    height_m = None if height is None else height / per_metre
+    return mass, height_m, {key: value / per_metre for key, value in lengths.items()}, [note]

@@ -13,11 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from kinertia.errors import FileError
 from kinertia.trial import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
 _OUTSIDE_LIMIT_M = 0.05
+_OFFSET_LIMIT_N = 5.0
+_FEWEST_IDLE_SAMPLES = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +40,7 @@ class LabPlates:
     corners: FloatArray
 
     def loaded_direction(self) -> FloatArray:
-        """Mean direction (3,) of the loaded samples, each counted without sign; zero when nothing is
-        loaded."""
+        """Mean direction (3,) of the loaded samples, each without its sign; zero when nothing is loaded."""
         size = np.linalg.norm(self.force, axis=2)
         loaded = self.force[size > 5 * LOAD_THRESHOLD_N]
         if len(loaded) < 10:
@@ -71,9 +73,7 @@ def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, li
         corners.append(places)
     if not names:
         return None, notes
-    return LabPlates(
-        tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners)
-    ), notes
+    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners)), notes
 
 
 def to_ground_plates(
@@ -86,14 +86,19 @@ def to_ground_plates(
     corners = plates.corners @ rotation.T
     notes = []
     for p, name in enumerate(plates.names):
-        vertical = force[:, p, 1]
+        vertical = np.nan_to_num(force[:, p, 1])
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
             moment[:, p] *= -1
-            notes.append(
-                f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed"
-            )
+            notes.append(f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed")
         loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
+        lost = np.isnan(force[:, p]).any(axis=1) | (loaded & np.isnan(moment[:, p]).any(axis=1))
+        if lost.any():
+            raise FileError(path, f"{name} has no number at {time[lost][0]:g} s; expected one for every sample")
+        offset = np.median(force[~loaded, p], axis=0) if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES else np.zeros(3)
+        if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
+            told = ", ".join(f"{value:.0f}" for value in offset)
+            notes.append(f"{path.name}: {name} reads ({told}) N when nobody stands on it; this was not subtracted")
         force[~loaded, p] = 0.0
         moment[~loaded, p] = 0.0
         if not loaded.any():
@@ -101,8 +106,7 @@ def to_ground_plates(
         elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
             notes.append(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
-                "corners; check "
-                "the plate's corners, origin and units"
+                "corners; check the plate's corners, origin and units"
             )
     return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners), notes
 

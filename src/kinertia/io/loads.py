@@ -90,8 +90,7 @@ def _expect_steady_time(path: Path, time: FloatArray) -> None:
         raise FileError(
             path,
             f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal "
-            "steps, export "
-            "the forces without gaps",
+            "steps, export the forces without gaps",
         )
 
 
@@ -103,8 +102,7 @@ def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArra
         raise FileError(
             path,
             f"the largest vertical force in {group.force}y is {force[:, 1].min():.0f} N, downward; expected "
-            "Y up and "
-            "the force on the person, turn the sign or the axes before export",
+            "Y up and the force on the person, turn the sign or the axes before export",
         )
     loaded = force[:, 1] >= LOAD_THRESHOLD_N
     _expect_numbers(path, table, group.point, loaded)
@@ -126,23 +124,18 @@ def _expect_numbers(path: Path, table: pd.DataFrame, identifier: str, where: np.
         raise FileError(
             path,
             f"column {identifier}{'xyz'[axis]} has no number at {table.index[row]:g} s; expected one for "
-            "every loaded "
-            "sample, fill the gap or cut the trial before export",
+            "every loaded sample, fill the gap or cut the trial before export",
         )
 
 
 def _remarks(path: Path, loads: PlateLoads, groups: Sequence[_Columns]) -> list[str]:
-    idle = [
-        name for name, force in zip(loads.names, loads.force.swapaxes(0, 1), strict=True) if not force.any()
-    ]
+    idle = [name for name, force in zip(loads.names, loads.force.swapaxes(0, 1), strict=True) if not force.any()]
     still = [group.name for group in groups if group.torque is None]
     notes = []
     if idle:
         notes.append(f"{path.name}: {', '.join(idle)} never carries {LOAD_THRESHOLD_N:g} N")
     if still:
-        notes.append(
-            f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero"
-        )
+        notes.append(f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero")
     return notes
 
 
@@ -159,21 +152,16 @@ def _groups_by_name(path: Path, table: pd.DataFrame) -> list[_Columns]:
                 "ExternalLoads file",
             )
         candidates = [stem + "m", stem + "t"]
-        candidates += [
-            stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")
-        ]
+        candidates += [stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")]
         torque = next((c for c in candidates if c != stem and _has(table, c)), None)
         words = re.split(r"[_\W]+", stem.lower())
         feet = {_FOOT_WORDS[word] for word in words if word in _FOOT_WORDS}
-        groups.append(
-            _Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None)
-        )
+        groups.append(_Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None))
     if not groups:
         raise FileError(
             path,
             "no ground reaction forces: expected columns like ground_force_vx, ground_force_vy, "
-            "ground_force_vz, but "
-            f"it has {_listed(columns)}; rename them or give an ExternalLoads file",
+            f"ground_force_vz, but it has {_listed(columns)}; rename them or give an ExternalLoads file",
         )
     return groups
 
@@ -205,9 +193,7 @@ def _datafile(root: ElementTree.Element, loads_path: Path) -> Path:
         raise FileError(loads_path, "names no datafile; give the MOT or STO file of the forces beside it")
     path = loads_path.parent / name.replace("\\", "/")
     if not path.is_file():
-        raise FileError(
-            loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it"
-        )
+        raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
     return path
 
 
@@ -221,20 +207,14 @@ def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_
         for tag in ("force_expressed_in_body", "point_expressed_in_body"):
             body = _text(element, tag) or "ground"
             if body.rsplit("/", 1)[-1] != "ground":
-                raise FileError(
-                    path, f"{name} has {tag} = {body}; expected ground, transform the load before export"
-                )
+                raise FileError(path, f"{name} has {tag} = {body}; expected ground, transform the load before export")
         force, point = _text(element, "force_identifier"), _text(element, "point_identifier")
         for tag, identifier in (("force_identifier", force), ("point_identifier", point)):
             if not identifier:
-                raise FileError(
-                    path, f"{name} has no {tag}; expected the beginning of its three column names"
-                )
+                raise FileError(path, f"{name} has no {tag}; expected the beginning of its three column names")
         side = re.search(r"_([rl])$", _text(element, "applied_to_body"))
         groups.append(
-            _Columns(
-                name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None
-            )
+            _Columns(name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None)
         )
     if not groups:
         raise FileError(path, "all its external forces are disabled; expected at least one that applies")
@@ -254,6 +234,6 @@ def _expect_columns(groups: Sequence[_Columns], table: pd.DataFrame, path: Path,
                 raise FileError(
                     path,
                     f"no column {', '.join(missing)}, which {loads_path.name} names for {group.name} by the "
-                    "identifier "
-                    f"'{identifier}'; the columns are {_listed(list(table.columns))}; correct the identifier",
+                    f"identifier '{identifier}'; correct the identifier, the columns are "
+                    f"{_listed(list(table.columns))}",
                 )

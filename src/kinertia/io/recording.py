@@ -53,9 +53,7 @@ def read_recording(
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
     if path.suffix.lower() not in suffixes:
-        raise FileError(
-            path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}"
-        )
+        raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}")
     expect_file(path)
 
 
@@ -67,6 +65,5 @@ def _expect_overlap(recording: Recording) -> None:
         raise TrialError(
             recording.name,
             f"forces from {forces[0]:.3f} to {forces[-1]:.3f} s and markers from {markers[0]:.3f} to "
-            f"{markers[-1]:.3f} s "
-            "do not overlap; give files of the same trial on the same clock",
+            f"{markers[-1]:.3f} s do not overlap; give files of the same trial on the same clock",
         )

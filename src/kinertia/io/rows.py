@@ -38,9 +38,7 @@ def expect_file(path: Path) -> None:
         raise FileError(path, f"no such file: there is no folder {folder}; give the path of an existing file")
     names = [entry.name for entry in folder.iterdir() if entry.is_file()]
     nearest = get_close_matches(path.name, names, n=3, cutoff=0.4)
-    hint = (
-        f"the nearest names there are {', '.join(nearest)}" if nearest else "nothing there has a name like it"
-    )
+    hint = f"the nearest names there are {', '.join(nearest)}" if nearest else "nothing there has a name like it"
     raise FileError(path, f"no such file; looked in {folder}, {hint}")
 
 
@@ -75,8 +73,7 @@ def read_rows(
         if len(cells) > columns or (len(cells) < columns and not may_be_short):
             raise FileError(
                 path,
-                f"the row has {len(cells)} values, expected {columns} as the header says; repair or export "
-                "it again",
+                f"the row has {len(cells)} values, expected {columns} as the header says; repair or export it again",
                 number,
             )
         try:
@@ -88,9 +85,7 @@ def read_rows(
     values = np.array(rows, dtype=float).reshape(len(rows), columns)
     if np.isinf(values).any():
         row_index, column_index = np.argwhere(np.isinf(values))[0]
-        raise FileError(
-            path, f"infinite value in column {column_index + 1}; expected a number", numbers[row_index]
-        )
+        raise FileError(path, f"infinite value in column {column_index + 1}; expected a number", numbers[row_index])
     return values, numbers
 
 

@@ -28,19 +28,13 @@ def read_sto(path: str | Path) -> pd.DataFrame:
     """
     path = Path(path)
     lines = read_lines(path)
-    end = next(
-        (number for number, line in enumerate(lines, start=1) if line.strip().lower() == "endheader"), None
-    )
+    end = next((number for number, line in enumerate(lines, start=1) if line.strip().lower() == "endheader"), None)
     if end is None:
         raise FileError(path, "not a STO or MOT file: no line 'endheader'; check what was exported")
     header = _header(lines[: end - 1])
-    label_line = next(
-        (number for number in range(end + 1, len(lines) + 1) if lines[number - 1].strip()), None
-    )
+    label_line = next((number for number in range(end + 1, len(lines) + 1) if lines[number - 1].strip()), None)
     if label_line is None:
-        raise FileError(
-            path, "ends after 'endheader'; expected column labels and rows, export the file again", end
-        )
+        raise FileError(path, "ends after 'endheader'; expected column labels and rows, export the file again", end)
     labels = _labels(path, lines[label_line - 1], label_line)
     values, line_numbers = read_rows(path, lines, label_line + 1, len(labels))
     _check_counts(path, header, len(values), len(labels))
@@ -106,9 +100,7 @@ def _labels(path: Path, line: str, number: int) -> list[str]:
     cells = line.rstrip().split("\t") if "\t" in line.strip() else line.split()
     labels = [cell.strip() for cell in cells]
     if labels[0].lower() != "time":
-        raise FileError(
-            path, f"the first column is '{labels[0]}', expected 'time'; export the file again", number
-        )
+        raise FileError(path, f"the first column is '{labels[0]}', expected 'time'; export the file again", number)
     if "" in labels:
         raise FileError(path, f"column {labels.index('') + 1} has no label; export the file again", number)
     repeated = [label for label, times in Counter(labels).items() if times > 1]
@@ -130,8 +122,7 @@ def _check_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, col
             if not told.isdigit() or int(told) != found:
                 raise FileError(
                     path,
-                    f"the header announces {told} {what} but the file has {found}; export the file again or "
-                    "correct it",
+                    f"the header announces {told} {what} but the file has {found}; export the file again or correct it",
                     line,
                 )
     if not rows:

@@ -16,7 +16,7 @@ METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
-_TIME_TOLERANCE_FRAMES = 0.1
+_TIME_TOLERANCE_FRAMES = 0.25
 
 
 def read_trc(path: str | Path) -> Markers:
@@ -43,8 +43,7 @@ def read_trc_with_notes(path: str | Path) -> tuple[Markers, tuple[str, ...]]:
         raise FileError(
             path,
             f"the header announces {frames} frames but the file has {len(values)}; export the file again or "
-            "correct "
-            "NumFrames",
+            "correct NumFrames",
             3,
         )
     time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
@@ -83,9 +82,7 @@ def write_trc(path: str | Path, markers: Markers) -> None:
 
 def _header(path: Path, lines: list[str]) -> dict[str, str]:
     if not lines[0].lstrip().startswith("PathFileType"):
-        raise FileError(
-            path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1
-        )
+        raise FileError(path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1)
     if len(lines) < _FIRST_ROW_LINE:
         raise FileError(path, f"ends within its header after {len(lines)} lines; export it again", len(lines))
     names, values = lines[1].split(), lines[2].split()
@@ -101,9 +98,7 @@ def _number(path: Path, header: dict[str, str], key: str) -> float:
     try:
         return float(header[key])
     except ValueError:
-        raise FileError(
-            path, f"{key} is '{header[key]}', expected a number; export the file again", 3
-        ) from None
+        raise FileError(path, f"{key} is '{header[key]}', expected a number; export the file again", 3) from None
 
 
 def _count(path: Path, header: dict[str, str], key: str) -> int:
@@ -141,44 +136,23 @@ def _first_row(lines: list[str]) -> int:
 def _uniform_time(
     path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    if np.isnan(time).any():
-        raise FileError(
-            path, "the row has no time; expected it in column 2", line_numbers[int(np.argmax(np.isnan(time)))]
-        )
+    """Times on an exactly uniform grid; DataRate gives the step, or the time column where that fits better."""
+    _expect_even_steps(path, time, line_numbers)
     if len(time) == 1:
         return time, ()
-    late = np.flatnonzero(np.diff(time) <= 0)
-    if late.size:
-        row = int(late[0]) + 1
-        raise FileError(
-            path,
-            f"time {time[row]:g} s does not come after {time[row - 1]:g} s; expected time to grow",
-            line_numbers[row],
-        )
     step = (time[-1] - time[0]) / (len(time) - 1)
     if abs(rate_hz * step - 1) > 0.01:
-        raise FileError(
-            path,
-            f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz; correct the wrong "
-            "one",
-            3,
-        )
+        found = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
+        raise FileError(path, f"{found}; correct the wrong one", 3)
     frames = np.arange(len(time))
     uniform = time[0] + frames / rate_hz
+    if np.abs(time - uniform).max() > _TIME_TOLERANCE_FRAMES * step:
+        uniform = time[0] + frames * step
     error = np.abs(time - uniform)
     if error.max() > _TIME_TOLERANCE_FRAMES * step:
-        uniform = time[0] + frames * step
-        error = np.abs(time - uniform)
-    off = np.flatnonzero(error > _TIME_TOLERANCE_FRAMES * step)
-    if off.size:
-        row = int(off[0])
-        raise FileError(
-            path,
-            f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s; Kinertia "
-            "takes uniform "
-            "frames only, so export every frame (gaps as empty cells)",
-            line_numbers[row],
-        )
+        row = int(np.argmax(error))
+        found = f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s"
+        raise FileError(path, f"{found}; Kinertia needs a constant frame rate, export one", line_numbers[row])
     if error.max() <= 1e-9:
         return time, ()
     note = (
@@ -186,6 +160,20 @@ def _uniform_time(
         f"{1 / (uniform[1] - uniform[0]):.6g} Hz were taken instead"
     )
     return uniform, ((note,) if error.max() > 1e-6 else ())
+
+
+def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) -> None:
+    if np.isnan(time).any():
+        row = int(np.argmax(np.isnan(time)))
+        raise FileError(path, "the row has no time; expected it in column 2", line_numbers[row])
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    back = np.flatnonzero(steps <= 0)
+    odd = back if back.size else np.flatnonzero(np.abs(steps - usual) > 0.5 * usual)
+    if odd.size:
+        row = int(odd[0]) + 1
+        found = f"time goes from {time[row - 1]:g} s to {time[row]:g} s where its step is {usual:g} s"
+        raise FileError(path, f"{found}; expected every frame, export gaps as empty cells", line_numbers[row])
 
 
 def _positions(
@@ -198,8 +186,7 @@ def _positions(
         row, marker = partly[0]
         raise FileError(
             path,
-            f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair "
-            "the row",
+            f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair the row",
             line_numbers[row],
         )
     zero = (positions == 0).all(axis=2)
@@ -207,6 +194,4 @@ def _positions(
         return positions, ()
     positions[zero] = np.nan
     named = ", ".join(label for label, hit in zip(labels, zero.any(axis=0), strict=True) if hit)
-    return positions, (
-        f"{path.name}: {int(zero.sum())} marker positions 0 0 0 were taken as missing ({named})",
-    )
+    return positions, (f"{path.name}: {int(zero.sum())} marker positions 0 0 0 were taken as missing ({named})",)

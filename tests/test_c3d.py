@@ -1,0 +1,367 @@
+import numpy as np
+import pytest
+
+from c3d_writer import plate_parameters, write_c3d
+from kinertia.errors import FileError
+from kinertia.io.c3d import read_c3d
+
+GRAVITY = 9.80665
+CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)  # mm, type 2: z down
+SCREEN = {"POINT": {"Y_SCREEN": ["+Z"]}}
+
+
+def standing(n=20, labels=("RHEE", "RTOE", "RASI", "RFHD")):
+    """Points (n, m, 3) mm of somebody upright over the plate, Z up."""
+    height = np.linspace(30, 1700, len(labels))
+    points = np.column_stack(
+        (np.full(len(labels), 250.0) + 20 * np.arange(len(labels)), np.full(len(labels), 240.0), height)
+    )
+    return np.tile(points, (n, 1, 1)), list(labels)
+
+
+def stepping(n=20, per_frame=10, vertical=-600.0):
+    """Analogs (n * s, 6) N, N mm of a constant load at (300, 200) mm, in plate axes (-X, Y, down)."""
+    force = np.array([-30.0, 20.0, vertical])
+    point = np.array([-(300 - 250), 200 - 250, 20.0]) * [1, 1, -1]  # from the transducer 20 mm below the surface
+    return np.tile(np.concatenate((force, np.cross(point, force))), (n * per_frame, 1))
+
+
+def expect_centre_of_pressure(plates, x, z, force):
+    np.testing.assert_allclose(plates.force[:, 0], np.tile(force, (len(plates.time), 1)), atol=1e-4)
+    np.testing.assert_allclose(
+        plates.moment[:, 0], np.tile(np.cross((x, 0, z), force), (len(plates.time), 1)), atol=1e-3
+    )
+
+
+VARIETY = {
+    "bts.c3d": (675, 22, 6),
+    "duplicate_labels.c3d": (1050, 22, 0),
+    "ist.c3d": (134, 24, 2),
+    "motion_analysis_walk.c3d": (151, 37, 2),
+    "plates_kistler_type3.c3d": "has no points",
+    "plates_type1.c3d": (634, 22, 1),
+    "rotations_only.c3d": "has no points",
+    "subject_prefixed_labels.c3d": (333, 86, 2),
+}
+
+
+@pytest.mark.parametrize("name", VARIETY)
+def test_every_maker(shared_data, name):
+    expected = VARIETY[name]
+    path = shared_data / "c3d_variety" / name
+    if isinstance(expected, str):
+        with pytest.raises(FileError, match=expected):
+            read_c3d(path)
+        return
+    recording = read_c3d(path)
+    frames, count, plates = expected
+    assert recording.markers.positions.shape == (frames, count, 3)
+    assert (0 if recording.plates is None else len(recording.plates.names)) == plates
+    seen = recording.markers.positions[np.isfinite(recording.markers.positions).all(axis=2)]
+    assert 0.7 < np.percentile(seen[:, 1], 99) < 2.0, "Y is up and metres"
+
+
+def centres_of_pressure(plates, p, threshold_n=100.0):
+    """(k,) s, (k, 3) m, (k,) N m: time, centre of pressure in the plate's plane and free moment about the
+    vertical."""
+    loaded = plates.force[:, p, 1] > threshold_n
+    force, moment = plates.force[loaded, p], plates.moment[loaded, p]
+    height = plates.corners[p, :, 1].mean()
+    x = (moment[:, 2] + height * force[:, 0]) / force[:, 1]
+    z = (height * force[:, 2] - moment[:, 0]) / force[:, 1]
+    point = np.column_stack((x, np.full_like(x, height), z))
+    return plates.time[loaded], point, (moment - np.cross(point, force))[:, 1]
+
+
+WALKS = ["pig_c3d/subject_a_walk", "pig_c3d/subject_b_walk", "c3d_variety/ist", "c3d_variety/bts",
+         "c3d_variety/motion_analysis_walk", "c3d_variety/subject_prefixed_labels"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_centre_of_pressure_lies_within_the_corners(shared_data, name):
+    plates = read_c3d(shared_data / f"{name}.c3d").plates
+    for p in range(len(plates.names)):
+        _, point, free_moment = centres_of_pressure(plates, p)
+        low, high = plates.corners[p].min(axis=0), plates.corners[p].max(axis=0)
+        assert (point[:, [0, 2]] > low[[0, 2]] - 0.02).all()
+        assert (point[:, [0, 2]] < high[[0, 2]] + 0.02).all()
+        assert (np.abs(free_moment) < 20).all()
+        assert plates.force[:, p, 1].min() >= 0
+
+
+FEET = {"plate 1": "L", "plate 2": "R"}
+
+
+@pytest.mark.parametrize("subject", "ab")
+def test_centre_of_pressure_runs_under_the_stance_foot(shared_data, subject):
+    recording = read_c3d(shared_data / "pig_c3d" / f"subject_{subject}_walk.c3d")
+    for p, name in enumerate(recording.plates.names):
+        side = FEET[name] if subject == "a" else {"L": "R", "R": "L"}[FEET[name]]
+        time, point, _ = centres_of_pressure(recording.plates, p, 200.0)
+        heel, toe = recording.markers.select([f"{side}HEE", f"{side}TOE"]).positions.swapaxes(0, 1)
+        middle = np.column_stack(
+            [np.interp(time, recording.markers.time, (heel + toe)[:, axis] / 2) for axis in (0, 2)]
+        )
+        assert np.median(np.linalg.norm(point[:, [0, 2]] - middle, axis=1)) < 0.12
+
+
+@pytest.mark.parametrize("subject", "ab")
+def test_force_on_the_person_brakes_then_drives(shared_data, subject):
+    recording = read_c3d(shared_data / "pig_c3d" / f"subject_{subject}_walk.c3d")
+    pelvis = recording.markers.select(["LASI"]).positions[:, 0]
+    forward = pelvis[-1] - pelvis[0]
+    for p in range(2):
+        along = recording.plates.force[:, p] @ (forward / np.linalg.norm(forward))
+        when = np.flatnonzero(recording.plates.force[:, p, 1] > 100)
+        early, late = np.array_split(when, 2)
+        assert along[early].mean() < -10
+        assert along[late].mean() > 10
+
+
+@pytest.mark.parametrize(("subject", "mass_kg", "height_m"), [("a", 41.5, 1.61), ("b", 47.5, 1.505)])
+def test_static_trials_weigh_the_subject(shared_data, subject, mass_kg, height_m):
+    recording = read_c3d(shared_data / "pig_c3d" / f"subject_{subject}_static.c3d")
+    mean = recording.plates.force[:, :, 1].sum(axis=1).mean() / GRAVITY
+    assert mean == pytest.approx(mass_kg, rel=0.05)
+    assert recording.mass_kg == mass_kg
+    assert recording.height_m == pytest.approx(height_m)
+    assert 0.05 < recording.measurements["LKneeWidth"] < 0.15
+    assert all(0.01 < value < 1.2 for value in recording.measurements.values())
+
+
+def test_plug_in_gait_outputs_go_and_virtual_markers_stay(shared_data):
+    recording = read_c3d(shared_data / "pig_c3d" / "subject_a_walk.c3d")
+    labels = recording.markers.labels
+    assert {"RHEE", "LFEO", "CentreOfMass"} <= set(labels)
+    assert not [label for label in labels if label.endswith(("Angles", "Force", "Moment", "Power"))]
+    assert recording.markers.time[0] == pytest.approx(1.52)
+    assert recording.plates.time[0] == pytest.approx(1.52)
+    assert recording.plates.time[-1] == pytest.approx(5.159)
+
+
+def test_load_about_the_ground_origin(tmp_path):
+    points, labels = standing()
+    path = write_c3d(
+        tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    )
+    recording = read_c3d(path)
+    assert recording.notes == ("x.c3d: lab axes with +Z up were turned to Y up",)
+    np.testing.assert_allclose(recording.markers.positions[0, 0], [0.25, 0.03, -0.24], atol=1e-6)
+    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+    np.testing.assert_allclose(recording.plates.time[:3], [0, 0.001, 0.002])
+    np.testing.assert_allclose(recording.plates.corners[0, 0], [0, 0, -0.5], atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_units(tmp_path, unit):
+    size = {"m": 1000, "cm": 10, "mm": 1}[unit]
+    points, labels = standing()
+    analogs = stepping() / [1, 1, 1, size, size, size]
+    plate = plate_parameters(CORNERS / size, origin_z=-20 / size)
+    path = write_c3d(tmp_path / "x.c3d", points / size, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate}, unit=unit)
+    recording = read_c3d(path)
+    np.testing.assert_allclose(recording.markers.positions[0, 0], [0.25, 0.03, -0.24], atol=1e-6)
+    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+
+
+def test_calibrated_plate_of_type_4(tmp_path):
+    points, labels = standing()
+    plate = plate_parameters(CORNERS, kind=4)
+    plate["CAL_MATRIX"] = 2 * plate["CAL_MATRIX"]
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping() / 2, {**SCREEN, "FORCE_PLATFORM": plate})
+    expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
+
+
+def test_plate_of_type_1_tells_the_centre_of_pressure(tmp_path):
+    points, labels = standing()
+    analogs = np.tile([-30.0, 20, -600, -(300 - 250), 200 - 250, 4000], (200, 1))  # plate axes; free moment 4 N m down
+    plate = plate_parameters(CORNERS, kind=1)
+    path = write_c3d(tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate})
+    plates = read_c3d(path).plates
+    np.testing.assert_allclose(plates.force[0, 0], [30, 600, -20], atol=1e-4)
+    np.testing.assert_allclose(plates.moment[0, 0], np.cross((0.3, 0, -0.2), (30, 600, -20)) - (0, 4, 0), atol=1e-3)
+
+
+def test_load_on_the_plate_is_reversed(tmp_path):
+    points, labels = standing()
+    path = write_c3d(
+        tmp_path / "x.c3d", points, labels, -stepping(), {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    )
+    recording = read_c3d(path)
+    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+    assert "plate 1 tells a force that points down, the load on the plate; it was reversed" in recording.notes[-1]
+
+
+def test_unloaded_plate_is_zero(tmp_path):
+    points, labels = standing()
+    path = write_c3d(
+        tmp_path / "x.c3d",
+        points,
+        labels,
+        stepping(vertical=-15.0),
+        {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)},
+    )
+    recording = read_c3d(path)
+    assert not recording.plates.force.any()
+    assert not recording.plates.moment.any()
+    assert recording.notes[-2:] == (
+        "x.c3d: plate 1 reads (30, 15, -20) N when nobody stands on it; this was not subtracted",
+        "x.c3d: plate 1 never carries 20 N",
+    )
+
+
+def plates_left_out(tmp_path, plate, **arguments):
+    points, labels = standing()
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate}, **arguments)
+    recording = read_c3d(path)
+    assert recording.plates is None
+    return " ".join(recording.notes)
+
+
+def test_plates_that_cannot_be_used_are_left_out(tmp_path):
+    assert "force plates (types 5) were left out" in plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
+    assert "its corners are no plate" in plates_left_out(tmp_path, plate_parameters(1e8 * CORNERS))
+    assert "its corners are no plate" in plates_left_out(tmp_path, plate_parameters(0 * CORNERS))
+    words = plates_left_out(tmp_path, plate_parameters(CORNERS), moment_unit="Nm")
+    assert "plate 1 was left out, its moments are in Nm while points are in mm" in words
+
+
+def test_analog_without_a_number(tmp_path):
+    points, labels = standing()
+    analogs = stepping()
+    analogs[25, 2] = np.nan
+    path = write_c3d(
+        tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    )
+    with pytest.raises(FileError, match=r"plate 1 has no number at 0.025 s"):
+        read_c3d(path)
+
+
+def test_plate_somewhere_else_is_noted(tmp_path):
+    points, labels = standing()
+    analogs = stepping() * [1, 1, 1, 10, 10, 10]
+    path = write_c3d(
+        tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    )
+    assert "centre of pressure of plate 1 lies" in read_c3d(path).notes[-1]
+
+
+@pytest.mark.parametrize("told", ["+Z", "-Y", "+X", "-X", "+Y", "-Z"])
+def test_vertical_axis(tmp_path, told):
+    points, labels = standing()
+    up = np.zeros(3)
+    up["XYZ".index(told[1])] = -1 if told[0] == "-" else 1
+    side = np.roll(up, 1)
+    to_lab = np.column_stack((side, np.cross(up, side), up))  # columns: lab axes of our X, Y, Z
+    path = write_c3d(tmp_path / "x.c3d", points @ to_lab.T, labels, parameters={"POINT": {"Y_SCREEN": [told]}})
+    recording = read_c3d(path)
+    np.testing.assert_allclose(recording.markers.positions[0, :, 1], points[0, :, 2] / 1000, atol=1e-6)
+    assert not [note for note in recording.notes if "believed" in note]
+    blind = read_c3d(write_c3d(tmp_path / "y.c3d", points @ to_lab.T, labels))
+    np.testing.assert_allclose(blind.markers.positions, recording.markers.positions, atol=1e-6)
+    assert f"no vertical axis given (POINT:Y_SCREEN); {told} was found from the markers' extents" in blind.notes[0]
+    gaps = np.linalg.norm(np.diff(recording.markers.positions[0], axis=0), axis=1)
+    np.testing.assert_allclose(gaps, np.linalg.norm(np.diff(points[0], axis=0), axis=1) / 1000, atol=1e-6)
+
+
+def test_contradicted_vertical_axis_is_noted(tmp_path):
+    points, labels = standing()
+    parameters = {"POINT": {"Y_SCREEN": ["+Y"]}, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters))
+    assert "POINT:Y_SCREEN says +Y is up but the plates' forces say +Z; +Z was believed" in recording.notes[0]
+    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters={"POINT": {"Y_SCREEN": ["+Y"]}}))
+    assert "the markers' extents say +Z; +Z was believed" in recording.notes[0]
+
+
+def test_arms_spread_wider_than_tall_do_not_turn_the_lab(tmp_path):
+    points, labels = standing(labels=("RHEE", "RASI", "LFIN", "RFIN"))
+    points[:, 2], points[:, 3] = [-700, 240, 1300], [1100, 240, 1300]
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters=SCREEN))
+    assert recording.notes[0] == "x.c3d: lab axes with +Z up were turned to Y up"
+
+
+def test_labels(tmp_path):
+    points, _ = standing(labels=range(12))
+    points[:, 1] = np.nan
+    points[3, 2] = 0.0
+    labels = ["Ann:RHEE", "Ann:RTOE", "Ann:RTOE", "Ann:RASI", "Bob:RASI", "*3", "", "Ann:RKneeAngles", "Listed",
+              "Ann:RTOE", "LHipForce", "CentreOfMass"]  # fmt: skip
+    parameters = {"POINT": {"Y_SCREEN": ["+Z"], "SCALARS": ["Listed"]}}
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters=parameters))
+    assert recording.markers.labels == ("RHEE", "RTOE", "RASI", "Bob:RASI", "CentreOfMass")
+    toe = recording.markers.select(["RTOE"]).positions[:, 0]
+    assert np.isnan(toe[3]).all()
+    np.testing.assert_allclose(toe[0] * 1000, points[0, 2][[0, 2, 1]] * [1, 1, -1], atol=1e-3)
+    for words in (
+        "several subjects; 'Ann:' was taken off the labels, Bob keep theirs",
+        "3 model outputs among the points were left out (Ann:RKneeAngles, LHipForce, Listed)",
+        "2 unnamed points were left out",
+        "repeated labels, the first with data was kept: RTOE",
+        "1 marker positions 0 0 0 were taken as missing",
+    ):
+        assert [note for note in recording.notes if words in note]
+
+
+def test_more_than_255_labels(tmp_path):
+    points = np.tile(standing(n=2)[0], (1, 70, 1))
+    labels = [f"m{k}" for k in range(280)]
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters=SCREEN))
+    assert recording.markers.labels == tuple(labels)
+
+
+@pytest.mark.parametrize(("given", "height_m"), [(1610.0, 1.61), (161.0, 1.61), (1.61, 1.61)])
+def test_measurements(tmp_path, given, height_m):
+    points, labels = standing()
+    processing = {
+        "Bodymass": 70.0,
+        "Height": given,
+        "LKneeWidth": given / 16.1,
+        "LTibialTorsion": 0.3,
+        "RLegLength": 0.0,
+    }
+    parameters = {**SCREEN, "PROCESSING": {key: np.array([value]) for key, value in processing.items()}}
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters=parameters))
+    assert recording.mass_kg == 70.0
+    assert recording.height_m == pytest.approx(height_m)
+    assert recording.measurements == {"LKneeWidth": pytest.approx(0.1)}
+
+
+def test_time_of_a_cropped_trial(tmp_path):
+    points, labels = standing()
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), SCREEN, rate_hz=50.0, first_frame=101)
+    assert read_c3d(path).markers.time[0] == pytest.approx(2.0)
+
+
+def test_files_that_are_no_trial(tmp_path):
+    points, labels = standing()
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), SCREEN)
+    whole = path.read_bytes()
+    for content, words in (
+        (b"", "the file is empty"),
+        (b"PathFileType\t4\n" * 100, "not a C3D file"),
+        (whole[:100], "truncated: it has 100 of at least 512 bytes"),
+        (whole[:700], "truncated: it has 700 of at least 7104 bytes"),
+        (whole[:-1], "truncated: it has 7103 of at least 7104 bytes"),
+        (whole[:515] + b"\0" + whole[516:], "broken C3D file .*processor"),
+        (whole.replace(b"POINT", b"PAINT"), "has no points"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(FileError, match=words):
+            read_c3d(path)
+    with pytest.raises(FileError, match="no such file"):
+        read_c3d(tmp_path / "y.c3d")
+    with pytest.raises(FileError, match="POINT:UNITS is 'inch'"):
+        read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, unit="inch"))
+    with pytest.raises(FileError, match="no markers with data"):
+        read_c3d(write_c3d(tmp_path / "x.c3d", points, [f"{label}Angles" for label in labels]))
+    with pytest.raises(FileError, match="no markers with data"):
+        read_c3d(write_c3d(tmp_path / "x.c3d", points * np.nan, labels))
+
+
+def test_real_file_cut_anywhere(shared_data, tmp_path):
+    whole = (shared_data / "pig_c3d" / "subject_b_walk.c3d").read_bytes()
+    for size in (10, 600, 20_000, 200_000, len(whole) - 20_000):
+        (tmp_path / "x.c3d").write_bytes(whole[:size])
+        with pytest.raises(FileError, match="truncated"):
+            read_c3d(tmp_path / "x.c3d")

@@ -1,0 +1,146 @@
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from kinertia.errors import FileError
+from kinertia.io.sto import read_sto, write_sto
+
+HEADER = "walk\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\nendheader\n"
+TABLE = "time\ta\tb\n0\t1\t2\n0.5\t3\t4\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        path = tmp_path / "x.sto"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+REAL = {
+    "gait2354/opensim_results/ik.mot": (73, 23, True),
+    "gait2354/opensim_results/inverse_dynamics.sto": (73, 23, False),
+    "gait2354/subject01_walk1_grf.mot": (1501, 18, True),
+    "rajagopal_walk/grf_walk.mot": (4778, 18, False),
+    "subject4/addbiomechanics_walking1_ik.mot": (131, 33, False),
+    "subject4/squats1_grf.mot": (1346, 27, None),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_files_as_opensim_reads_them(shared_data, opensim, name):
+    rows, columns, in_degrees = REAL[name]
+    table = read_sto(shared_data / name)
+    assert table.shape == (rows, columns)
+    assert table.attrs["in_degrees"] is in_degrees
+    theirs = opensim.TimeSeriesTable(str(shared_data / name))
+    assert tuple(table.columns) == theirs.getColumnLabels()
+    np.testing.assert_array_equal(table.to_numpy(), theirs.getMatrix().to_numpy())
+    np.testing.assert_array_equal(table.index, theirs.getIndependentColumn())
+
+
+@pytest.mark.parametrize(
+    ("text", "in_degrees"),
+    [
+        (HEADER + TABLE, True),
+        (HEADER + "\n" + TABLE + "\n", True),
+        (HEADER.replace("walk\n", ""), True),
+        ("name walk\ndatacolumns 3\ndatarows 2\notherdata 1\nrange 0 0.5\nendheader\n", None),
+        ("nColumns=3\nnRows=2\nDataType=double\nversion=3\nOpenSimVersion=4.1\nendheader\n", None),
+        ("inDegrees=no\nendheader\n", False),
+        (HEADER.replace("endheader", "\nUnits are S.I. units (second, meters, ...)\n\nendheader"), True),
+        (HEADER.replace("\n", "\t\t\n"), True),
+        (HEADER.replace("nRows=2", "nRows = 2"), True),
+    ],
+)
+def test_header_variants(write, text, in_degrees):
+    table = read_sto(write(text if "time" in text else text + TABLE))
+    assert list(table.columns) == ["a", "b"]
+    assert table.index.name == "time"
+    np.testing.assert_array_equal(table.to_numpy(), [[1, 2], [3, 4]])
+    np.testing.assert_array_equal(table.index, [0, 0.5])
+    assert table.attrs["in_degrees"] is in_degrees
+
+
+@pytest.mark.parametrize(
+    "rows", [TABLE.replace("\n", "\t\t\n"), TABLE.replace("\t", "   "), TABLE.replace("time", "Time ")]
+)
+def test_row_variants(write, rows):
+    np.testing.assert_array_equal(read_sto(write(HEADER + rows)).to_numpy(), [[1, 2], [3, 4]])
+
+
+def test_empty_cell_is_nan(write):
+    table = read_sto(write(HEADER + TABLE.replace("\t1\t", "\t\t")))
+    np.testing.assert_array_equal(table.to_numpy(), [[np.nan, 2], [3, 4]])
+
+
+BROKEN = {
+    "rows": (HEADER.replace("nRows=2", "nRows=3") + TABLE, 3, "announces 3 rows but the file has 2"),
+    "columns": (HEADER.replace("nColumns=3", "nColumns=4") + TABLE, 4, "announces 4 columns but the file has 3"),
+    "short row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3"), 9, "2 values, expected 3"),
+    "long row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3\t4\t5"), 9, "4 values, expected 3"),
+    "not a number": (HEADER + TABLE.replace("3", "three"), 9, "'three' in column 2"),
+    "no time": (HEADER + TABLE.replace("0.5", ""), 9, "no time"),
+    "no time column": (HEADER + TABLE.replace("time", "frame"), 7, "first column is 'frame'"),
+    "repeated": (HEADER + TABLE.replace("a\tb", "a\ta"), 7, "repeated column labels a"),
+    "no label": (HEADER + TABLE.replace("a\tb", "\tb"), 7, "column 2 has no label"),
+    "no endheader": (TABLE, None, "no line 'endheader'"),
+    "nothing after": (HEADER, 6, "ends after 'endheader'"),
+    "no rows": (HEADER.replace("nRows=2", "").replace("nColumns=3", "") + "time\ta\n", None, "no rows"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files(write, case):
+    text, line, words = BROKEN[case]
+    with pytest.raises(FileError) as caught:
+        read_sto(write(text))
+    assert words in str(caught.value)
+    assert caught.value.line == line
+
+
+@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    values=hnp.arrays(
+        float,
+        st.tuples(st.integers(1, 6), st.integers(1, 4)),
+        elements=st.floats(allow_infinity=False, allow_nan=True),
+    ),
+    in_degrees=st.booleans(),
+)
+def test_round_trip(tmp_path, values, in_degrees):
+    time = pd.Index(np.arange(len(values)) / 3, name="time")
+    table = pd.DataFrame(values, index=time, columns=[f"column {k}/value" for k in range(values.shape[1])])
+    write_sto(tmp_path / "x.sto", table, in_degrees, "table")
+    back = read_sto(tmp_path / "x.sto")
+    pd.testing.assert_frame_equal(back, table, check_exact=True)
+    assert back.attrs["in_degrees"] is in_degrees
+    assert [path.name for path in tmp_path.iterdir()] == ["x.sto"]
+
+
+def test_opensim_reads_what_we_write(tmp_path, opensim):
+    values = np.random.default_rng(0).standard_normal((4, 2))
+    table = pd.DataFrame(values, index=pd.Index(np.arange(4) / 60, name="time"), columns=["a", "/b/value"])
+    for name in ("x.mot", "x.sto"):
+        path = str(tmp_path / name)
+        write_sto(path, table, in_degrees=True, name="motion")
+        theirs = opensim.TimeSeriesTable(path)
+        assert theirs.getColumnLabels() == ("a", "/b/value")
+        np.testing.assert_array_equal(theirs.getMatrix().to_numpy(), values)
+        assert theirs.getTableMetaDataString("inDegrees") == "yes"
+        storage = opensim.Storage(path)
+        assert storage.getSize() == 4
+        assert storage.isInDegrees()
+
+
+def test_failed_write_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    table = pd.DataFrame({"a": [1.0]}, index=[0.0])
+    with pytest.raises(OSError, match="disk full"):
+        write_sto(tmp_path / "x.sto", table, in_degrees=False, name="x")
+    assert not list(tmp_path.iterdir())
