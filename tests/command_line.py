@@ -1,4 +1,4 @@
-"""Runs the command line as a user does, and knows the command for each measured trial."""
+"""Runs the command line as a user does."""
 
 from __future__ import annotations
 
@@ -50,19 +50,3 @@ def fitted(folder: Path, *arguments: object) -> Fitted:
     outcome = run("fit", *arguments, "-o", folder)
     assert outcome.status == 0, outcome.err
     return Fitted(folder, json.loads((folder / "fit.json").read_text()), outcome)
-
-
-def measured_trial(data: Path, name: str) -> list[object]:
-    """The arguments of `kinertia fit` for one of the four measured walks."""
-    if name == "gait2354":
-        walk = data / "gait2354" / "subject01_walk1"
-        files = [f"{walk}.trc", "--forces", f"{walk}_grf.mot", "--loads", f"{walk}_grf.xml"]
-        person = ["--static", data / "gait2354" / "subject01_static.trc", "--mass", 72.6, "--height", 1.803]
-        return [*files, *person, "--sex", "male"]
-    if name == "rajagopal":
-        lab = data / "rajagopal_walk"
-        files = [lab / "motion_capture_walk.trc", "--forces", lab / "grf_walk.mot", "--loads", lab / "grf_walk.xml"]
-        return [*files, "--static", lab / "static_walk_1.trc", "--mass", 85, "--height", 1.83, "--sex", "male"]
-    walk, static = (data / "pig_c3d" / f"subject_{name[-1]}_{kind}.c3d" for kind in ("walk", "static"))
-    person = ["--mass", 41.5, "--height", 1.61, "--sex", "male"] if name == "pig_a" else ["--sex", "female"]
-    return [walk, "--static", static, *person]

@@ -1,8 +1,15 @@
 """Fixtures shared by the tests."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+
+from command_line import fitted
+from kinertia.config import Subject
+from kinertia.fit import TrialInput, estimate_bsp
+from kinertia.io.recording import read_recording
+from walks import fit_arguments
 
 
 @pytest.fixture(scope="session")
@@ -21,3 +28,28 @@ def opensim():
     module.Logger.removeFileSink()
     module.Logger.setLevelString("error")
     return module
+
+
+@pytest.fixture(scope="session")
+def fit_of(shared_data, tmp_path_factory):
+    """Results of `kinertia fit` for a measured walk, by its name in `walks.WALKS`; run once."""
+    done = {}
+
+    def get(name):
+        if name not in done:
+            folder = tmp_path_factory.mktemp(name) / "results" / "out"
+            done[name] = fitted(folder, *fit_arguments(shared_data, name))
+        return done[name]
+
+    return get
+
+
+@pytest.fixture(scope="session")
+def short_fit(shared_data):
+    """A `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
+    walk, static = (read_recording(shared_data / "pig_c3d" / f"subject_a_{kind}.c3d") for kind in ("walk", "static"))
+    inputs = [
+        TrialInput(replace(walk, name=name), window, 0.25)
+        for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
+    ]
+    return estimate_bsp(Subject(name="A", sex="male"), static, inputs)

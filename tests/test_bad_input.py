@@ -5,8 +5,8 @@ import shutil
 
 import numpy as np
 import pytest
-from command_line import run
 
+from command_line import run
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 
@@ -108,7 +108,7 @@ def test_missing_subject_file(lab):
 def test_empty_file(lab, name):
     (lab / name).write_bytes(b"")
     walk = "walk.c3d" if name.endswith(".c3d") else "walk.trc"
-    expect(refused(lab, walk), re.escape(f"{lab / name}: "), "empty", "export|give")
+    expect(refused(lab, walk), re.escape(str(lab / name)), "empty|no element", "export|give")
 
 
 @pytest.mark.parametrize("name", ["walk.trc", "walk.mot", "walk.xml", "static.trc", "walk.c3d", "static.c3d"])
@@ -193,17 +193,17 @@ def test_forces_without_overlap(lab):
 
 def test_not_a_number_in_forces(lab):
     spoil(lab / "walk.mot", edit_cell(107, 2, "nan"))
-    expect(refused(lab), r"walk\.mot", "ground_force_vy", r"0\.1\d", "NaN|not a number")
+    expect(refused(lab), r"walk\.mot", "ground_force_vy", r"0\.1\d", "no number", "fill")
 
 
 @pytest.mark.parametrize(
     ("changes", "parts"),
     [
-        ({"mass": "72600"}, ("mass_kg = 72600", "kg")),
+        ({"mass": "72600"}, ("mass_kg = 72600", "grams", "in kilograms")),
         ({"mass": "-72.6"}, ("mass_kg", "kg")),
         ({"mass": "nan"}, ("mass_kg = nan",)),
-        ({"height": "180.3"}, ("height_m = 180.3", r"\bm\b")),
-        ({"height": "1803"}, ("height_m = 1803", r"\bm\b")),
+        ({"height": "180.3"}, ("height_m = 180.3", "centimetres", "in metres")),
+        ({"height": "1803"}, ("height_m = 1803", "millimetres", "in metres")),
         ({"mass": None}, ("mass_kg", "--mass")),
         ({"height": None}, ("height_m", "--height")),
         ({"sex": "m"}, ("sex", "male", "female")),
@@ -230,18 +230,17 @@ def test_options_beside_a_subject_file(lab):
 
 def without(path, *labels):
     markers = read_trc(path)
+    assert set(labels) <= set(markers.labels)
     write_trc(path, markers.select([label for label in markers.labels if label not in labels]))
 
 
 @pytest.mark.parametrize(
     ("label", "joint"),
-    [("R.ASIS", "hip|pelvis"), ("L.Knee.Medial", "knee"), ("R.Ankle.Lateral", "ankle"), ("R.Elbow", "elbow")],
+    [("R.ASIS", "hip|pelvis"), ("L.Knee.Med", "knee"), ("R.Ankle.Lat", "ankle"), ("R.Elbow", "elbow")],
 )
 def test_static_trial_without_landmark(lab, label, joint):
-    labels = read_trc(lab / "static.trc").labels
-    (found,) = [one for one in labels if one.replace(".Lat", ".Lateral").startswith(label) or one == label] or [label]
-    without(lab / "static.trc", found)
-    expect(refused(lab, markers="cleveland-clinic"), re.escape(found), joint)
+    without(lab / "static.trc", label)
+    expect(refused(lab, markers="cleveland-clinic"), re.escape(label), joint)
 
 
 def test_static_trial_of_another_marker_set(lab):

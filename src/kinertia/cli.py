@@ -43,7 +43,7 @@ _STAGES = ("literature", "corrected", "estimate")
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
     try:
-        app(args=arguments)
+        app(args=arguments, prog_name="kinertia")
     except KinertiaError as error:
         _fail(str(error))
     except OSError as error:
@@ -251,7 +251,7 @@ def _bsp_table(fit: Fit) -> Table:
 
 def _table(*headings: str) -> Table:
     """First two columns to the left if the second has no heading, the numbers to the right."""
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(box=box.SIMPLE_HEAD, padding=0)
     for k, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if k == 0 or not heading else "right")
+        table.add_column(heading, justify="left" if k == 0 or not heading else "right", overflow="fold")
     return table

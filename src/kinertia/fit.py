@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
+from threadpoolctl import threadpool_limits
 
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
@@ -17,9 +18,10 @@ from kinertia.checks import check_visible, complete_subject, fit_warnings, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
-from kinertia.errors import TrialError
+from kinertia.errors import MarkerSetError, TrialError
 from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
-from kinertia.kinematics import Kinematics, check_labels, facing, solve_kinematics
+from kinertia.kinematics import Kinematics, facing, solve_kinematics
+from kinertia.labels import check_labels
 from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording, Trial
@@ -167,7 +169,19 @@ def estimate_bsp(
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
-    settings = settings or Settings()
+    # the matrices are small: BLAS threads cost twice what they give, and ten times on a busy machine
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _estimate(subject, static, inputs, settings or Settings(), marker_set, progress)
+
+
+def _estimate(
+    subject: Subject,
+    static: Recording,
+    inputs: Sequence[TrialInput],
+    settings: Settings,
+    marker_set: MarkerSet | None,
+    progress: Progress,
+) -> Fit:
     recordings = [item.recording for item in inputs]
     subject, warnings = complete_subject(subject, [static, *recordings])
     if marker_set is None:
@@ -225,7 +239,10 @@ def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
                 recording.name, f"no marker of the {'right' if side == 'r' else 'left'} foot is in the file"
             )
     trial = build_trial(recording, feet, item.window_s)
-    rotation, angle = facing(trial.markers, marker_set)
+    try:
+        rotation, angle = facing(trial.markers, marker_set)
+    except MarkerSetError as error:
+        raise TrialError(trial.name, str(error)) from error
     if angle == 0.0:
         return trial, 0.0
     note = f"{trial.name}: turned by {angle:g} degrees about the vertical so that the person faces +X"

@@ -90,7 +90,7 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
         if not all(np.isfinite(part).all() for part in (joint.rotation, joint.translation, directions)):
             raise MarkerSetError(
                 f"the static trial gives no frame for the {joint.child}: landmarks of it or of the {joint.parent} "
-                f"coincide or lie in line; check the labels in the marker set '{marks.marker_set.name}' and the static trial"
+                f"coincide or lie in line; check the static trial and the marker set '{marks.marker_set.name}'"
             )
     skeleton = Skeleton("gait27", tuple(joints), _markers(marks, frames), locked)
     return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))

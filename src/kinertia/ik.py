@@ -59,13 +59,16 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(np.square(values))))
 
 
-def solve_ik(skeleton: Skeleton, markers: Markers, name: str = "markers") -> InverseKinematics:
+def solve_ik(
+    skeleton: Skeleton, markers: Markers, name: str = "markers", consecutive: bool = True
+) -> InverseKinematics:
     """All coordinates at every frame, by least squares on all visible markers.
 
     Args:
         skeleton: the model; its markers and those of the trial are matched by label.
         markers: measured markers.
         name: the trial's, for messages.
+        consecutive: neighbouring frames show nearly the same pose, so that one may start from the other.
 
     Raises:
         MarkerSetError: fewer than three root markers of the skeleton are in the trial.
@@ -82,10 +85,11 @@ def solve_ik(skeleton: Skeleton, markers: Markers, name: str = "markers") -> Inv
             "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
         )
     fine = np.flatnonzero(placed)
-    coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
-    q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse])
-    q_coarse[:, model.rotational] = np.unwrap(q_coarse[:, model.rotational], axis=0)
-    q[fine] = PchipInterpolator(coarse, q_coarse)(fine) if len(coarse) > 1 else q_coarse
+    if consecutive and len(fine) > 1:
+        coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
+        q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse])
+        q_coarse[:, model.rotational] = np.unwrap(q_coarse[:, model.rotational], axis=0)
+        q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
     q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine])
     errors = np.full(measured.shape[:2], np.nan)
@@ -93,14 +97,15 @@ def solve_ik(skeleton: Skeleton, markers: Markers, name: str = "markers") -> Inv
     errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
-    return InverseKinematics(markers.time, model.coordinates, _unwrap(q, model), model.labels, errors, converged)
+    if consecutive:
+        _unwrap(q, model)
+    return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
 
 
-def _unwrap(q: np.ndarray, model: Skeleton) -> np.ndarray:
+def _unwrap(q: np.ndarray, model: Skeleton) -> None:
     for c in np.flatnonzero(model.rotational):
         seen = np.isfinite(q[:, c])
         q[seen, c] = np.unwrap(q[seen, c])
-    return q
 
 
 def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,6 @@
 """Writes a `Fit` to a folder: `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
 
-Everything is written beside the folder first and moved into it when complete, so a run never leaves half a result.
+Everything is written to a hidden folder first and moved when complete, so a run never leaves half a result.
 """
 
 from __future__ import annotations
@@ -31,12 +31,16 @@ def check_folder(folder: str | Path) -> None:
 
     Worth calling before a long computation.
     """
-    folder = Path(folder).absolute()
-    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    existing = _existing(Path(folder))
     if not existing.is_dir():
         raise FileError(existing, "is a file; give a folder for the results")
     if not os.access(existing, os.W_OK):
         raise FileError(existing, "cannot be written to; give another folder for the results")
+
+
+def _existing(folder: Path) -> Path:
+    """The folder itself, or the nearest one above it that exists."""
+    return next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
 
 
 def save_fit(fit: Fit, folder: str | Path) -> Path:
@@ -49,8 +53,7 @@ def save_fit(fit: Fit, folder: str | Path) -> Path:
     """
     folder = Path(folder)
     check_folder(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    work = Path(tempfile.mkdtemp(dir=_existing(folder), prefix=".kinertia."))
     try:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
@@ -59,10 +62,8 @@ def save_fit(fit: Fit, folder: str | Path) -> Path:
             into.mkdir(exist_ok=True)
             _write_trial(fit, trial, into)
         for path in sorted(work.rglob("*")):
-            target = folder / path.relative_to(work)
-            if path.is_dir():
-                target.mkdir(parents=True, exist_ok=True)
-            else:
+            if path.is_file():
+                target = folder / path.relative_to(work)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 os.replace(path, target)
     finally:

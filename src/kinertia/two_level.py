@@ -5,19 +5,20 @@ by the trapezoid rule, with the two constants per coordinate that track the meas
 closed form).
 Outer level: bounded nonlinear least squares on the residual P at the corrected motion, over all frames of all trials.
 
-Deviations from the study: no finite differences (the derivative is chained through (2), the integration and the fit),
+Deviations from the study: CoM coordinates are bounded to 1 m (a mass near zero would send its CoM anywhere); no finite differences (the derivative is chained through (2), the integration and the fit),
 and moments are divided by the body's radius of gyration about the pelvis, so that N and N m add up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from kinertia.bsp import BodySegmentParameters, ParameterVector
 from kinertia.dynamics import (
@@ -31,7 +32,11 @@ from kinertia.skeleton import Skeleton
 
 MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""
-_MAX_EVALUATIONS = 200
+_FREE_EVALUATIONS, _MAX_EVALUATIONS = 200, 400
+_SMALLEST_POSITIVE, _FARTHEST_COM_M = 1e-9, 1.0
+"""Bounds: masses and moments stay positive (kg, kg m2), each CoM coordinate within 1 m of the segment's origin."""
+_SMALLEST_SCALE = 0.005
+"""Trust region: each parameter in units of its start value, but not below this (kg, m, kg m2)."""
 
 
 @dataclass(frozen=True)
@@ -148,25 +153,54 @@ def estimate_two_level(
     length = _radius_of_gyration(skeleton, start, windows)
     problem = _Problem(skeleton, vector, windows, correct, length)
     theta = vector.values(start)
-    bounds = (vector.lower_bounds + 1e-9, np.full(len(theta), np.inf))
     begin = 0.5 * float(np.square(problem.residuals(theta)).sum())
-    fit = least_squares(
-        problem.residuals,
-        np.maximum(theta, bounds[0] + 1e-6),
-        jac=problem.jacobian,
-        bounds=bounds,
-        x_scale="jac",
-        method="trf",
-        xtol=1e-12,
-        ftol=1e-7,
-        gtol=1e-12,
-        max_nfev=_MAX_EVALUATIONS,
-        callback=lambda intermediate_result: progress(intermediate_result.nfev / _MAX_EVALUATIONS),
-    )
+    positive = vector.lower_bounds == 0.0
+    bounds = (np.where(positive, _SMALLEST_POSITIVE, -_FARTHEST_COM_M), np.where(positive, np.inf, _FARTHEST_COM_M))
+    fit = _minimise(problem, theta, bounds, progress)
     bsp = vector.bsp(fit.x)
     motions = tuple(problem.motion(bsp, window) for window in windows)
     loads = tuple(residual(skeleton, bsp, m, w.wrench) for m, w in zip(motions, windows, strict=True))
     return TwoLevelResult(bsp, motions, loads, (begin, float(fit.cost)), int(fit.nfev), fit.status > 0)
+
+
+def _minimise(
+    problem: _Problem, theta: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], progress: Callable[[float], None]
+) -> OptimizeResult:
+    """Least squares within bounds.
+
+    Without bounds first: Levenberg-Marquardt crosses them on its way, and where the data are good it ends inside. Only if
+    it does not, the trust region method keeps to them from the start on; it may end on a bound short of the minimum.
+    """
+    scale = np.maximum(np.abs(theta), _SMALLEST_SCALE)
+    free = None
+    with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
+        free = least_squares(
+            problem.residuals,
+            theta,
+            problem.jacobian,
+            method="lm",
+            x_scale=scale,
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+            max_nfev=_FREE_EVALUATIONS,
+        )
+    if free is not None and free.status > 0 and np.all((free.x > bounds[0]) & (free.x < bounds[1])):
+        return free
+    bounded = least_squares(
+        problem.residuals,
+        np.clip(theta, *bounds),
+        problem.jacobian,
+        bounds=bounds,
+        x_scale=scale,
+        xtol=1e-15,
+        ftol=1e-6,
+        gtol=1e-15,
+        max_nfev=_MAX_EVALUATIONS,
+        callback=lambda intermediate_result: progress(intermediate_result.nfev / _MAX_EVALUATIONS),
+    )
+    bounded.nfev += _FREE_EVALUATIONS if free is None else free.nfev
+    return bounded
 
 
 def _radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:

@@ -1,0 +1,250 @@
+"""Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length: writes docs/speed.md.
+
+    python benchmarks/stages.py
+
+OpenSim's InverseKinematicsTool solves the same markers in the same run, with the set-up file and scaled model that come
+with the data; its GCVSplineSet smooths the same coordinates. Both sides are the best of a few runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import opensim
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from kinertia.anthropometry import literature_bsp
+from kinertia.config import Subject
+from kinertia.contacts import build_trial
+from kinertia.dynamics import Motion, inverse_dynamics
+from kinertia.fit import calibrate
+from kinertia.ik import solve_ik
+from kinertia.io.recording import read_recording
+from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.trc import read_trc, write_trc
+from kinertia.marker_set import choose_marker_set
+from kinertia.splines import smooth
+from kinertia.trial import Markers
+from kinertia.two_level import Window, estimate_two_level, stretches
+from measured_trials import table
+from walks import WALKS, data_folder, fit_arguments
+
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "speed.md"
+SETUPS = {
+    "gait2354": ("gait2354/subject01_Setup_IK.xml", "gait2354/subject01_scaled.osim"),
+    "rajagopal": ("rajagopal_walk/ik_setup_walk.xml", "rajagopal_walk/scaled.osim"),
+}
+WINDOW_S = {"gait2354": (0.0, 2.5), "rajagopal": (0.5, 1.9)}
+"""Stretches in which all ground contact is measured: they can be repeated back and forth."""
+EVALUATIONS = 10
+STAGES = ("read", "calibration", "inverse kinematics", "smoothing", "two-level evaluation", "inverse dynamics")
+
+
+@dataclass(frozen=True)
+class Walk:
+    """One walk as files, and what the command line would be told about the person."""
+
+    markers: Path
+    forces: Path
+    loads: Path
+    static: Path
+    mass_kg: float
+    subject: Subject
+
+
+def walk(name: str) -> Walk:
+    """The measured walk."""
+    markers, *options = fit_arguments(data_folder(), name)
+    given = dict(zip(options[::2], options[1::2], strict=True))
+    subject = Subject(name=name, sex="male", mass_kg=float(given["--mass"]), height_m=float(given["--height"]))
+    files = (Path(given[f"--{kind}"]) for kind in ("forces", "loads", "static"))
+    return Walk(Path(markers), *files, float(given["--mass"]), subject)
+
+
+def there_and_back(values: np.ndarray, times: int) -> np.ndarray:
+    """`times` copies along the first axis, every second one backwards, so that nothing jumps."""
+    parts = [values if k % 2 == 0 else values[::-1] for k in range(times)]
+    return np.concatenate([part if k == 0 else part[1:] for k, part in enumerate(parts)])
+
+
+def lengthened(one: Walk, window_s: tuple[float, float], times: int, folder: Path) -> Walk:
+    """The walk's window repeated back and forth, as files."""
+    folder.mkdir(exist_ok=True)
+    markers = read_trc(one.markers).cut(*window_s)
+    positions = there_and_back(markers.positions, times)
+    clock = markers.time[0] + np.arange(len(positions)) / markers.rate_hz
+    write_trc(folder / "walk.trc", Markers(clock, markers.labels, positions))
+    table = read_sto(one.forces)
+    table = table[(table.index >= window_s[0]) & (table.index <= window_s[1])]
+    forces = there_and_back(table.to_numpy(), times)
+    step = (table.index[-1] - table.index[0]) / (len(table) - 1)
+    index = pd.Index(table.index[0] + np.arange(len(forces)) * step, name="time")
+    write_sto(folder / "walk.mot", pd.DataFrame(forces, index, table.columns), False, "walk")
+    return Walk(folder / "walk.trc", folder / "walk.mot", one.loads, one.static, one.mass_kg, one.subject)
+
+
+def best(runs: int, work: Callable[[], Any]) -> tuple[float, Any]:
+    """Shortest time (s) of a few runs, and what the work returned."""
+    times = []
+    for _ in range(runs):
+        started = time.perf_counter()
+        result = work()
+        times.append(time.perf_counter() - started)
+    return min(times), result
+
+
+def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
+    """Seconds per stage, and the number of frames."""
+    seconds = {}
+    seconds["read"], recording = best(runs, lambda: read_recording(one.markers, one.forces, one.loads))
+    static = read_recording(one.static)
+    marker_set = choose_marker_set(static.markers.labels)
+    there = set(recording.markers.labels)
+    feet = {side: [m for m in labels if m in there] for side, labels in marker_set.foot_labels().items()}
+    span = (float(recording.markers.time[0]), float(recording.markers.time[-1]))
+    trial = build_trial(recording, feet, span)
+    seconds["calibration"], (model, skeleton, *_) = best(
+        min(runs, 2), lambda: calibrate(static, [trial], marker_set, one.subject, "bell")
+    )
+    seconds["inverse kinematics"], ik = best(runs, lambda: solve_ik(skeleton, trial.markers))
+    seconds["smoothing"], spline = best(runs, lambda: smooth(ik.time, ik.q, "gcv"))
+    motion = Motion(*(spline(ik.time, order) for order in range(3)))
+    columns = np.concatenate([trial.loads.force, trial.loads.moment], axis=-1).reshape(-1, 12)
+    loads = smooth(trial.loads.time, columns, 10.0)(ik.time).reshape(-1, 2, 6)
+    bsp = literature_bsp(one.mass_kg, one.subject.height_m or 0.0, one.subject.sex, model.geometry, "dumas")
+    parts = stretches(Window(ik.time, motion, loads.sum(axis=1)))
+    with mock.patch("kinertia.two_level._MAX_EVALUATIONS", EVALUATIONS):
+        spent, result = best(min(runs, 2), lambda: estimate_two_level(skeleton, bsp, parts))
+    seconds["two-level evaluation"] = spent / result.evaluations
+    seconds["inverse dynamics"], _ = best(runs, lambda: inverse_dynamics(skeleton, bsp, motion, loads))
+    return seconds, len(ik.time)
+
+
+def opensim_ik(name: str, runs: int, frames: int | None = None) -> float:
+    """Seconds per frame of OpenSim's InverseKinematicsTool on the walk's own markers."""
+    setup, model = (str(data_folder() / file) for file in SETUPS[name])
+    markers = walk(name).markers
+    clock = read_trc(markers).time[:frames]
+
+    def solve(folder: str) -> float:
+        loaded = opensim.Model(model)
+        loaded.initSystem()
+        tool = opensim.InverseKinematicsTool(setup, False)
+        tool.setModel(loaded)
+        tool.setMarkerDataFileName(str(markers))
+        tool.setStartTime(float(clock[0]))
+        tool.setEndTime(float(clock[-1]))
+        tool.setOutputMotionFileName(str(Path(folder) / "ik.mot"))
+        tool.setResultsDir(folder)
+        before = os.getcwd()
+        os.chdir(folder)
+        try:
+            started = time.perf_counter()
+            tool.run()
+            return time.perf_counter() - started
+        finally:
+            os.chdir(before)
+
+    with tempfile.TemporaryDirectory() as folder:
+        return min(solve(folder) for _ in range(runs)) / len(clock)
+
+
+def our_ik(name: str, runs: int) -> float:
+    """Seconds per frame of `solve_ik` on the same markers, all frames."""
+    one = walk(name)
+    recording, static = read_recording(one.markers, one.forces, one.loads), read_recording(one.static)
+    marker_set = choose_marker_set(static.markers.labels)
+    there = set(recording.markers.labels)
+    feet = {side: [m for m in labels if m in there] for side, labels in marker_set.foot_labels().items()}
+    _, skeleton, *_ = calibrate(static, [build_trial(recording, feet)], marker_set, one.subject, "bell")
+    spent, ik = best(runs, lambda: solve_ik(skeleton, read_trc(one.markers)))
+    return spent / len(ik.time)
+
+
+def gcv_splines(frames: int, columns: int, runs: int) -> tuple[float, float]:
+    """Seconds of `smooth` and of OpenSim's GCVSplineSet to choose the smoothing of the same noisy sinusoids."""
+    rng = np.random.default_rng(0)
+    clock = np.arange(frames) / 100
+    values = np.sin(2 * np.pi * 1.5 * clock)[:, None] + 0.01 * rng.standard_normal((frames, columns))
+    table = opensim.TimeSeriesTable()
+    table.setColumnLabels([f"q{k}" for k in range(columns)])
+    for moment, row in zip(clock, values, strict=True):
+        table.appendRow(float(moment), opensim.RowVector([float(value) for value in row]))
+
+    def theirs() -> None:
+        splines = opensim.GCVSplineSet(table, [f"q{k}" for k in range(columns)], 5, -1.0)
+        for k in range(columns):
+            splines.get(k).calcValue(opensim.Vector(1, 0.01))
+
+    return best(runs, lambda: smooth(clock, values, "gcv"))[0], best(runs, theirs)[0]
+
+
+def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[str] = tuple(SETUPS)) -> str:
+    """The text of docs/speed.md, measured now."""
+    opensim.Logger.removeFileSink()
+    opensim.Logger.setLevelString("error")
+    peers, scaling = [], []
+    with threadpool_limits(limits=1, user_api="blas"), tempfile.TemporaryDirectory() as folder:
+        for name in names:
+            mine, theirs = our_ik(name, runs), opensim_ik(name, min(runs, 2))
+            peers.append([f"inverse kinematics, {WALKS[name]}", _ms(mine), _ms(theirs), f"{theirs / mine:.0f}"])
+            measured = [
+                ours(lengthened(walk(name), WINDOW_S[name], k, Path(folder) / f"{name}{k}"), runs) for k in lengths
+            ]
+            for stage in STAGES:
+                per_frame = [seconds[stage] / frames for seconds, frames in measured]
+                growth = f"{per_frame[-1] / per_frame[0]:.2f}"
+                scaling.append([f"{stage}, {WALKS[name]}", *map(_ms, per_frame), growth])
+        for frames in (200 * k for k in lengths):
+            mine, theirs = (spent / frames for spent in gcv_splines(frames, 27, runs))
+            title = f"quintic GCV splines, 27 columns of {frames} samples"
+            peers.append([title, _ms(mine), _ms(theirs), f"{theirs / mine:.1f}"])
+    return f"""# Speed
+
+Milliseconds per frame, one thread each, both programs in the same run on the same machine: only the ratios travel to
+another. This page is written by `python benchmarks/stages.py`; do not edit it by hand.
+
+## Next to OpenSim {opensim.GetVersion().split("-")[0]}
+
+Inverse kinematics: the same marker file, all frames, reading it included. OpenSim runs its `InverseKinematicsTool` with
+the set-up file and scaled model that come with the data (and also writes the motion); Kinertia its 27-DOF model.
+Splines: the choice of the smoothing by cross-validation, `smooth` against `GCVSplineSet`.
+
+{table(["task", "Kinertia (ms)", "OpenSim (ms)", "OpenSim / Kinertia"], peers)}
+
+## Cost is linear in the length of the trial
+
+The same walk once, {" and ".join(f"{k} times" for k in lengths[1:])}, every second time backwards so that nothing
+jumps. Linear cost means the same milliseconds per frame in every column; the last column is the longest's divided by
+the shortest's. Calibration looks at a few frames per second of trial, 60 at most. A two-level
+evaluation is the residual and its derivative with respect to 49 parameters, and the step that follows.
+
+{table(["stage", *(f"{k}x (ms)" for k in lengths), f"{lengths[-1]}x / {lengths[0]}x"], scaling)}
+"""
+
+
+def _ms(seconds: float) -> str:
+    return f"{seconds * 1e3:.3f}"
+
+
+def main() -> None:
+    """Measure and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser.add_argument("--runs", type=int, default=5, help="the best of so many runs counts")
+    text = document(parser.parse_args().runs)
+    DOCUMENT.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

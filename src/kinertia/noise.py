@@ -1,0 +1,94 @@
+"""Measurement errors for synthetic trials: skin motion, cameras, force plates. Every function takes its own generator.
+
+Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that moves with the neighbouring joints
+(`soft_tissue_artefact`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset (`plate_noise`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.skeleton import Skeleton
+from kinertia.trial import Markers, PlateLoads
+
+STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S = 0.01, 25.0
+
+ARTEFACT_RANGE_M = {"thigh": (0.010, 0.018), "shank": (0.007, 0.017)}
+"""Peak-to-peak displacement over a step, m, by segment; other segments: `OTHER_ARTEFACT_RANGE_M`."""
+OTHER_ARTEFACT_RANGE_M = (0.004, 0.009)
+
+
+def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
+    """The study's noise (DESIGN section 5): A sin(w t + phi) on every marker coordinate.
+
+    Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm RMS, below
+    4 Hz: no low-pass filter removes it (Chèze et al. 1995).
+    """
+    shape = markers.positions.shape[1:]
+    amplitude = rng.uniform(0.0, STUDY_AMPLITUDE_M, shape)
+    rate = rng.uniform(0.0, STUDY_RATE_RAD_S, shape)
+    phase = rng.uniform(0.0, 2 * np.pi, shape)
+    time = (markers.time - markers.time[0])[:, None, None]
+    return replace(markers, positions=markers.positions + amplitude * np.sin(rate * time + phase))
+
+
+def soft_tissue_artefact(markers: Markers, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator) -> Markers:
+    """Skin motion that goes with the joints: each segment's markers move together, linearly in its joints' angles.
+
+    The displacement, constant in the segment's frame but for the angles of the joints at its two ends, has a random direction
+    per joint angle and a peak-to-peak size drawn from `ARTEFACT_RANGE_M` (10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm
+    elsewhere, per step). Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes from the review of
+    Peters et al. (2010).
+
+    Args:
+        markers: of a trial of this skeleton.
+        skeleton: tells which marker is on which segment.
+        q: (n, c) true coordinates at the frames of `markers`.
+        rng: the random generator.
+    """
+    pose = skeleton.pose(q)
+    positions = markers.positions.copy()
+    for s, segment in enumerate(skeleton.segments):
+        labels = [marker.label for marker in skeleton.markers if marker.segment == segment]
+        columns = [markers.labels.index(label) for label in labels if label in markers.labels]
+        if not columns:
+            continue
+        angles = q[:, _neighbouring(skeleton, segment)]
+        local = (angles - angles.mean(axis=0)) @ rng.standard_normal((angles.shape[1], 3))
+        low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
+        extent = np.linalg.norm(np.ptp(local, axis=0))
+        local = local * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
+        positions[:, columns] += (pose.rotation[:, s] @ local[..., None])[:, None, :, 0]
+    return replace(markers, positions=positions)
+
+
+def _neighbouring(skeleton: Skeleton, segment: str) -> list[int]:
+    """Columns of the angles of the joints at both ends of a segment; a massless one in between belongs to the joint."""
+    names = set()
+    for joint in skeleton.joints:
+        if joint.child == segment or joint.parent == segment:
+            names |= {axis.coordinate for axis in joint.axes if axis.kind == "rotation"}
+    chosen = [i for i, name in enumerate(skeleton.coordinates) if name in names and not name.startswith("pelvis")]
+    return chosen
+
+
+def camera_noise(markers: Markers, sd_m: float, rng: np.random.Generator) -> Markers:
+    """White noise of this deviation (m) on every marker coordinate and frame."""
+    return replace(markers, positions=markers.positions + rng.normal(0.0, sd_m, markers.positions.shape))
+
+
+def plate_noise(
+    plates: PlateLoads, force_sd_n: float, offset_sd_n: float, moment_sd_nm: float, rng: np.random.Generator
+) -> PlateLoads:
+    """White noise on forces (N) and moments (N m), and a constant force offset (N) per plate, on loaded samples.
+
+    Unloaded samples stay zero, as laboratories and the readers here set them below the load threshold.
+    """
+    shape = plates.force.shape
+    loaded = plates.force[..., 1:2] > 0
+    offset = rng.normal(0.0, offset_sd_n, (1, *shape[1:]))
+    force = plates.force + np.where(loaded, rng.normal(0.0, force_sd_n, shape) + offset, 0.0)
+    moment = plates.moment + np.where(loaded, rng.normal(0.0, moment_sd_nm, shape), 0.0)
+    return replace(plates, force=force, moment=moment)
