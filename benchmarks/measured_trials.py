@@ -142,9 +142,9 @@ def _worth(runs: dict[str, dict[str, Any]]) -> str:
         f"{shifts[worst][0]} in the {WALKS[worst]}, {_length(shifts[worst][1])} off.",
         "This is what the study behind the method found. With perfect synthetic measurements the same estimator finds "
         "every parameter; with skin-motion noise of 4 mm RMS it was wrong by 18 cm RMS in the centres of mass, and "
-        "correcting the pelvis rescued only part of it. Small residuals alone prove nothing: six pelvis coordinates and "
-        "dozens of free parameters absorb six residuals. Use the estimate to reproduce or compare the method; for joint "
-        "loads of this person use `inverse_dynamics_literature.sto`.",
+        "correcting the pelvis rescued only part of it. Small residuals alone prove nothing: six pelvis coordinates "
+        "and dozens of free parameters absorb six residuals. Use the estimate to reproduce or compare the method; for "
+        "joint loads of this person use `inverse_dynamics_literature.sto`.",
     ]
     return "\n\n".join(textwrap.fill(paragraph, 120) for paragraph in paragraphs)
 

@@ -224,10 +224,10 @@ Splines: the choice of the smoothing by cross-validation, `smooth` against `GCVS
 
 ## Cost is linear in the length of the trial
 
-The same walk once, {" and ".join(f"{k} times" for k in lengths[1:])}, every second time backwards so that nothing
-jumps. Linear cost means the same milliseconds per frame in every column; the last column is the longest's divided by
-the shortest's. Calibration looks at a few frames per second of trial, 60 at most. A two-level
-evaluation is the residual and its derivative with respect to 49 parameters, and the step that follows.
+The same walk {" and ".join(f"{k}x" for k in lengths)}, every second time backwards so that nothing jumps. Linear cost
+means the same milliseconds per frame in every column, or fewer where a fixed part weighs on the short trial; the last
+column is the longest's divided by the shortest's. Calibration looks at ten frames per second of trial, 60 at most. A
+two-level evaluation is the residual, its derivative with respect to 49 parameters, and the step that follows.
 
 {table(["stage", *(f"{k}x (ms)" for k in lengths), f"{lengths[-1]}x / {lengths[0]}x"], scaling)}
 """

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.bsp import BodySegmentParameters
 from kinertia.skeleton import GRAVITY_M_S2, Axis, Joint, Skeleton
 
+osim.Logger.removeFileSink()
 osim.Logger.setLevelString("Off")
 
 

@@ -7,7 +7,7 @@ from opensim_model import Oracle
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
 from kinertia.calibration import marker_jacobian
-from kinertia.dynamics import root_regressor
+from kinertia.dynamics import Motion, root_regressor
 from kinertia.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.skeleton import Axis, Joint, Marker, Skeleton, _moved_parameters
 
@@ -96,8 +96,6 @@ def test_locked_coordinates_carry_their_inertia_and_regressor(model, bsp, values
         tau = pin.rnea(small, d_small, q[k], qd[k], qdd[k])
         expected = pin.rnea(large, d_large, *(part[k] for part in full))[common]
         np.testing.assert_allclose(tau, expected, atol=1e-9)
-    from kinertia.dynamics import Motion
-
     here = root_regressor(locked, bsp.segments, Motion(q, qd, qdd))
     there = root_regressor(free, bsp.segments, Motion(*full))
     np.testing.assert_allclose(here, there, atol=1e-9)

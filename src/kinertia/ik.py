@@ -23,7 +23,7 @@ from kinertia.trial import Markers
 _WARM_START_EVERY = 10
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-5
-"""Rad or m; the step below it is still taken and leaves an error some twenty times smaller."""
+"""Rad or m; the step below it is still taken and leaves an error several times smaller."""
 _UNINFORMED_RAD_PER_M = 60.0
 """A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
 

@@ -104,7 +104,9 @@ def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 def pelvis_frame(marks: Landmarks) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Rotation, origin (mid ASIS), width (ASIS to ASIS) and depth (mid ASIS to mid PSIS) of the pelvis, m."""
-    back = ("sacrum",) if "psis_r" not in marks and "sacrum" in marks else ("psis_r", "psis_l")
+    named = marks.marker_set.landmarks
+    sacrum = "psis_r" not in marks and ("sacrum" in marks or ("sacrum" in named and "psis_r" not in named))
+    back = ("sacrum",) if sacrum else ("psis_r", "psis_l")
     marks.require("pelvis", "asis_r", "asis_l", *back)
     behind = np.mean([marks[name] for name in back], axis=0)
     origin = (marks["asis_r"] + marks["asis_l"]) / 2

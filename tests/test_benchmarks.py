@@ -1,0 +1,54 @@
+"""The benchmarks in their smallest form: that they run and fill their pages. No time is judged here."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import measured_trials
+
+
+def test_there_and_back_does_not_jump():
+    stages = pytest.importorskip("stages")
+    np.testing.assert_array_equal(stages.there_and_back(np.array([1, 2, 3]), 3), [1, 2, 3, 2, 1, 2, 3])
+
+
+def test_worst_com_shift():
+    bsp = pd.DataFrame(
+        {
+            "segment": ["a"] * 3 + ["b"] * 3,
+            "parameter": ["mass", "com_x", "com_z"] * 2,
+            "literature": [1.0, 0.0, 0.1, 2.0, 0.0, 0.0],
+            "estimate": [9.0, 0.3, 0.5, 2.0, 0.4, 0.0],
+        }
+    )
+    assert measured_trials.worst_com_shift(bsp) == ("a", pytest.approx(0.5))
+
+
+def test_page_of_measured_trials(fit_of):
+    runs = {
+        name: {**fit_of(name).summary, "bsp": pd.read_csv(fit_of(name).folder / "bsp.csv")}
+        for name in ("gait2354", "pig_a")
+    }
+    page = measured_trials.document(runs)
+    for name, run in runs.items():
+        trial = run["trials"][0]
+        residual = trial["residual_force_rms_N"]["estimate"], trial["residual_force_max_N"]["estimate"]
+        title = measured_trials.WALKS[name]
+        assert re.search(rf"\| {title}, force \(N\) .*\| {residual[0]:.1f} \({residual[1]:.1f}\) \|", page)
+        assert re.search(rf"\| {title} \| {trial['n_frames']} \| {trial['n_dynamic_frames']} \|", page)
+        for warning in run["warnings"]:
+            assert warning in page
+
+
+def test_page_of_speed(shared_data, tmp_path, monkeypatch):
+    stages = pytest.importorskip("stages")
+    monkeypatch.setattr(stages, "WINDOW_S", {"gait2354": (0.0, 0.6)})
+    page = stages.document(runs=1, lengths=(1, 2), names=("gait2354",))
+    for stage in stages.STAGES:
+        (once, twice, growth) = re.search(
+            rf"\| {stage}, gait2354 walk \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|", page
+        ).groups()
+        assert min(float(once), float(twice), float(growth)) >= 0
+    assert re.search(r"\| inverse kinematics, gait2354 walk \| [\d.]+ \| [\d.]+ \| \d+ \|", page)
