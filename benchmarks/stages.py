@@ -32,7 +32,7 @@ from kinertia.ik import solve_ik
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
-from kinertia.marker_set import choose_marker_set
+from kinertia.marker_set import MarkerSet, choose_marker_set
 from kinertia.splines import smooth
 from kinertia.trial import Markers
 from kinertia.two_level import Window, estimate_two_level, stretches
@@ -109,8 +109,7 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     seconds["read"], recording = best(runs, lambda: read_recording(one.markers, one.forces, one.loads))
     static = read_recording(one.static)
     marker_set = choose_marker_set(static.markers.labels)
-    there = set(recording.markers.labels)
-    feet = {side: [m for m in labels if m in there] for side, labels in marker_set.foot_labels().items()}
+    feet = foot_labels(marker_set, recording.markers)
     span = (float(recording.markers.time[0]), float(recording.markers.time[-1]))
     trial = build_trial(recording, feet, span)
     seconds["calibration"], (model, skeleton, *_) = best(
@@ -130,15 +129,16 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     return seconds, len(ik.time)
 
 
-def opensim_ik(name: str, runs: int, frames: int | None = None) -> float:
-    """Seconds per frame of OpenSim's InverseKinematicsTool on the walk's own markers."""
+def opensim_ik(name: str) -> float:
+    """Seconds that OpenSim's InverseKinematicsTool takes for all frames of the walk."""
     setup, model = (str(data_folder() / file) for file in SETUPS[name])
     markers = walk(name).markers
-    clock = read_trc(markers).time[:frames]
+    clock = read_trc(markers).time
 
-    def solve(folder: str) -> float:
-        loaded = opensim.Model(model)
-        loaded.initSystem()
+    loaded = opensim.Model(model)
+    loaded.initSystem()
+    before = os.getcwd()
+    with tempfile.TemporaryDirectory() as folder:
         tool = opensim.InverseKinematicsTool(setup, False)
         tool.setModel(loaded)
         tool.setMarkerDataFileName(str(markers))
@@ -146,29 +146,31 @@ def opensim_ik(name: str, runs: int, frames: int | None = None) -> float:
         tool.setEndTime(float(clock[-1]))
         tool.setOutputMotionFileName(str(Path(folder) / "ik.mot"))
         tool.setResultsDir(folder)
-        before = os.getcwd()
         os.chdir(folder)
         try:
-            started = time.perf_counter()
-            tool.run()
-            return time.perf_counter() - started
+            return best(1, tool.run)[0]
         finally:
             os.chdir(before)
 
-    with tempfile.TemporaryDirectory() as folder:
-        return min(solve(folder) for _ in range(runs)) / len(clock)
+
+def foot_labels(marker_set: MarkerSet, markers: Markers) -> dict[str, list[str]]:
+    """Per side, the foot's markers that the trial has."""
+    return {side: [m for m in labels if m in markers.labels] for side, labels in marker_set.foot_labels().items()}
 
 
-def our_ik(name: str, runs: int) -> float:
-    """Seconds per frame of `solve_ik` on the same markers, all frames."""
+def both_ik(name: str, runs: int) -> tuple[float, float]:
+    """Seconds per frame of `solve_ik` and of OpenSim, by turns, so that both meet the same load of the machine."""
     one = walk(name)
     recording, static = read_recording(one.markers, one.forces, one.loads), read_recording(one.static)
     marker_set = choose_marker_set(static.markers.labels)
-    there = set(recording.markers.labels)
-    feet = {side: [m for m in labels if m in there] for side, labels in marker_set.foot_labels().items()}
+    feet = foot_labels(marker_set, recording.markers)
     _, skeleton, *_ = calibrate(static, [build_trial(recording, feet)], marker_set, one.subject, "bell")
-    spent, ik = best(runs, lambda: solve_ik(skeleton, read_trc(one.markers)))
-    return spent / len(ik.time)
+    mine, theirs = [], []
+    for _ in range(runs):
+        theirs.append(opensim_ik(name))
+        mine.append(best(5, lambda: solve_ik(skeleton, read_trc(one.markers)))[0])
+    frames = len(recording.markers.time)
+    return min(mine) / frames, min(theirs) / frames
 
 
 def gcv_splines(frames: int, columns: int, runs: int) -> tuple[float, float]:
@@ -196,7 +198,7 @@ def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[
     peers, scaling = [], []
     with threadpool_limits(limits=1, user_api="blas"), tempfile.TemporaryDirectory() as folder:
         for name in names:
-            mine, theirs = our_ik(name, runs), opensim_ik(name, min(runs, 2))
+            mine, theirs = both_ik(name, runs)
             peers.append([f"inverse kinematics, {WALKS[name]}", _ms(mine), _ms(theirs), f"{theirs / mine:.0f}"])
             measured = [
                 ours(lengthened(walk(name), WINDOW_S[name], k, Path(folder) / f"{name}{k}"), runs) for k in lengths

@@ -1,8 +1,9 @@
 """Makes the package's synthetic walk: `src/kinertia/data/standing.csv` and `walk.csv`, from the measured gait2354 walk.
 
 The walk is a truncated Fourier series of every coordinate, fitted to the inverse kinematics of two treadmill strides of
-OpenSim's gait2354 example, with the belt's speed added to the forward translation. The standing person is the model of the same
-subject, adapted to the walk, put into a standing pose.
+OpenSim's gait2354 example; then, as in the study, the pelvis is modified until the motion asks for the measured ground
+reactions (as a series of the same harmonics), so that the centre of pressure stays under the feet. The belt's speed is added to
+the forward translation. The standing person is the model of the same subject, adapted to the walk, in a standing pose.
 
     python benchmarks/synthetic_walk_table.py ../shared/data
 """
@@ -18,22 +19,28 @@ from scipy.optimize import minimize_scalar
 
 from kinertia.config import Subject
 from kinertia.contacts import build_trial
+from kinertia.dynamics import Motion, residual, root_derivatives
 from kinertia.fit import calibrate
 from kinertia.io.recording import read_recording
-from kinertia.kinematics import solve_kinematics
+from kinertia.kinematics import Kinematics, solve_kinematics
 from kinertia.marker_set import read_marker_set
-from kinertia.trial import Trial, runs
+from kinertia.skeleton import Skeleton
+from kinertia.synthetic import walking_subject
+from kinertia.trial import Recording, Trial, runs
 
 HARMONICS = 8
 STANDING = {"elbow_flex_r": 1.2, "elbow_flex_l": 1.2, "arm_add_r": -0.25, "arm_add_l": -0.25}
+PELVIS_SD_M, PELVIS_SD_RAD = 0.01, 0.02
+FORCE_SD_N, MOMENT_SD_NM = 3.0, 1.0
 DATA = Path(__file__).parents[1] / "src" / "kinertia" / "data"
 
 
-def basis(time: np.ndarray, period_s: float) -> np.ndarray:
-    """(n, 1 + 2 h): constant, then cosine and sine of every harmonic."""
-    angle = 2 * np.pi * np.outer(time / period_s, np.arange(1, HARMONICS + 1))
-    pairs = np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(time), -1)
-    return np.column_stack([np.ones(len(time)), pairs])
+def basis(time: np.ndarray, period_s: float, order: int = 0) -> np.ndarray:
+    """(n, 1 + 2 h): constant, then cosine and sine of every harmonic; or their derivatives of this order by time."""
+    rate = 2 * np.pi / period_s * np.arange(1, HARMONICS + 1)
+    angle = np.outer(time, rate) + order * np.pi / 2
+    pairs = (np.stack([np.cos(angle), np.sin(angle)], axis=-1) * rate[:, None] ** order).reshape(len(time), -1)
+    return np.column_stack([np.full(len(time), 1.0 if order == 0 else 0.0), pairs])
 
 
 def main(shared: Path) -> None:
@@ -47,6 +54,12 @@ def main(shared: Path) -> None:
     subject = Subject(name="walker", sex="male", mass_kg=72.6, height_m=1.803)
     skeleton = calibrate(static, [trial], marker_set, subject, "bell")[1]
     kinematics = solve_kinematics(skeleton, trial, 0.0, 8.0)
+    write_standing(skeleton, static)
+    write_walk(kinematics, trial)
+
+
+def write_walk(kinematics: Kinematics, trial: Trial) -> None:
+    """The Fourier series of the coordinates, with what the head of the file says."""
     time, q = kinematics.time, kinematics.motion.q
 
     def misfit(period_s: float) -> float:
@@ -55,24 +68,61 @@ def main(shared: Path) -> None:
     period_s = float(minimize_scalar(misfit, bounds=(1.0, 1.5), method="bounded").x)
     coefficients = np.linalg.lstsq(basis(time, period_s), q)[0]
     rms = np.sqrt(np.mean(np.square(q - basis(time, period_s) @ coefficients), axis=0))
+    wrench = np.linalg.lstsq(basis(time, period_s), kinematics.foot_loads.sum(axis=1))[0]
+    coefficients, moved = balanced(coefficients, wrench, period_s)
     contacts = _contacts(trial.loads.time, trial.loads.force[:, :, 1], period_s)
-    speed = _belt_speed(trial)
     header = [
         "# Joint coordinates of a walk (rad, m) as Fourier series over one stride. Value at time t: mean, plus for every h",
         "# cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t / period); pelvis_tx moves on at the walking speed.",
         "# Fitted by benchmarks/synthetic_walk_table.py to two treadmill strides of OpenSim's gait2354 example",
         f"# (opensim-models, Pipelines/Gait2354_Simbody, subject01_walk1); RMS misfit {np.degrees(rms[3:]).mean():.2f} deg, "
-        f"{rms[:3].max() * 1e3:.1f} mm.",
+        f"{rms[:3].max() * 1e3:.1f} mm; then the pelvis",
+        f"# moved by RMS {moved[:3].max() * 1e3:.1f} mm, {np.degrees(moved[3:]).max():.2f} deg, so that it asks for the "
+        "measured ground reactions.",
         f"# period_s = {period_s:.4f}",
-        f"# speed_m_s = {speed:.3f}",
+        f"# speed_m_s = {_belt_speed(trial):.3f}",
         "# contact_r = {:.3f}, {:.3f}".format(*contacts[0]),
         "# contact_l = {:.3f}, {:.3f}".format(*contacts[1]),
     ]
     columns = ["mean"] + [f"{kind}_{h}" for h in range(1, HARMONICS + 1) for kind in ("cos", "sin")]
-    table = pd.DataFrame(coefficients.T, index=pd.Index(skeleton.coordinates, name="coordinate"), columns=columns)
+    table = pd.DataFrame(coefficients.T, index=pd.Index(kinematics.ik.coordinates, name="coordinate"), columns=columns)
     table.loc["pelvis_tx", "mean"] = table.loc["pelvis_tz", "mean"] = 0.0
     _write(DATA / "walk.csv", header, table, "%.7f")
+    print("\n".join(header))
 
+
+def balanced(coefficients: np.ndarray, wrench: np.ndarray, period_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients whose pelvis balances the ground reactions, and (6,) how far it moved from the first ones (RMS; m, rad).
+
+    Gauss-Newton on the root residual over one stride and on the change of the pelvis, each by its standard deviation.
+    """
+    subject = walking_subject()
+    time = np.arange(128) * period_s / 128
+    orders = [basis(time, period_s, order) for order in range(3)]
+    load = orders[0] @ wrench
+    start = coefficients.copy()
+    current = coefficients.copy()
+    pelvis = np.repeat([PELVIS_SD_M, PELVIS_SD_RAD], 3)
+    residual_sd = np.repeat([FORCE_SD_N, MOMENT_SD_NM], 3)
+    for _ in range(15):
+        motion = Motion(*(order @ current for order in orders))
+        left = residual(subject.skeleton, subject.bsp, motion, load) / residual_sd
+        by = root_derivatives(subject.skeleton, subject.bsp, motion, load)
+        jacobian = sum(
+            np.einsum("nij,nk->nikj", part, order) for part, order in zip((by.q, by.qd, by.qdd), orders, strict=True)
+        )
+        jacobian = (jacobian / residual_sd[:, None, None]).reshape(-1, 6 * len(current))
+        kept = np.einsum("nk,ij->nikj", orders[0], np.diag(1 / pelvis)).reshape(-1, 6 * len(current))
+        change = orders[0] @ (current - start)[:, :6] / pelvis
+        step = np.linalg.lstsq(np.vstack([jacobian, kept]), -np.concatenate([left.ravel(), change.ravel()]))[0]
+        current[:, :6] += step.reshape(-1, 6)
+    rms = np.sqrt(np.mean(np.square(left * residual_sd), axis=0))
+    print("residual left, RMS (N, N m):", rms.round(2))
+    return current, np.sqrt(np.mean(np.square(orders[0] @ (current - start)[:, :6]), axis=0))
+
+
+def write_standing(skeleton: Skeleton, static: Recording) -> None:
+    """The markers of the model in a standing pose."""
     stand = np.zeros(len(skeleton.coordinates))
     for name, value in STANDING.items():
         stand[skeleton.coordinates.index(name)] = value
@@ -86,7 +136,6 @@ def main(shared: Path) -> None:
     ]
     table = pd.DataFrame(positions, index=pd.Index(skeleton.labels, name="label"), columns=["x", "y", "z"])
     _write(DATA / "standing.csv", header, table, "%.5f")
-    print("\n".join(header), f"period {period_s:.4f} s, speed {speed:.3f} m/s, contacts {contacts}")
 
 
 def _contacts(time: np.ndarray, vertical: np.ndarray, period_s: float) -> list[tuple[float, float]]:

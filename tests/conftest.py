@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
@@ -10,6 +11,8 @@ from kinertia.config import Subject
 from kinertia.fit import TrialInput, estimate_bsp
 from kinertia.io.recording import read_recording
 from walks import fit_arguments
+
+FEW_EVALUATIONS = 30
 
 
 @pytest.fixture(scope="session")
@@ -44,6 +47,12 @@ def fit_of(shared_data, tmp_path_factory):
     return get
 
 
+@pytest.fixture
+def few_evaluations(monkeypatch):
+    """Stops the estimate early: enough for tests of everything around it."""
+    monkeypatch.setattr("kinertia.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS)
+
+
 @pytest.fixture(scope="session")
 def short_fit(shared_data):
     """A `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
@@ -52,4 +61,5 @@ def short_fit(shared_data):
         TrialInput(replace(walk, name=name), window, 0.25)
         for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
     ]
-    return estimate_bsp(Subject(name="A", sex="male"), static, inputs)
+    with mock.patch("kinertia.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
+        return estimate_bsp(Subject(name="A", sex="male"), static, inputs)

@@ -79,8 +79,7 @@ def smooth_motion(skeleton, n: int = 60, rate_hz: float = 60.0, seed: int = 0) -
     size[:, :3] *= 0.2
     angle = omega * time[:, None, None] + phase
     q, qd, qdd = (
-        (size * part).sum(axis=1)
-        for part in (np.sin(angle), omega * np.cos(angle), -(omega**2) * np.sin(angle))
+        (size * part).sum(axis=1) for part in (np.sin(angle), omega * np.cos(angle), -(omega**2) * np.sin(angle))
     )
     q[:, 1] += 1.0
     return time, Motion(q, qd, qdd)

@@ -10,10 +10,10 @@ from importlib.metadata import version
 
 import pytest
 from rich.console import Console
-from walks import fit_arguments
 
 from command_line import fitted, run
 from kinertia import cli
+from walks import fit_arguments
 
 
 def test_version_and_help():
@@ -77,6 +77,7 @@ def person(tmp_path, shared_data):
     return folder
 
 
+@pytest.mark.usefixtures("few_evaluations")
 def test_init_then_fill_in_then_fit(person):
     """The drafted file says what is missing; with that filled in and a shorter window it runs as it is."""
     drafted = run("init", person)
@@ -112,6 +113,7 @@ def test_init_without_recordings(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("few_evaluations")
 def test_one_walk_as_two_trials(tmp_path, shared_data):
     walk, _, forces, _, loads, _, static, *_ = fit_arguments(shared_data, "gait2354")
     trial = f'[[trial]]\nmarkers = "{walk}"\nforces = "{forces}"\nloads = "{loads}"\n'

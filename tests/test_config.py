@@ -162,6 +162,8 @@ CASES = [
     ('"plug-in-gait"', '"plugin"', 8, "'cleveland-clinic', 'plug-in-gait', 'rajagopal'"),
     ('name = "second"', 'name = "walk1"', 18, "trial 'walk1' is there already"),
     ('name = "second"', 'name = ""', 18, "must be a name that a folder can have"),
+    ('name = "second"', 'name = "../second"', 18, "must be a name that a folder can have"),
+    ('"data/walk2.c3d"', '"data"', 17, "data is a folder; give a file"),
     ('sex = "female"', "sex = female", 2, "put text in quotes"),
     ("height_m = 1.68", "height_m = 1.68\nheight_m = 1.7", 5, "not valid TOML"),
     ('"data/walk1.mot"', '"C:\\walk1.mot"', 12, "write paths with /"),

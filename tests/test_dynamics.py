@@ -1,9 +1,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from generic_static import balancing_wrench, generic_model, smooth_motion
-from opensim_model import Oracle
 
+from generic_static import balancing_wrench, generic_model, smooth_motion
 from kinertia.anthropometry import literature_bsp
 from kinertia.dynamics import (
     Motion,
@@ -15,6 +14,7 @@ from kinertia.dynamics import (
     root_regressor,
 )
 from kinertia.skeleton import GRAVITY_M_S2
+from opensim_model import Oracle
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from generic_static import generic_model, generic_static, recording, standing_positions
 from scipy.spatial.transform import Rotation
 
+from generic_static import generic_model, generic_static, recording, standing_positions
 from kinertia.errors import MarkerSetError
 from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, build_gait27
 from kinertia.ik import solve_ik

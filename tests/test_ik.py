@@ -1,16 +1,16 @@
 import numpy as np
 import opensim as osim
 import pytest
-from generic_static import generic_model, random_coordinates, smooth_motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from opensim_model import build_opensim
 
+from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.anthropometry import literature_bsp
 from kinertia.calibration import marker_jacobian
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.ik import _STEP_TOLERANCE, _ancestor_of, _normal_equations, solve_ik
 from kinertia.trial import Markers
+from opensim_model import build_opensim
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,9 @@ def test_a_missing_marker_changes_little_and_is_not_counted(skeleton):
     ik = solve_ik(skeleton, without(markers, ["R.Knee.Lat", "V.Sacral"], slice(10, 20)))
     # the pelvis shows two markers only: its coordinates are unknown, and so are all others there
     assert np.isnan(ik.q[10:20]).all()
-    np.testing.assert_allclose(np.delete(ik.q, np.s_[10:20], axis=0), np.delete(motion.q, np.s_[10:20], axis=0), atol=1e-6)
+    np.testing.assert_allclose(
+        np.delete(ik.q, np.s_[10:20], axis=0), np.delete(motion.q, np.s_[10:20], axis=0), atol=1e-6
+    )
     ik = solve_ik(skeleton, without(markers, ["R.Knee.Lat"], slice(10, 20)))
     np.testing.assert_allclose(ik.q, motion.q, atol=1e-6)
     assert np.isnan(ik.errors_m[10:20, ik.labels.index("R.Knee.Lat")]).all()

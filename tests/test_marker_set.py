@@ -78,7 +78,7 @@ def test_a_users_own_set(tmp_path):
         (("asis_r", "asis_rr"), r"unknown \[landmarks\] entry 'asis_rr'; did you mean asis_r", 4),
         (("pelvis =", "hips ="), r"unknown \[segments\] entry 'hips'", 7),
         (('"RA", "LA", "LB"]', '"RA", "LA"]'), "at least three markers", None),
-        (('"RA"\nasis_l', '3\nasis_l'), r"must be a label or a list of labels, not 3", 4),
+        (('"RA"\nasis_l', "3\nasis_l"), r"must be a label or a list of labels, not 3", 4),
         (("[landmarks]", "[landmark]"), "unknown entry 'landmark'", 3),
         (('name = "mine"', "name = mine"), "not valid TOML", None),
         (('asis_r = "RA"\n', ""), r"\[landmarks\] must name asis_r", None),

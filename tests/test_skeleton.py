@@ -1,15 +1,15 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from generic_static import generic_model, random_coordinates, smooth_motion
-from opensim_model import Oracle
 
+from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
 from kinertia.calibration import marker_jacobian
 from kinertia.dynamics import Motion, root_regressor
 from kinertia.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.skeleton import Axis, Joint, Marker, Skeleton, _moved_parameters
+from opensim_model import Oracle
 
 
 @pytest.fixture(scope="module")

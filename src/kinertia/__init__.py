@@ -1,5 +1,32 @@
-"""Body segment parameters from gait: motion-capture markers and ground reaction forces in, BSPs out."""
+"""Body segment parameters from gait: motion-capture markers and ground reaction forces in, BSPs out.
+
+What a notebook needs first; every step of `estimate_bsp` is a function of its own module.
+"""
 
 from importlib.metadata import version
 
 __version__ = version("kinertia")
+
+# `kinertia.results` writes the version, so it must be there before the imports
+from kinertia.bsp import BodySegmentParameters
+from kinertia.config import Settings, Subject, read_subject
+from kinertia.errors import KinertiaError
+from kinertia.fit import Fit, TrialFit, TrialInput, estimate_bsp
+from kinertia.io.recording import read_recording
+from kinertia.marker_set import read_marker_set
+from kinertia.results import save_fit
+
+__all__ = [
+    "BodySegmentParameters",
+    "Fit",
+    "KinertiaError",
+    "Settings",
+    "Subject",
+    "TrialFit",
+    "TrialInput",
+    "estimate_bsp",
+    "read_marker_set",
+    "read_recording",
+    "read_subject",
+    "save_fit",
+]

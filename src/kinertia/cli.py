@@ -1,29 +1,24 @@
-"""The command line: `kinertia fit`, `kinertia init`."""
+"""The command line: `kinertia fit`, `kinertia init`; `kinertia.cli_study` has the others."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from kinertia import __version__
+from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
-from kinertia.fit import Fit, TrialInput, estimate_bsp
-from kinertia.io.recording import read_recording
-from kinertia.marker_set import read_marker_set
+from kinertia.fit import Fit, estimate_bsp
+from kinertia.inputs import read_inputs
 from kinertia.results import check_folder, save_fit, summary
 from kinertia.subject_draft import init_subject
+from kinertia.terminal import err, out, plain_table, shown_progress
 
 app = typer.Typer(
     name="kinertia",
@@ -34,9 +29,8 @@ app = typer.Typer(
     help="Body segment parameters from gait: markers and ground reaction forces in; masses, centres of mass and "
     "inertias of all segments out.",
 )
-# names of files and trials may contain what rich takes for markup
-_out = Console(markup=False, emoji=False, highlight=False)
-_err = Console(markup=False, emoji=False, highlight=False, stderr=True)
+app.command()(demo)
+app.add_typer(study, name="study")
 _STAGES = ("literature", "corrected", "estimate")
 
 
@@ -51,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _fail(message: str) -> NoReturn:
-    _err.print(
+    err.print(
         Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default"),
         soft_wrap=True,
     )
@@ -60,7 +54,7 @@ def _fail(message: str) -> NoReturn:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        _out.print(__version__)
+        out.print(__version__)
         raise typer.Exit
 
 
@@ -143,7 +137,7 @@ def init(
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
     text = init_subject(folder)
     path.write_text(text, encoding="utf-8")
-    _out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
+    out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
 
 
 def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
@@ -170,74 +164,45 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
 
 
 def _run(wanted: SubjectFile) -> Fit:
-    with _progress() as progress:
-        started = time.perf_counter()
-        progress("reading", 0.0)
-        static = read_recording(wanted.model.static)
-        inputs = []
-        for k, files in enumerate(wanted.trials):
-            progress("reading", k / len(wanted.trials))
-            recording = read_recording(files.markers, files.forces, files.loads)
-            seconds = time.perf_counter() - started
-            inputs.append(TrialInput(replace(recording, name=files.name), files.window_s, seconds))
-            started = time.perf_counter()
-        marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
+    with shown_progress() as progress:
+        static, inputs, marker_set = read_inputs(wanted, progress)
         return estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on a terminal, a line per stage elsewhere."""
-    if not _err.is_terminal:
-        seen: list[str] = []
-
-        def line(stage: str, share: float) -> None:
-            if stage not in seen:
-                seen.append(stage)
-                _err.print(stage)
-
-        yield line
-        return
-    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=_err, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda stage, share: bar.update(task, description=stage, completed=share)
 
 
 def _report(fit: Fit, folder: Path) -> None:
     told = summary(fit)
     subject, mass = told["subject"], told["total_mass_kg"]
-    _out.print(
+    out.print(
         f"\n{subject['name']}: {subject['mass_kg']:g} kg, {subject['height_m']:g} m, {subject['sex']}; "
         f"method {told['method']}; {fit.notes[0]}"
     )
     for trial in told["trials"]:
         _report_trial(trial)
-    _out.print(_bsp_table(fit))
-    _out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
+    out.print(_bsp_table(fit))
+    out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
-        _out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
-    _out.print(f"results in {folder}")
+        out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
+    out.print(f"results in {folder}")
 
 
 def _report_trial(trial: dict[str, Any]) -> None:
     first, last = trial["window_s"]
     markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
-    _out.print(
+    out.print(
         f"\n{trial['name']}: {first:.3f} to {last:.3f} s used, {trial['n_dynamic_frames']} of "
         f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
         f"{markers['final']} (estimate)"
     )
-    table = _table("residual at the pelvis, RMS (max)", *_STAGES)
+    table = plain_table("residual at the pelvis, RMS (max)", *_STAGES)
     for kind, unit in (("force", "N"), ("moment", "Nm")):
         rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
         table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
-    _out.print(table)
+    out.print(table)
 
 
 def _bsp_table(fit: Fit) -> Table:
     """Two rows per segment; where left mirrors right, the right side stands for both."""
-    table = _table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
+    table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
     for i, segment in enumerate(fit.literature.segments):
         if fit.settings.symmetry and segment.endswith("_l"):
             continue
@@ -246,12 +211,4 @@ def _bsp_table(fit: Fit) -> Table:
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
             table.add_row(segment, source, f"{bsp.mass_kg[i]:.2f}", *com, *inertia)
             segment = ""
-    return table
-
-
-def _table(*headings: str) -> Table:
-    """First two columns to the left if the second has no heading, the numbers to the right."""
-    table = Table(box=box.SIMPLE_HEAD, padding=0)
-    for k, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if k == 0 or not heading else "right", overflow="fold")
     return table

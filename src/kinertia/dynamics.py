@@ -48,7 +48,7 @@ class RootDerivatives:
     qdd: np.ndarray
 
 
-def _root_axes(q: np.ndarray) -> np.ndarray:
+def root_axes(q: np.ndarray) -> np.ndarray:
     """(n, 3, 3): columns are the axes of tilt (z), list (x) and rotation (y) in ground; omega = A * angle rates."""
     tilt, lst = q[:, 3], q[:, 4]
     zero, one = np.zeros_like(tilt), np.ones_like(tilt)
@@ -61,14 +61,14 @@ def _root_axes(q: np.ndarray) -> np.ndarray:
 def _generalised_to_load(q: np.ndarray, tau: np.ndarray) -> np.ndarray:
     """Root generalised forces (n, 6) or (n, 6, k) to force and moment about the pelvis origin, ground axes."""
     columns = tau if tau.ndim == 3 else tau[..., None]
-    moment = np.linalg.solve(_root_axes(q).transpose(0, 2, 1), columns[:, 3:])
+    moment = np.linalg.solve(root_axes(q).transpose(0, 2, 1), columns[:, 3:])
     load = np.concatenate([columns[:, :3], moment], axis=1)
     return load if tau.ndim == 3 else load[..., 0]
 
 
 def _load_to_generalised(q: np.ndarray, load: np.ndarray) -> np.ndarray:
     """The inverse of `_generalised_to_load`, (n, 6)."""
-    turned = np.einsum("nij,ni->nj", _root_axes(q), load[:, 3:])
+    turned = np.einsum("nij,ni->nj", root_axes(q), load[:, 3:])
     return np.concatenate([load[:, :3], turned], axis=1)
 
 
@@ -133,7 +133,7 @@ def root_derivatives(
     da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
     q = motion.q
     moment = _generalised_to_load(q, tau)[:, 3:]
-    axes = _root_axes(q)
+    axes = root_axes(q)
     for later in range(3):
         for earlier in range(later):
             turned = np.cross(axes[:, :, earlier], axes[:, :, later])

@@ -105,6 +105,28 @@ class Fit:
         return table.assign(estimate=self.estimate.to_frame()["value"])
 
 
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """All that an estimator needs of a person: what recordings become before any estimate.
+
+    Attributes:
+        subject: with mass and height filled in.
+        skeleton: calibrated model.
+        literature: body segment parameters of its geometry.
+        kinematics: smoothed coordinates and ground reactions, one entry per trial.
+        seconds: computing time by stage, one entry per trial.
+        warnings, notes: one sentence each.
+    """
+
+    subject: Subject
+    skeleton: Skeleton
+    literature: BodySegmentParameters
+    kinematics: tuple[Kinematics, ...]
+    seconds: tuple[Mapping[str, float], ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class TrialInput:
     """A recording and, where the user gives one, the window (s) to use instead of the detected one."""
@@ -182,6 +204,36 @@ def _estimate(
     marker_set: MarkerSet | None,
     progress: Progress,
 ) -> Fit:
+    ready = prepare(subject, static, inputs, settings, marker_set, progress)
+    started = time.perf_counter()
+    result, trials = _two_level(ready, settings, started, progress)
+    warnings = ready.warnings + tuple(fit_warnings(known(ready.subject.mass_kg), ready.literature, result, trials))
+    return Fit(
+        subject=ready.subject,
+        settings=settings,
+        skeleton=ready.skeleton,
+        literature=ready.literature,
+        estimate=result.bsp,
+        trials=trials,
+        converged=result.converged,
+        warnings=tuple(dict.fromkeys(warnings)),
+        notes=ready.notes,
+    )
+
+
+def prepare(
+    subject: Subject,
+    static: Recording,
+    inputs: Sequence[TrialInput],
+    settings: Settings,
+    marker_set: MarkerSet | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> Prepared:
+    """Calibrated skeleton, literature BSPs and smoothed kinematics of all trials; the arguments are `estimate_bsp`'s.
+
+    Raises:
+        KinertiaError: the subject, a marker set or a trial cannot be used.
+    """
     recordings = [item.recording for item in inputs]
     subject, warnings = complete_subject(subject, [static, *recordings])
     if marker_set is None:
@@ -206,20 +258,15 @@ def _estimate(
         ik_s = time.perf_counter() - started
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
 
-    started = time.perf_counter()
-    result, trials = _two_level(skeleton, literature, kinematics, settings, seconds, started, progress)
-    warnings += fit_warnings(known(subject.mass_kg), literature, result, trials)
     notes = [f"marker set: {marker_set.name}", *static.notes, *notes]
     notes += [note for k in kinematics for note in k.notes]
-    return Fit(
+    return Prepared(
         subject=subject,
-        settings=settings,
         skeleton=skeleton,
         literature=literature,
-        estimate=result.bsp,
-        trials=trials,
-        converged=result.converged,
-        warnings=tuple(dict.fromkeys(warnings)),
+        kinematics=tuple(kinematics),
+        seconds=tuple(seconds),
+        warnings=tuple(warnings),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -250,14 +297,9 @@ def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
 
 
 def _two_level(
-    skeleton: Skeleton,
-    literature: BodySegmentParameters,
-    kinematics: Sequence[Kinematics],
-    settings: Settings,
-    seconds: Sequence[Mapping[str, float]],
-    started: float,
-    progress: Progress,
+    ready: Prepared, settings: Settings, started: float, progress: Progress
 ) -> tuple[TwoLevelResult, tuple[TrialFit, ...]]:
+    skeleton, literature, kinematics = ready.skeleton, ready.literature, ready.kinematics
     windows = [Window(k.time, k.motion, k.foot_loads.sum(axis=1)) for k in kinematics]
     cut = [stretches(window) for window in windows]
     result = estimate_two_level(
@@ -269,7 +311,7 @@ def _two_level(
     )
     spent = (time.perf_counter() - started) / sum(len(window.time) for window in windows)
     motions, trials = iter(result.motions), []
-    for k, window, parts, before in zip(kinematics, windows, cut, seconds, strict=True):
+    for k, window, parts, before in zip(kinematics, windows, cut, ready.seconds, strict=True):
         motion = joined([next(motions) for _ in parts])
         corrected = joined([correct_pelvis(skeleton, literature, part) for part in parts])
         residuals = {

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.skeleton import Skeleton
-from kinertia.trial import Markers, PlateLoads
+from kinertia.trial import LOAD_THRESHOLD_N, Markers, PlateLoads
 
 STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S = 0.01, 25.0
 
@@ -84,11 +84,14 @@ def plate_noise(
 ) -> PlateLoads:
     """White noise on forces (N) and moments (N m), and a constant force offset (N) per plate, on loaded samples.
 
-    Unloaded samples stay zero, as laboratories and the readers here set them below the load threshold.
+    Errors of force act at the middle of the plate's corners (at the ground origin where they are unknown). Samples below the
+    load threshold are zero, as the readers of this package have them.
     """
     shape = plates.force.shape
-    loaded = plates.force[..., 1:2] > 0
     offset = rng.normal(0.0, offset_sd_n, (1, *shape[1:]))
-    force = plates.force + np.where(loaded, rng.normal(0.0, force_sd_n, shape) + offset, 0.0)
-    moment = plates.moment + np.where(loaded, rng.normal(0.0, moment_sd_nm, shape), 0.0)
-    return replace(plates, force=force, moment=moment)
+    error = rng.normal(0.0, force_sd_n, shape) + offset
+    centre = np.zeros(3) if plates.corners is None else plates.corners.mean(axis=1)
+    force = plates.force + error
+    moment = plates.moment + np.cross(centre, error) + rng.normal(0.0, moment_sd_nm, shape)
+    loaded = (plates.force[..., 1:2] > 0) & (force[..., 1:2] >= LOAD_THRESHOLD_N)
+    return replace(plates, force=np.where(loaded, force, 0.0), moment=np.where(loaded, moment, 0.0))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -127,8 +127,7 @@ def symmetric_truth(bsp: BodySegmentParameters) -> BodySegmentParameters:
 def study_trial() -> SyntheticTrial:
     """One stride of the package's walk, with margins, of a subject with exactly symmetric BSPs."""
     subject = walking_subject()
-    symmetric = type(subject)(subject.static, subject.marker_set, subject.skeleton, symmetric_truth(subject.bsp))
-    return walk(symmetric, _STRIDE_S + 2 * MARGIN_S)
+    return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S + 2 * MARGIN_S)
 
 
 def run_table1(

@@ -12,7 +12,7 @@ back the motion itself):
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 
@@ -31,11 +31,14 @@ from kinertia.two_level import Integration, Window
 
 MASS_KG, HEIGHT_M, SEX = 72.6, 1.803, "male"
 """The walker: the subject of OpenSim's gait2354 example."""
-_FEET = ("foot_r", "foot_l")
+STATIC_ONLY = tuple(f"{side}.{joint}.{place}" for side in "RL" for joint in ("Knee", "Ankle") for place in ("Lat", "Med"))
+"""Markers that are taken off after the static trial, as in the measured walk; 41 remain."""
+UNLIKE_MASS, UNLIKE_COM_M, UNLIKE_INERTIA = 0.1, 0.01, 0.1
+"""How far people are from the literature: standard deviations of masses and moments (share), CoM coordinates (m)."""
 _MAX_ITERATIONS = 100
 _RESIDUAL_TOLERANCE = 1e-9
 _HANDOVER = 0.3
-"""Share of double support over which the load begins and ends to pass between the feet."""
+"""Share of double support over which the shares of the load set in, and over which they end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +49,14 @@ class SyntheticSubject:
         static: standing, Cleveland Clinic markers.
         marker_set: theirs.
         skeleton: the model of `static`.
-        bsp: the truth: Dumas' literature values with zero products of inertia (principal axes along the segment axes, as in
-            the study); CoMs lie off the segment axes.
+        literature: Dumas' values for this person; CoMs lie off the segment axes.
+        bsp: the truth.
     """
 
     static: Recording
     marker_set: MarkerSet
     skeleton: Skeleton
+    literature: BodySegmentParameters
     bsp: BodySegmentParameters
 
 
@@ -95,21 +99,46 @@ def without_products(bsp: BodySegmentParameters) -> BodySegmentParameters:
 
 
 def walking_subject() -> SyntheticSubject:
-    """The person of the package's synthetic walk: 72.6 kg, 1.803 m, male."""
+    """The person of the package's synthetic walk: 72.6 kg, 1.803 m, male.
+
+    The truth is the literature with zero products of inertia: principal axes along the segment axes, as in the study.
+    """
     table = _data("standing.csv").set_index("label")
     rate_hz, n = 100.0, 20
     positions = np.tile(table[["x", "y", "z"]].to_numpy(float), (n, 1, 1))
     static = Recording("static", Markers(np.arange(n) / rate_hz, tuple(table.index), positions))
     marker_set = read_marker_set("cleveland-clinic")
     model = build_gait27(static, marker_set, HEIGHT_M, SEX)
-    bsp = without_products(literature_bsp(MASS_KG, HEIGHT_M, SEX, model.geometry))
-    return SyntheticSubject(static, marker_set, model.skeleton, bsp)
+    literature = literature_bsp(MASS_KG, HEIGHT_M, SEX, model.geometry)
+    return SyntheticSubject(static, marker_set, model.skeleton, literature, without_products(literature))
+
+
+def unlike_literature(subject: SyntheticSubject, rng: np.random.Generator) -> SyntheticSubject:
+    """The same skeleton with a body that differs from the literature as people do, left mirroring right.
+
+    Every mass off by 10 %, every CoM coordinate by 10 mm, every moment of inertia by 10 % (standard deviations of normal
+    draws); products of inertia change with their moments. The total mass stays, a scale tells it. Drawn again until every
+    segment is physically possible.
+    """
+    bsp = subject.literature
+    left = np.array([segment.endswith("_l") for segment in bsp.segments])
+    while True:
+        shape = bsp.com_m.shape
+        mass = bsp.mass_kg * (1.0 + rng.normal(0.0, UNLIKE_MASS, len(left)))
+        com = bsp.com_m + rng.normal(0.0, UNLIKE_COM_M, shape)
+        root = np.sqrt(np.maximum(1.0 + rng.normal(0.0, UNLIKE_INERTIA, shape), 0.01))
+        drawn = BodySegmentParameters(bsp.segments, mass, com, bsp.inertia_kgm2 * root[:, :, None] * root[:, None, :])
+        table = np.where(left[:, None], drawn.mirrored().table(), drawn.table())
+        table[:, 0] *= bsp.total_mass_kg / table[:, 0].sum()
+        result = BodySegmentParameters.from_table(bsp.segments, table)
+        if result.physically_consistent().all():
+            return replace(subject, bsp=result)
 
 
 def walk(
     subject: SyntheticSubject, duration_s: float | None = None, rate_hz: float = 100.0, start: float = 0.0
 ) -> SyntheticTrial:
-    """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same.
+    """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same; without the markers `STATIC_ONLY`.
 
     Args:
         subject: who walks.
@@ -118,18 +147,18 @@ def walk(
         start: share of the stride at which the trial begins (0: shortly before the left heel strikes).
     """
     series = _WalkSeries.read()
+    skeleton = subject.skeleton.with_markers([m for m in subject.skeleton.markers if m.label not in STATIC_ONLY])
     duration_s = series.period_s if duration_s is None else duration_s
     time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
-    motion = series.motion(subject.skeleton.coordinates, time + start * series.period_s)
+    motion = series.motion(skeleton.coordinates, time + start * series.period_s)
     position, velocity = Integration(time).track(motion.qdd[:, :6], motion.q[:, :6])
     deviation = np.abs(position - motion.q[:, :6]).max(axis=0)
     motion = motion.with_root(position, velocity, motion.qdd[:, :6])
-    at_pelvis = residual(subject.skeleton, subject.bsp, motion, np.zeros((len(time), 6)))
+    at_pelvis = residual(skeleton, subject.bsp, motion, np.zeros((len(time), 6)))
     force = at_pelvis[:, :3]
     wrench = np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])
-    shares = series.right_share(time + start * series.period_s)
-    loads = _on_feet(subject.skeleton, motion, wrench, *shares)
-    return SyntheticTrial(subject.skeleton, subject.bsp, time, motion, loads, deviation)
+    loads = _on_feet(skeleton, motion, wrench, *series.support(time + start * series.period_s))
+    return SyntheticTrial(skeleton, subject.bsp, time, motion, loads, deviation)
 
 
 def consistent_trial(
@@ -198,20 +227,18 @@ class _WalkSeries:
         qd[:, forward] += self.speed_m_s
         return Motion(q, qd, qdd)
 
-    def right_share(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Per frame: load share of the right foot by contact alone (1, 0, or between in double support), the progress
-        (0 to 1) through the double support, and whether the right foot is the trailing one in it.
+    def support(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Per frame: index of the foot that stands alone, or trails in double support (0 right, 1 left), and the progress
+        (0 to 1) through the double support; 0 in single support.
         """
         phase = (time / self.period_s) % 1.0
         (start_r, end_r), (start_l, end_l) = self.contacts
-        share, progress = np.empty_like(phase), np.full_like(phase, np.nan)
         right, left = _between(phase, start_r, end_r), _between(phase, start_l, end_l)
-        share[:] = np.where(right & ~left, 1.0, 0.0)
-        trailing = right & left & _between(phase, start_l, end_r)
-        leading = right & left & ~trailing
-        for frames, begin, finish in ((trailing, start_l, end_r), (leading, start_r, end_l)):
-            progress[frames] = ((phase[frames] - begin) % 1.0) / ((finish - begin) % 1.0)
-        return share, progress, trailing
+        right_trails = right & (~left | _between(phase, start_l, end_r))
+        begin = np.where(right_trails, start_l, start_r)
+        span = np.where(right_trails, (end_r - start_l) % 1.0, (end_l - start_r) % 1.0)
+        progress = np.where(right & left, ((phase - begin) % 1.0) / span, 0.0)
+        return np.where(right_trails, 0, 1), progress
 
 
 def _between(phase: np.ndarray, start: float, end: float) -> np.ndarray:
@@ -219,38 +246,36 @@ def _between(phase: np.ndarray, start: float, end: float) -> np.ndarray:
 
 
 def _on_feet(
-    skeleton: Skeleton,
-    motion: Motion,
-    wrench: np.ndarray,
-    share: np.ndarray,
-    progress: np.ndarray,
-    right_trails: np.ndarray,
+    skeleton: Skeleton, motion: Motion, wrench: np.ndarray, behind: np.ndarray, progress: np.ndarray
 ) -> np.ndarray:
-    """Share a wrench (n, 6) out to the feet (n, 2, 6).
+    """Share a wrench (n, 6) out to the feet (n, 2, 6): `behind` has it all, but what the other takes over in double support.
 
-    In single support the foot on the ground has it all. In double support the trailing foot's share acts at the forefoot and
-    follows from the lever between forefoot and leading heel; the leading foot has the rest. Only the sum is exact.
+    The shares of force follow from the lever between the trailing forefoot and the leading heel, handed over smoothly. As the
+    load passes on, the leading foot's first share acts at its heel and the trailing foot's last at its forefoot, so that both
+    centres of pressure stay under the feet. Only the sum is exact.
     """
     force = wrench[:, :3]
-    centre = centre_of_pressure(wrench)
     toe, heel = _foot_points(skeleton, motion, "metatarsal"), _foot_points(skeleton, motion, "heel")
     rows = np.arange(len(wrench))
-    behind = np.where(right_trails, 0, 1)
     tip, strike = toe[rows, behind], heel[rows, 1 - behind]
     along = strike - tip
-    lever = np.einsum("ni,ni->n", strike - centre, along) / np.einsum("ni,ni->n", along, along)
-    step = np.clip(np.minimum(progress, 1 - progress) / _HANDOVER, 0.0, 1.0)
-    smooth_step = np.where(np.isnan(progress), 0.0, step**2 * (3 - 2 * step))
+    lever = np.einsum("ni,ni->n", strike - centre_of_pressure(wrench), along) / np.einsum("ni,ni->n", along, along)
     early = np.where(progress < 0.5, 1.0, 0.0)
-    part = early + smooth_step * (np.clip(lever, 0.0, 1.0) - early)
-    trailing = np.concatenate([force, np.cross(tip, force)], axis=1) * part[:, None]
-    both = ~np.isnan(progress)
-    loads = np.zeros((len(wrench), 2, 6))
-    loads[rows, behind] = np.where(both[:, None], trailing, 0.0)
-    loads[rows, 1 - behind] = np.where(both[:, None], wrench - trailing, 0.0)
-    single = np.where(share > 0.5, 0, 1)
-    loads[rows[~both], single[~both]] = wrench[~both]
+    handover = _smooth_step(np.minimum(progress, 1.0 - progress) / _HANDOVER)
+    share = (early + handover * (np.clip(lever, 0.0, 1.0) - early))[:, None]
+    at_heel = wrench[:, 3:] - np.cross(strike, (1.0 - share) * force)
+    at_forefoot = np.cross(tip, share * force)
+    blend = _smooth_step(progress)[:, None]
+    trailing = np.hstack([share * force, (1.0 - blend) * at_heel + blend * at_forefoot])
+    loads = np.empty((len(wrench), 2, 6))
+    loads[rows, behind] = trailing
+    loads[rows, 1 - behind] = wrench - trailing
     return loads
+
+
+def _smooth_step(x: np.ndarray) -> np.ndarray:
+    x = np.clip(x, 0.0, 1.0)
+    return x**2 * (3.0 - 2.0 * x)
 
 
 def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:

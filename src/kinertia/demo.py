@@ -1,0 +1,92 @@
+"""`kinertia demo`: a person who does not exist, measured by a laboratory that does not exist, estimated, compared with truth.
+
+The truth differs from the literature as people do and is known to nobody but the comparison at the end: the estimator reads the
+laboratory's files.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kinertia.bsp import BodySegmentParameters
+from kinertia.config import read_subject
+from kinertia.fit import Fit, Progress, estimate_bsp
+from kinertia.inputs import read_inputs
+from kinertia.io.folder import complete_folder
+from kinertia.results import check_folder, save_fit
+from kinertia.synthetic import unlike_literature, walk, walking_subject
+from kinertia.synthetic_lab import LabNoise, record, write_lab
+
+PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
+"""Force plates at 1000 Hz, cameras at 100 Hz."""
+DURATION_S, START = 2.7, 0.75
+"""A bit over two strides, begun so that one right and one left contact are whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """A fit of synthetic files, and the truth behind them.
+
+    Attributes:
+        fit: what the pipeline made of the files.
+        truth: the BSPs that the files were made with.
+        subject_file: of the synthetic laboratory.
+    """
+
+    fit: Fit
+    truth: BodySegmentParameters
+    subject_file: Path
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Columns segment, parameter, unit, truth, literature, estimate."""
+        table = self.fit.bsp
+        table.insert(3, "truth", self.truth.to_frame()["value"])
+        return table
+
+    def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
+        """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
+        change = source.table() - self.truth.table()
+        distance = np.linalg.norm(change[:, 1:4], axis=1)
+        return tuple(float(np.sqrt(np.mean(np.square(part)))) for part in (change[:, 0], distance, change[:, 4:7]))
+
+
+def run_demo(
+    folder: str | Path,
+    seed: int = 1,
+    noise: LabNoise | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> Demo:
+    """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
+
+    Args:
+        folder: is made if need be.
+        seed: of truth and noise.
+        noise: the default `LabNoise` if None.
+        progress: called as the work goes on.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    progress("measuring", 0.0)
+    truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
+    subject = unlike_literature(walking_subject(), truth_rng)
+    trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
+    recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
+    subject_file = write_lab(folder / "lab", recordings)
+
+    wanted = read_subject(subject_file)
+    static, inputs, marker_set = read_inputs(wanted, progress)
+    fit = estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
+    save_fit(fit, folder)
+    demo = Demo(fit, subject.bsp, subject_file)
+    with complete_folder(folder) as work:
+        demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
+    return demo

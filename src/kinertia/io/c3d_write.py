@@ -1,0 +1,88 @@
+"""Writes a `Recording` as a C3D file, as a laboratory's software would: lab axes with Z up, mm, type-2 force plates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ezc3d
+import numpy as np
+
+from kinertia.trial import FloatArray, PlateLoads, Recording
+
+_TO_LAB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""Ground axes (Y up) to lab axes (Z up): x stays, lab y points to the person's left."""
+_TO_PLATE = np.diag([1.0, -1.0, -1.0])
+"""Lab axes to the plates' own: z down, as they are built."""
+_MM = 1000.0
+_CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+
+def write_c3d(path: str | Path, recording: Recording) -> None:
+    """Write markers, force plates, mass and height to a C3D file; numbers are stored in single precision.
+
+    Plate channels hold the force on the person and its moment about the middle of the plate's surface, in plate axes.
+
+    Args:
+        path: the file.
+        recording: its plates, if any, have corners, start with the markers and have a whole number of samples per frame.
+
+    Raises:
+        ValueError: the plates have no corners, or their time base does not fit the markers'.
+    """
+    file = ezc3d.c3d()
+    markers, parameters = recording.markers, file["parameters"]
+    parameters["POINT"]["LABELS"]["value"] = list(markers.labels)
+    parameters["POINT"]["UNITS"]["value"] = ["mm"]
+    parameters["POINT"]["RATE"]["value"] = [markers.rate_hz]
+    file["header"]["points"]["first_frame"] = round(float(markers.time[0]) * markers.rate_hz)
+    places = np.moveaxis(_MM * markers.positions @ _TO_LAB.T, 2, 0).swapaxes(1, 2)
+    file["data"]["points"] = np.concatenate([places, np.ones((1, *places.shape[1:]))])
+    file.add_parameter("POINT", "X_SCREEN", "+X")
+    file.add_parameter("POINT", "Y_SCREEN", "+Z")
+    if recording.mass_kg is not None:
+        file.add_parameter("PROCESSING", "Bodymass", float(recording.mass_kg))
+    if recording.height_m is not None:
+        file.add_parameter("PROCESSING", "Height", _MM * recording.height_m)
+    if recording.plates is not None:
+        _add_plates(file, recording.plates, _samples_per_frame(recording, recording.plates))
+    file.write(str(path))
+
+
+def _samples_per_frame(recording: Recording, plates: PlateLoads) -> int:
+    markers = recording.markers
+    ratio, rest = divmod(len(plates.time), len(markers.time))
+    step = 1.0 / (markers.rate_hz * max(ratio, 1))
+    if rest or np.abs(plates.time - markers.time[0] - step * np.arange(len(plates.time))).max() > 1e-6:
+        raise ValueError("plates must start with the markers and have a whole number of samples per frame")
+    return ratio
+
+
+def _add_plates(file: ezc3d.c3d, plates: PlateLoads, samples_per_frame: int) -> None:
+    if plates.corners is None:
+        raise ValueError("a C3D file needs the corners of its force plates")
+    count, parameters = len(plates.names), file["parameters"]
+    middle = plates.corners.mean(axis=1)
+    about_middle = plates.moment - np.cross(middle, plates.force)
+    turn = _TO_PLATE @ _TO_LAB
+    channels = np.concatenate([plates.force @ turn.T, _MM * about_middle @ turn.T], axis=-1)
+    file["data"]["analogs"] = channels.reshape(1, len(plates.time), 6 * count).swapaxes(1, 2)
+    parameters["ANALOG"]["RATE"]["value"] = [parameters["POINT"]["RATE"]["value"][0] * samples_per_frame]
+    parameters["ANALOG"]["LABELS"]["value"] = [f"{name}{p}" for p in range(1, count + 1) for name in _CHANNELS]
+    parameters["ANALOG"]["UNITS"]["value"] = (3 * ["N"] + 3 * ["Nmm"]) * count
+    for name, value in (
+        ("USED", [count]),
+        ("TYPE", [2] * count),
+        ("ZERO", [1, 0]),
+        ("ORIGIN", np.zeros((3, count))),
+        ("CHANNEL", np.arange(1, 6 * count + 1).reshape(count, 6).T),
+        ("CORNERS", np.moveaxis(np.array([_ordered(c) for c in plates.corners]), 0, 2).swapaxes(0, 1)),
+    ):
+        parameters["FORCE_PLATFORM"][name]["value"] = np.asarray(value)
+
+
+def _ordered(corners: FloatArray) -> FloatArray:
+    """(4, 3) mm in lab axes, in the order of the format: quadrants (+, +), (-, +), (-, -), (+, -) of the plate's axes."""
+    lab = _MM * corners @ _TO_LAB.T
+    x, y, _ = _TO_PLATE @ (lab - lab.mean(axis=0)).T
+    quadrant = np.select([(x > 0) & (y > 0), (x < 0) & (y > 0), (x < 0) & (y < 0)], [0, 1, 2], 3)
+    return lab[np.argsort(quadrant)]

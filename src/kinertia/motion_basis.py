@@ -1,0 +1,52 @@
+"""Uniform quintic B-splines for the coordinates of a trial, with the normal equations of anything that depends on them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+_DEGREE = 5
+_ACTIVE = _DEGREE + 1
+
+
+class MotionBasis:
+    """Uniform quintic B-splines over a trial's time.
+
+    Six splines are active at any time, so that the normal equations of coefficients ordered by time are block tridiagonal in
+    blocks of five splines.
+
+    Attributes:
+        size: number of splines.
+        first: (n,) the first active spline of each frame.
+        values: (3, n, 6) values of the active splines and their first two time derivatives.
+    """
+
+    def __init__(self, time: np.ndarray, spacing_s: float) -> None:
+        count = max(1, int(np.ceil((time[-1] - time[0]) / spacing_s)))
+        step = (time[-1] - time[0]) / count
+        knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
+        self.size = count + _DEGREE
+        self.first = np.minimum(((time - time[0]) / step).astype(int), count - 1)
+        # on a uniform grid all splines are one, shifted
+        shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
+        local = (time - time[0]) / step - self.first
+        at = local[:, None] + np.arange(_DEGREE, -1, -1)
+        self.values = np.stack([shape.derivative(d)(at) / step**d if d else shape(at) for d in range(3)])
+        self.active = self.first[:, None] + np.arange(_ACTIVE)
+        self.knots = knots
+
+    def evaluate(self, coefficients: np.ndarray) -> list[np.ndarray]:
+        """Coordinates and their first two derivatives, each (n, c), of coefficients (size, c)."""
+        active = coefficients[self.active]
+        return [np.einsum("na,nac->nc", values, active) for values in self.values]
+
+    def fit(self, q: np.ndarray) -> np.ndarray:
+        """(size, c) least-squares coefficients of q (n, c); NaN rows of a column are left out."""
+        design = np.zeros((len(q), self.size))
+        np.put_along_axis(design, self.active, self.values[0], axis=1)
+        ridge = 1e-8 * np.eye(self.size)
+        columns = []
+        for column in q.T:
+            seen = np.isfinite(column)
+            columns.append(np.linalg.solve(design[seen].T @ design[seen] + ridge, design[seen].T @ column[seen]))
+        return np.column_stack(columns)
