@@ -1,9 +1,10 @@
 """Makes the package's synthetic walk: `src/kinertia/data/standing.csv` and `walk.csv`, from the measured gait2354 walk.
 
-The walk is a truncated Fourier series of every coordinate, fitted to the inverse kinematics of two treadmill strides of
-OpenSim's gait2354 example; then, as in the study, the pelvis is modified until the motion asks for the measured ground
-reactions (as a series of the same harmonics), so that the centre of pressure stays under the feet. The belt's speed is added to
-the forward translation. The standing person is the model of the same subject, adapted to the walk, in a standing pose.
+The walk is a truncated Fourier series of every coordinate, fitted to the inverse kinematics of two treadmill strides
+of OpenSim's gait2354 example; then, as in the study, the pelvis is modified until the motion asks for the measured
+ground reactions (as a series of the same harmonics), so that the centre of pressure stays under the feet. The belt's
+speed is added to the forward translation. The standing person is the model of the same subject, adapted to the walk,
+in a standing pose.
 
     python benchmarks/synthetic_walk_table.py ../shared/data
 """
@@ -72,13 +73,13 @@ def write_walk(kinematics: Kinematics, trial: Trial) -> None:
     coefficients, moved = balanced(coefficients, wrench, period_s)
     contacts = _contacts(trial.loads.time, trial.loads.force[:, :, 1], period_s)
     header = [
-        "# Joint coordinates of a walk (rad, m) as Fourier series over one stride. Value at time t: mean, plus for every h",
-        "# cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t / period); pelvis_tx moves on at the walking speed.",
+        "# Joint coordinates of a walk (rad, m) as Fourier series over one stride. At time t: mean, plus for every",
+        "# h cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t / period); pelvis_tx moves on at the walking speed.",
         "# Fitted by benchmarks/synthetic_walk_table.py to two treadmill strides of OpenSim's gait2354 example",
-        f"# (opensim-models, Pipelines/Gait2354_Simbody, subject01_walk1); RMS misfit {np.degrees(rms[3:]).mean():.2f} deg, "
-        f"{rms[:3].max() * 1e3:.1f} mm; then the pelvis",
-        f"# moved by RMS {moved[:3].max() * 1e3:.1f} mm, {np.degrees(moved[3:]).max():.2f} deg, so that it asks for the "
-        "measured ground reactions.",
+        "# (opensim-models, Pipelines/Gait2354_Simbody, subject01_walk1); RMS misfit "
+        f"{np.degrees(rms[3:]).mean():.2f} deg, {rms[:3].max() * 1e3:.1f} mm; then the pelvis",
+        f"# moved by RMS {moved[:3].max() * 1e3:.1f} mm, {np.degrees(moved[3:]).max():.2f} deg, so that it asks for "
+        "the measured ground reactions.",
         f"# period_s = {period_s:.4f}",
         f"# speed_m_s = {_belt_speed(trial):.3f}",
         "# contact_r = {:.3f}, {:.3f}".format(*contacts[0]),
@@ -92,7 +93,8 @@ def write_walk(kinematics: Kinematics, trial: Trial) -> None:
 
 
 def balanced(coefficients: np.ndarray, wrench: np.ndarray, period_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients whose pelvis balances the ground reactions, and (6,) how far it moved from the first ones (RMS; m, rad).
+    """Coefficients whose pelvis balances the ground reactions, and (6,) how far it moved from the first ones (RMS; m,
+    rad).
 
     Gauss-Newton on the root residual over one stride and on the change of the pelvis, each by its standard deviation.
     """
@@ -131,7 +133,8 @@ def write_standing(skeleton: Skeleton, static: Recording) -> None:
     ankle = static.markers.positions[:, [static.markers.labels.index(skeleton.labels[i]) for i in feet], 1]
     positions[:, 1] += np.median(ankle) - np.median(positions[feet, 1])
     header = [
-        "# Markers (m; X forward, Y up, Z right) of the synthetic walker standing: the gait2354 subject (72.6 kg, 1.803 m),",
+        "# Markers (m; X forward, Y up, Z right) of the synthetic walker standing: the gait2354 subject (72.6 kg, "
+        "1.803 m),",
         "# made by benchmarks/synthetic_walk_table.py.",
     ]
     table = pd.DataFrame(positions, index=pd.Index(skeleton.labels, name="label"), columns=["x", "y", "z"])

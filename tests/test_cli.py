@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from command_line import fitted, run
-from kinertia import cli
+from kinertia import terminal
 from walks import fit_arguments
 
 
@@ -60,8 +60,8 @@ def test_progress_is_plain_lines_in_a_log(fit_of):
 
 def test_progress_is_a_bar_on_a_terminal(monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(cli, "_err", Console(file=screen, force_terminal=True, width=80))
-    with cli._progress() as progress:
+    monkeypatch.setattr(terminal, "err", Console(file=screen, force_terminal=True, width=80))
+    with terminal.shown_progress() as progress:
         progress("inverse kinematics", 0.5)
     assert "inverse kinematics" in screen.getvalue()
     assert "\r" in screen.getvalue()
@@ -153,7 +153,7 @@ def test_trouble_with_the_disk_is_one_line(person, monkeypatch):
     def denied(*_):
         raise PermissionError(13, "Permission denied", "/somewhere")
 
-    monkeypatch.setattr(cli, "read_recording", denied)
+    monkeypatch.setattr("kinertia.inputs.read_recording", denied)
     outcome = run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", "-o", person / "out")
     assert outcome.status == 2
     assert outcome.err.splitlines()[-1].startswith("error: /somewhere: Permission denied; check")

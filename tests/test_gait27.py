@@ -4,7 +4,14 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import generic_model, generic_static, recording, standing_positions
 from kinertia.errors import MarkerSetError
-from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, build_gait27
+from kinertia.gait27 import (
+    ARM_COORDINATES,
+    ARM_ROTATIONS,
+    HIP_OFFSETS,
+    LUMBAR_OFFSETS,
+    SHOULDER_OFFSETS,
+    build_gait27,
+)
 from kinertia.ik import solve_ik
 from kinertia.marker_set import read_marker_set
 
@@ -29,7 +36,7 @@ def test_fourteen_segments_and_27_coordinates():
         "pelvis_list",
         "pelvis_rotation",
     )
-    assert set(skeleton.locked) == {*SHOULDER_OFFSETS, *ARM_ROTATIONS}
+    assert set(skeleton.locked) == {*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS, *ARM_ROTATIONS}
     assert set(ARM_COORDINATES) <= set(skeleton.coordinates)
 
 

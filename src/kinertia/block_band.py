@@ -1,7 +1,8 @@
-"""Symmetric positive definite systems that are block tridiagonal with a dense border: Cholesky, solution, Schur complement.
+"""Symmetric positive definite systems that are block tridiagonal with a dense border: Cholesky, solution, Schur
+complement.
 
-Ordered by time, the spline coefficients of a motion see only their neighbours, and all of them see the few unknowns that do not
-move. Work and memory grow linearly with the number of blocks.
+Ordered by time, the spline coefficients of a motion see only their neighbours, and all of them see the few unknowns
+that do not move. Work and memory grow linearly with the number of blocks.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""`kinertia demo`: a person who does not exist, measured by a laboratory that does not exist, estimated, compared with truth.
+"""`kinertia demo`: a synthetic person, measured by a synthetic laboratory, estimated, compared with the truth.
 
-The truth differs from the literature as people do and is known to nobody but the comparison at the end: the estimator reads the
-laboratory's files.
+The truth differs from the literature as people do and is known to nobody but the comparison at the end: the estimator
+reads the laboratory's files.
 """
 
 from __future__ import annotations
@@ -53,7 +53,10 @@ class Demo:
         """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
         change = source.table() - self.truth.table()
         distance = np.linalg.norm(change[:, 1:4], axis=1)
-        return tuple(float(np.sqrt(np.mean(np.square(part)))) for part in (change[:, 0], distance, change[:, 4:7]))
+        mass, com, inertia = (
+            float(np.sqrt(np.mean(np.square(part)))) for part in (change[:, 0], distance, change[:, 4:7])
+        )
+        return mass, com, inertia
 
 
 def run_demo(

@@ -5,9 +5,9 @@ between), back (3), shoulder (2), elbow (1). Twelve of the fourteen segments car
 (Rajagopal): flexion of hip, knee and elbow, dorsiflexion, adduction, internal rotation and inversion are positive; hip,
 knee and shoulder angles are zero when segments are aligned, the ankle's when foot and shank are square.
 
-Ten more axes are locked unless they are calibrated (`calibration.py`): the shoulder centres in the torso, and the axial
-rotation of the upper arm and of the forearm, which this model does not move but which differ between a T-pose and
-walking.
+More axes are locked unless they are calibrated: the centres of hips, lumbar joint and shoulders in their parents, and
+the axial rotation of the upper arm and of the forearm, which this model does not move but which differ between a
+T-pose and walking.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from kinertia.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial import Recording
 
 SHOULDER_OFFSETS = tuple(f"shoulder_{axis}_{side}" for side in "rl" for axis in "xyz")
+HIP_OFFSETS = tuple(f"hip_{axis}_{side}" for side in "rl" for axis in "xyz")
+LUMBAR_OFFSETS = tuple(f"lumbar_{axis}" for axis in "xyz")
 ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", "pro_sup"))
 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
@@ -77,11 +79,12 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     for side in "rl":
         joints += _leg(marks, frames, lengths, hips[side], side)
     lumbar = jc.lumbar_in_pelvis(width, sex)
-    joints.append(Joint("pelvis", "torso", np.eye(3), lumbar, _gimbal("lumbar_", ["extension", "bending", "rotation"])))
+    back = _offsets(LUMBAR_OFFSETS) + _gimbal("lumbar_", ["extension", "bending", "rotation"])
+    joints.append(Joint("pelvis", "torso", np.eye(3), lumbar, back))
     at = origin + pelvis @ lumbar
     torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
     frames["torso"] = (torso, at)
-    locked = dict.fromkeys(SHOULDER_OFFSETS, 0.0)
+    locked = dict.fromkeys((*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS), 0.0)
     for side in "rl":
         joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, sex, side)
     mid_hip = (hips["r"] + hips["l"]) / 2
@@ -108,6 +111,12 @@ def _gimbal(prefix: str, names: list[str], suffix: str = "", side: str = "r") ->
     return tuple(
         Axis(f"{prefix}{name}{suffix}", "rotation", _triple(d)) for name, d in zip(names, directions, strict=False)
     )
+
+
+def _offsets(names: tuple[str, ...], side: str = "") -> tuple[Axis, ...]:
+    """Three translations that move a joint centre in its parent, for calibration."""
+    own = [name for name in names if name.endswith(side)]
+    return tuple(Axis(name, "translation", d) for name, d in zip(own, (_X, _Y, _Z), strict=True))
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -157,7 +166,7 @@ def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side
     ankle_pin = _axis(f"ankle_angle_{side}", foot.T @ ankle_axis)
     subtalar_pin = _axis(f"subtalar_angle_{side}", jc.subtalar_axis(side))
     down = np.array([0.0, -1.0, 0.0])
-    hip_axes = _gimbal("hip_", ["flexion", "adduction", "rotation"], f"_{side}", side)
+    hip_axes = _offsets(HIP_OFFSETS, side) + _gimbal("hip_", ["flexion", "adduction", "rotation"], f"_{side}", side)
     return [
         Joint("pelvis", f"thigh_{side}", np.eye(3), hip, hip_axes),
         _pin(f"thigh_{side}", f"shank_{side}", lengths[f"thigh_{side}"] * down, in_thigh, knee_pin, flexion),
@@ -204,10 +213,7 @@ def _arm(
     in_upper = upper.T @ lower
     flexion = np.arctan2(-in_upper[0, 1], in_upper[1, 1])
     elbow_pin = _axis(f"elbow_flex_{side}", lower.T @ upper[:, 2])
-    offsets = tuple(
-        Axis(f"shoulder_{name}_{side}", "translation", d) for name, d in zip("xyz", (_X, _Y, _Z), strict=True)
-    )
-    shoulder_axes = offsets + _gimbal("arm_", ["flex", "add", "rot"], f"_{side}", side)
+    shoulder_axes = _offsets(SHOULDER_OFFSETS, side) + _gimbal("arm_", ["flex", "add", "rot"], f"_{side}", side)
     elbow = _pin(
         f"upper_arm_{side}",
         f"forearm_{side}",

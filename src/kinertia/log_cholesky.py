@@ -1,9 +1,10 @@
-"""Physically consistent inertial parameters by construction: log mass, CoM, and log-Cholesky second moments about the CoM.
+"""Physically consistent inertial parameters by construction: log mass, CoM, and log-Cholesky second moments about the
+CoM.
 
 Ten free numbers per segment, any real values: log m; c; and the lower triangular L of the second moments about the CoM,
 Sigma = L L^T with logarithms on its diagonal. Mass is then positive and Sigma positive definite, which is what physical
-consistency of the pseudo-inertia means. It is the log-Cholesky form of Rucker and Wensing (2022, IEEE RA-L 7:2735) taken about the
-CoM instead of the origin: mass, CoM and inertia then stay apart, as in the anthropometric prior.
+consistency of the pseudo-inertia means. It is the log-Cholesky form of Rucker and Wensing (2022, IEEE RA-L 7:2735)
+taken about the CoM instead of the origin: mass, CoM and inertia then stay apart, as in the anthropometric prior.
 """
 
 from __future__ import annotations
@@ -31,9 +32,7 @@ def from_log_cholesky(segments: tuple[str, ...], theta: np.ndarray) -> BodySegme
     """Body segment parameters of (10 s,) parameters."""
     rows = theta.reshape(-1, 10)
     lower = _lower(rows)
-    return BodySegmentParameters(
-        segments, np.exp(rows[:, 0]), rows[:, 1:4], _inertia(lower @ lower.transpose(0, 2, 1))
-    )
+    return BodySegmentParameters(segments, np.exp(rows[:, 0]), rows[:, 1:4], _inertia(lower @ lower.transpose(0, 2, 1)))
 
 
 def table_jacobian(theta: np.ndarray) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""Uniform quintic B-splines for the coordinates of a trial, with the normal equations of anything that depends on them."""
+"""Uniform quintic B-splines for the coordinates of a trial, with the normal equations of anything that depends on
+them."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ _ACTIVE = _DEGREE + 1
 class MotionBasis:
     """Uniform quintic B-splines over a trial's time.
 
-    Six splines are active at any time, so that the normal equations of coefficients ordered by time are block tridiagonal in
-    blocks of five splines.
+    Six splines are active at any time, so that the normal equations of coefficients ordered by time are block
+    tridiagonal in blocks of five splines.
 
     Attributes:
         size: number of splines.

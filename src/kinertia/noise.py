@@ -1,7 +1,8 @@
 """Measurement errors for synthetic trials: skin motion, cameras, force plates. Every function takes its own generator.
 
 Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that moves with the neighbouring joints
-(`soft_tissue_artefact`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset (`plate_noise`).
+(`soft_tissue_artefact`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset
+(`plate_noise`).
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ OTHER_ARTEFACT_RANGE_M = (0.004, 0.009)
 def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
     """The study's noise (DESIGN section 5): A sin(w t + phi) on every marker coordinate.
 
-    Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm RMS, below
-    4 Hz: no low-pass filter removes it (Chèze et al. 1995).
+    Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm
+    RMS, below 4 Hz: no low-pass filter removes it (Chèze et al. 1995).
     """
     shape = markers.positions.shape[1:]
     amplitude = rng.uniform(0.0, STUDY_AMPLITUDE_M, shape)
@@ -37,10 +38,10 @@ def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
 def soft_tissue_artefact(markers: Markers, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator) -> Markers:
     """Skin motion that goes with the joints: each segment's markers move together, linearly in its joints' angles.
 
-    The displacement, constant in the segment's frame but for the angles of the joints at its two ends, has a random direction
-    per joint angle and a peak-to-peak size drawn from `ARTEFACT_RANGE_M` (10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm
-    elsewhere, per step). Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes from the review of
-    Peters et al. (2010).
+    The displacement, constant in the segment's frame but for the angles of the joints at its two ends, has a random
+    direction per joint angle and a peak-to-peak size drawn from `ARTEFACT_RANGE_M` (10-18 mm on the thigh, 7-17 mm on
+    the shank, 4-9 mm elsewhere, per step). Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes
+    from the review of Peters et al. (2010).
 
     Args:
         markers: of a trial of this skeleton.
@@ -84,8 +85,8 @@ def plate_noise(
 ) -> PlateLoads:
     """White noise on forces (N) and moments (N m), and a constant force offset (N) per plate, on loaded samples.
 
-    Errors of force act at the middle of the plate's corners (at the ground origin where they are unknown). Samples below the
-    load threshold are zero, as the readers of this package have them.
+    Errors of force act at the middle of the plate's corners (at the ground origin where they are unknown). Samples
+    below the load threshold are zero, as the readers of this package have them.
     """
     shape = plates.force.shape
     offset = rng.normal(0.0, offset_sd_n, (1, *shape[1:]))

@@ -1,8 +1,8 @@
-"""The study's Table 1, repeated: which body segment parameters come back from gait, with and without noise and correction.
+"""The study's Table 1, repeated: which BSPs come back from gait, with and without noise and pelvis correction.
 
-Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the study's marker
-noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The two-level estimator never
-sees the truth.
+Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the
+study's marker noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The
+two-level estimator never sees the truth.
 """
 
 from __future__ import annotations
@@ -11,16 +11,20 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
+from multiprocessing import get_context
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from kinertia.bsp import BodySegmentParameters, ParameterVector
+from kinertia.config import SubjectFile
 from kinertia.dynamics import Motion
+from kinertia.fit import Progress, prepare
 from kinertia.ik import solve_ik
+from kinertia.inputs import read_inputs
 from kinertia.noise import study_noise
 from kinertia.splines import smooth
-from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+from kinertia.synthetic import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.two_level import Window, estimate_two_level
 
 CONDITIONS = {
@@ -40,8 +44,8 @@ _STRIDE_S = 1.24
 class Errors:
     """One column of Table 1: errors of the estimated parameters, and the root residual that is left.
 
-    RMS and largest magnitude over all parameters of a class (21 moments, 7 masses, 21 CoM coordinates), and over all frames
-    and components of the pelvis force and torque.
+    RMS and largest magnitude over all parameters of a class (21 moments, 7 masses, 21 CoM coordinates), and over all
+    frames and components of the pelvis force and torque.
     """
 
     inertia_rms_kgm2: float
@@ -130,6 +134,36 @@ def study_trial() -> SyntheticTrial:
     return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S + 2 * MARGIN_S)
 
 
+def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> tuple[SyntheticTrial, str]:
+    """The study's trial from a measured one, and what to call it.
+
+    The first trial of the subject file goes through reading, calibration, inverse kinematics and smoothing; of its
+    measured window, the middle `_STRIDE_S` with margins (or all, if it is shorter) is made consistent with the
+    literature BSPs.
+
+    Raises:
+        KinertiaError: the trial cannot be used, or no pelvis motion near the measured one balances its ground
+            reactions.
+    """
+    static, inputs, marker_set = read_inputs(wanted, progress)
+    with threadpool_limits(1):
+        ready = prepare(wanted.subject, static, inputs[:1], wanted.settings, marker_set, progress)
+        measured = ready.kinematics[0]
+        worn = [m for m in ready.skeleton.markers if m.label in measured.ik.labels]
+        spare = max(0.0, (np.ptp(measured.time) - _STRIDE_S) / 2 - MARGIN_S)
+        inside = np.abs(measured.time - measured.time.mean()) <= np.ptp(measured.time) / 2 - spare + 1e-9
+        frames = slice(int(np.argmax(inside)), int(len(inside) - np.argmax(inside[::-1])))
+        trial = consistent_trial(
+            ready.skeleton.with_markers(worn),
+            symmetric_truth(without_products(ready.literature)),
+            measured.time[frames],
+            measured.motion.cut(frames),
+            measured.foot_loads[frames],
+        )
+    first, last = trial.time[[0, -1]]
+    return trial, f"{measured.trial.name}, {first:.2f} to {last:.2f} s"
+
+
 def run_table1(
     trial: SyntheticTrial,
     repeats: int = 10,
@@ -153,11 +187,15 @@ def run_table1(
     vector = ParameterVector(trial.bsp, symmetric=True)
     workers = min(workers or os.cpu_count() or 1, repeats)
     draws: list[Draw] = []
-    with ProcessPoolExecutor(workers, initializer=_one_thread) as pool:
-        waiting = [pool.submit(run_draw, trial, seed, number) for number in range(repeats)]
-        for done in as_completed(waiting):
+    progress(0.0)
+    # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
+    try:
+        for done in as_completed([pool.submit(run_draw, trial, seed, number) for number in range(repeats)]):
             draws.append(done.result())
             progress(len(draws) / repeats)
+    finally:
+        pool.shutdown(cancel_futures=True)
     draws.sort(key=lambda draw: draw.number)
     return Table1(vector.names, vector.values(trial.bsp), tuple(draws), seed, name)
 
@@ -237,4 +275,3 @@ def table1_json(table: Table1) -> dict[str, object]:
             for draw in table.draws
         ],
     }
-

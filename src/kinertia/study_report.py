@@ -37,7 +37,8 @@ _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>Table 1 repeated</title>
 <style>body{{font-family:sans-serif;max-width:60rem;margin:1rem auto;padding:0 1rem}}
-table{{border-collapse:collapse;font-size:.9rem}}td,th{{padding:.25rem .6rem;border-bottom:1px solid #ccc;text-align:right}}
+table{{border-collapse:collapse;font-size:.9rem}}
+td,th{{padding:.25rem .6rem;border-bottom:1px solid #ccc;text-align:right}}
 td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>
 <h1>Table 1 repeated</h1><p>{about}</p>{table}
 <h2>Error per segment</h2>{picture}<p>{caption}</p></html>
@@ -59,15 +60,13 @@ def table1_frame(table: Table1) -> pd.DataFrame:
 
 
 def table1_rows(table: Table1) -> list[list[str]]:
-    """The table in the study's form: quantity, then per condition "RMS / max", ours above the published."""
+    """The table in the study's form: quantity, then "RMS / max" per condition: mean, spread and published value."""
+    sources = {"  spread": table.spread, "  published": PUBLISHED.__getitem__}
     rows = []
     for heading, *names in QUANTITIES.values():
-        ours, theirs = [], []
-        for condition in CONDITIONS:
-            mean, published = asdict(table.mean(condition)), asdict(PUBLISHED[condition])
-            ours.append(" / ".join(f"{mean[name]:.3g}" for name in names))
-            theirs.append(" / ".join(f"{published[name]:.3g}" for name in names))
-        rows += [[heading, *ours], ["  published", *theirs]]
+        for label, source in ((heading, table.mean), *sources.items()):
+            values = [asdict(source(condition)) for condition in CONDITIONS]
+            rows.append([label, *(" / ".join(f"{value[name]:.3g}" for name in names) for value in values)])
     return rows
 
 
@@ -85,7 +84,9 @@ def table1_figure(table: Table1) -> Figure:
                 chosen = [table.parameters.index(f"{segment}.{member}") for member in members]
                 heights.append(float(np.sqrt(np.mean(np.square(values[:, chosen])))))
             label = "start" if key == "start" else CONDITIONS[key]
-            axis.plot(segments, heights, linestyle="", marker=_MARKS[key], color=_COLOURS[key], label=label, markersize=7)
+            axis.plot(
+                segments, heights, linestyle="", marker=_MARKS[key], color=_COLOURS[key], label=label, markersize=7
+            )
         axis.set_yscale("log")
         axis.set_title(f"{heading}, RMS error")
         axis.tick_params(axis="x", rotation=45)
@@ -103,15 +104,14 @@ def save_table1(table: Table1, folder: str | Path) -> Path:
     picture = svg.getvalue()
     about = (
         f"{len(table.draws)} draws of start and noise, seed {table.seed}, {table.trial}. "
-        "RMS / max; ours (mean over draws) above the published values."
+        "RMS / max; ours (mean and standard deviation over the draws) above the published values."
     )
     rows = pd.DataFrame(table1_rows(table), columns=["error", *CONDITIONS.values()])
     page = _PAGE.format(
         about=escape(about),
         table=rows.to_html(index=False, border=0),
         picture=picture[picture.index("<svg") :],
-        caption="Start: every parameter off by up to 50 %. Logarithmic: without noise the errors vanish, with noise they "
-        "are as large as at the start, or larger.",
+        caption="Start: every parameter off by up to 50 %. The scale is logarithmic.",
     )
     with complete_folder(folder) as work:
         (work / "table1.json").write_text(json.dumps(table1_json(table), indent=1) + "\n", encoding="utf-8")

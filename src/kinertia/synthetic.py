@@ -4,10 +4,10 @@ Two ways to an exactly consistent trial, both with root residual P = 0 at every 
 velocity are the trapezoid integrals of its acceleration (so that the study's pelvis correction, at the true BSPs, gives
 back the motion itself):
 
-- `walk`: the walk that comes with the package, any length; the ground reactions are what the motion asks for, shared out
-  between the feet.
-- `consistent_trial`: as in the study, any measured window; the ground reactions are kept and the pelvis is modified until
-  equation (1) holds with P = 0.
+- `walk`: the walk that comes with the package, any length; the ground reactions are what the motion asks for, shared
+  out between the feet.
+- `consistent_trial`: as in the study, any measured window; the ground reactions are kept and the pelvis is modified
+  until equation (1) holds with P = 0.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ from kinertia.two_level import Integration, Window
 
 MASS_KG, HEIGHT_M, SEX = 72.6, 1.803, "male"
 """The walker: the subject of OpenSim's gait2354 example."""
-STATIC_ONLY = tuple(f"{side}.{joint}.{place}" for side in "RL" for joint in ("Knee", "Ankle") for place in ("Lat", "Med"))
+STATIC_ONLY = tuple(
+    f"{side}.{joint}.{place}" for side in "RL" for joint in ("Knee", "Ankle") for place in ("Lat", "Med")
+)
 """Markers that are taken off after the static trial, as in the measured walk; 41 remain."""
 UNLIKE_MASS, UNLIKE_COM_M, UNLIKE_INERTIA = 0.1, 0.01, 0.1
 """How far people are from the literature: standard deviations of masses and moments (share), CoM coordinates (m)."""
@@ -116,9 +118,9 @@ def walking_subject() -> SyntheticSubject:
 def unlike_literature(subject: SyntheticSubject, rng: np.random.Generator) -> SyntheticSubject:
     """The same skeleton with a body that differs from the literature as people do, left mirroring right.
 
-    Every mass off by 10 %, every CoM coordinate by 10 mm, every moment of inertia by 10 % (standard deviations of normal
-    draws); products of inertia change with their moments. The total mass stays, a scale tells it. Drawn again until every
-    segment is physically possible.
+    Every mass off by 10 %, every CoM coordinate by 10 mm, every moment of inertia by 10 % (standard deviations of
+    normal draws); products of inertia change with their moments. The total mass stays, a scale tells it. Drawn again
+    until every segment is physically possible.
     """
     bsp = subject.literature
     left = np.array([segment.endswith("_l") for segment in bsp.segments])
@@ -166,11 +168,13 @@ def consistent_trial(
 ) -> SyntheticTrial:
     """The trial of a measured window with the pelvis modified until P = 0 at every frame.
 
-    Equation (2) gives the pelvis acceleration at the current pelvis motion; it is integrated twice by the trapezoid rule, tracking
-    the measured pelvis; and again, until nothing changes (Picard iteration; some 15 rounds for one stride).
+    Equation (2) gives the pelvis acceleration at the current pelvis motion; it is integrated twice by the trapezoid
+    rule, tracking the measured pelvis; and again, until nothing changes (Picard iteration; some 15 rounds for one
+    stride).
 
     Raises:
-        KinertiaError: the iteration does not settle; the window is longer than about two strides, or the BSPs are far off.
+        KinertiaError: the iteration does not settle; the window is longer than about two strides, or the BSPs are far
+            off.
     """
     wrench = foot_loads.sum(axis=1)
     start, integration, current = motion.q[:, :6], Integration(time), motion
@@ -228,8 +232,8 @@ class _WalkSeries:
         return Motion(q, qd, qdd)
 
     def support(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Per frame: index of the foot that stands alone, or trails in double support (0 right, 1 left), and the progress
-        (0 to 1) through the double support; 0 in single support.
+        """Per frame: index of the foot that stands alone, or trails in double support (0 right, 1 left), and the
+        progress (0 to 1) through the double support; 0 in single support.
         """
         phase = (time / self.period_s) % 1.0
         (start_r, end_r), (start_l, end_l) = self.contacts
@@ -248,11 +252,11 @@ def _between(phase: np.ndarray, start: float, end: float) -> np.ndarray:
 def _on_feet(
     skeleton: Skeleton, motion: Motion, wrench: np.ndarray, behind: np.ndarray, progress: np.ndarray
 ) -> np.ndarray:
-    """Share a wrench (n, 6) out to the feet (n, 2, 6): `behind` has it all, but what the other takes over in double support.
+    """Share a wrench (n, 6) out to the feet (n, 2, 6): `behind` has it all but what the other takes over.
 
-    The shares of force follow from the lever between the trailing forefoot and the leading heel, handed over smoothly. As the
-    load passes on, the leading foot's first share acts at its heel and the trailing foot's last at its forefoot, so that both
-    centres of pressure stay under the feet. Only the sum is exact.
+    The shares of force follow from the lever between the trailing forefoot and the leading heel, handed over
+    smoothly. As the load passes on, the leading foot's first share acts at its heel and the trailing foot's last at
+    its forefoot, so that both centres of pressure stay under the feet. Only the sum is exact.
     """
     force = wrench[:, :3]
     toe, heel = _foot_points(skeleton, motion, "metatarsal"), _foot_points(skeleton, motion, "heel")
@@ -289,7 +293,9 @@ def _foot_points(skeleton: Skeleton, motion: Motion, landmark: str) -> np.ndarra
     marker_set = read_marker_set("cleveland-clinic")
     positions = skeleton.marker_positions(skeleton.pose(motion.q))
     points = [
-        positions[:, [skeleton.labels.index(label) for label in marker_set.landmarks[f"{landmark}_{side}"]]].mean(axis=1)
+        positions[:, [skeleton.labels.index(label) for label in marker_set.landmarks[f"{landmark}_{side}"]]].mean(
+            axis=1
+        )
         for side in "rl"
     ]
     return np.stack(points, axis=1) * np.array([1.0, 0.0, 1.0])

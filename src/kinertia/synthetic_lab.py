@@ -6,7 +6,7 @@ The plates catch one right and one left contact; the steps before and after go u
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -31,8 +31,8 @@ class LabNoise:
     """What goes wrong in measuring; the defaults are those of a careful laboratory.
 
     Attributes:
-        skin: "artefact": moves with the joints, published magnitudes (`noise.soft_tissue_artefact`); "study": the study's
-            sinusoids (`noise.study_noise`); "none".
+        skin: "artefact": moves with the joints, published magnitudes (`noise.soft_tissue_artefact`); "study": the
+            study's sinusoids (`noise.study_noise`); "none".
         camera_sd_m: white noise of every marker coordinate, m.
         force_sd_n: white noise of every force component, N.
         force_offset_sd_n: deviation of each plate's constant force offset, N.
@@ -85,12 +85,12 @@ def record(
         moved = soft_tissue_artefact(exact, trial.skeleton, trial.motion.q[seen], rng)
     elif noise.skin == "study":
         moved = study_noise(exact, rng)
-    plates = plate_noise(
-        _plates(trial, samples), noise.force_sd_n, noise.force_offset_sd_n, noise.moment_sd_nm, rng
+    plates = plate_noise(_plates(trial, samples), noise.force_sd_n, noise.force_offset_sd_n, noise.moment_sd_nm, rng)
+    standing = camera_noise(subject.static.markers, noise.camera_sd_m, rng)
+    return LabRecordings(
+        Recording("static", standing, None, MASS_KG, HEIGHT_M),
+        Recording("walk", camera_noise(moved, noise.camera_sd_m, rng), plates, MASS_KG, HEIGHT_M),
     )
-    told = {"mass_kg": MASS_KG, "height_m": HEIGHT_M}
-    static = replace(subject.static, markers=camera_noise(subject.static.markers, noise.camera_sd_m, rng), **told)
-    return LabRecordings(static, Recording("walk", camera_noise(moved, noise.camera_sd_m, rng), plates, **told))
 
 
 def _plates(trial: SyntheticTrial, samples: int) -> PlateLoads:
@@ -123,7 +123,7 @@ def _contacts(trial: SyntheticTrial, samples: int) -> list[tuple[int, int, int]]
     ]
     if not pairs:
         raise TrialError("synthetic", "it holds no whole contact of each foot in turn; make it about two strides long")
-    return list(min(pairs, key=lambda pair: abs((pair[0][2] + pair[1][1]) - samples)))
+    return [*min(pairs, key=lambda pair: abs((pair[0][2] + pair[1][1]) - samples))]
 
 
 def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc", "c3d"] = "trc") -> Path:

@@ -5,8 +5,9 @@ by the trapezoid rule, with the two constants per coordinate that track the meas
 closed form).
 Outer level: bounded nonlinear least squares on the residual P at the corrected motion, over all frames of all trials.
 
-Deviations from the study: CoM coordinates are bounded to 1 m (a mass near zero would send its CoM anywhere); no finite differences (the derivative is chained through (2), the integration and the fit),
-and moments are divided by the body's radius of gyration about the pelvis, so that N and N m add up.
+Deviations from the study: CoM coordinates are bounded to 1 m (a mass near zero would send its CoM anywhere); no finite
+differences (the derivative is chained through (2), the integration and the fit), and moments are divided by the body's
+radius of gyration about the pelvis, so that N and N m add up.
 """
 
 from __future__ import annotations
@@ -168,24 +169,13 @@ def _minimise(
 ) -> OptimizeResult:
     """Least squares within bounds.
 
-    Without bounds first: Levenberg-Marquardt crosses them on its way, and where the data are good it ends inside. Only if
-    it does not, the trust region method keeps to them from the start on; it may end on a bound short of the minimum.
+    Without bounds first: Levenberg-Marquardt crosses them on its way, and where the data are good it ends inside. Only
+    if it does not, the trust region method keeps to them from the start on; it may end on a bound short of the minimum.
+    Where it creeps along a valley until its limit, Levenberg-Marquardt goes on from there.
     """
     scale = np.maximum(np.abs(theta), _SMALLEST_SCALE)
-    free = None
-    with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
-        free = least_squares(
-            problem.residuals,
-            theta,
-            problem.jacobian,
-            method="lm",
-            x_scale=scale,
-            xtol=1e-15,
-            ftol=1e-15,
-            gtol=1e-15,
-            max_nfev=_FREE_EVALUATIONS,
-        )
-    if free is not None and free.status > 0 and np.all((free.x > bounds[0]) & (free.x < bounds[1])):
+    free = _minimise_freely(problem, theta, scale, bounds)
+    if free is not None:
         return free
     bounded = least_squares(
         problem.residuals,
@@ -199,8 +189,35 @@ def _minimise(
         max_nfev=_MAX_EVALUATIONS,
         callback=lambda intermediate_result: progress(intermediate_result.nfev / _MAX_EVALUATIONS),
     )
-    bounded.nfev += _FREE_EVALUATIONS if free is None else free.nfev
-    return bounded
+    best = bounded
+    if bounded.status == 0:
+        free = _minimise_freely(problem, bounded.x, scale, bounds)
+        if free is not None and free.cost < bounded.cost:
+            free.nfev += bounded.nfev
+            best = free
+    best.nfev += _FREE_EVALUATIONS
+    return best
+
+
+def _minimise_freely(
+    problem: _Problem, theta: np.ndarray, scale: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+) -> OptimizeResult | None:
+    """Levenberg-Marquardt without bounds; None unless it converges, and inside them."""
+    with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
+        free = least_squares(
+            problem.residuals,
+            theta,
+            problem.jacobian,
+            method="lm",
+            x_scale=scale,
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+            max_nfev=_FREE_EVALUATIONS,
+        )
+        if free.status > 0 and np.all((free.x > bounds[0]) & (free.x < bounds[1])):
+            return free
+    return None
 
 
 def _radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:

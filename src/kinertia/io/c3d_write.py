@@ -24,7 +24,8 @@ def write_c3d(path: str | Path, recording: Recording) -> None:
 
     Args:
         path: the file.
-        recording: its plates, if any, have corners, start with the markers and have a whole number of samples per frame.
+        recording: its plates, if any, have corners, start with the markers and have a whole number of samples per
+            frame.
 
     Raises:
         ValueError: the plates have no corners, or their time base does not fit the markers'.
@@ -81,7 +82,7 @@ def _add_plates(file: ezc3d.c3d, plates: PlateLoads, samples_per_frame: int) -> 
 
 
 def _ordered(corners: FloatArray) -> FloatArray:
-    """(4, 3) mm in lab axes, in the order of the format: quadrants (+, +), (-, +), (-, -), (+, -) of the plate's axes."""
+    """(4, 3) mm in lab axes, by the quadrants of the plate's axes: (+, +), (-, +), (-, -), (+, -)."""
     lab = _MM * corners @ _TO_LAB.T
     x, y, _ = _TO_PLATE @ (lab - lab.mean(axis=0)).T
     quadrant = np.select([(x > 0) & (y > 0), (x < 0) & (y > 0), (x < 0) & (y < 0)], [0, 1, 2], 3)

@@ -1,0 +1,161 @@
+"""The commands on synthetic data: `kinertia demo`, `kinertia study table1`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from kinertia.config import read_subject
+from kinertia.demo import Demo, run_demo
+from kinertia.results import check_folder
+from kinertia.study import CONDITIONS, Table1, measured_trial, run_table1, study_trial
+from kinertia.study_report import save_table1, table1_rows
+from kinertia.terminal import out, plain_table, shown_progress
+
+study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
+
+
+@study.callback()
+def _study() -> None:
+    """Keeps `table1` a sub-command while it is the only one."""
+
+
+def demo(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+) -> None:
+    """Show what Kinertia does; needs no files.
+
+    A synthetic person walks through a synthetic laboratory; the files it leaves are estimated from, and the estimate is
+    compared with the truth.
+
+    [bold]Example[/]
+
+    kinertia demo -o out
+    """
+    with shown_progress() as progress:
+        result = run_demo(output, progress=progress)
+    _report_demo(result, output)
+
+
+def _report_demo(result: Demo, folder: Path) -> None:
+    fit = result.fit
+    bodies = {"truth": result.truth, "literature": fit.literature, "estimate": fit.estimate}
+    trial = fit.trials[0]
+    out.print(
+        "\nA synthetic person (72.6 kg, 1.803 m) whose body differs from the literature by 10 % in masses, 10 mm in "
+        "centres of mass and 10 % in moments of inertia (standard deviations) walked over two force plates. Measured "
+        "with: skin motion that follows the joints (10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere), "
+        f"cameras 0.5 mm, plates 1 N. {len(trial.time)} frames with all ground contact on the plates were used.\n"
+    )
+    table = plain_table("segment", "", "mass\n(kg)", "CoM off by\n(mm)", "Ixx\n(kg m2)", "Iyy", "Izz")
+    for i, segment in enumerate(result.truth.segments):
+        if segment.endswith("_l"):
+            continue
+        name = segment.removesuffix("_r")
+        for source, bsp in bodies.items():
+            off = np.linalg.norm(bsp.com_m[i] - result.truth.com_m[i])
+            moments = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
+            gap = "-" if source == "truth" else f"{off * 1e3:.0f}"
+            table.add_row(name, source, f"{bsp.mass_kg[i]:.2f}", gap, *moments)
+            name = ""
+    out.print(table)
+    errors = plain_table("RMS error against the truth", "", "literature", "estimate")
+    before, after = (result.rms_errors(bsp) for bsp in (fit.literature, fit.estimate))
+    named = (
+        ("mass", "kg", ".2f", 1.0),
+        ("centre of mass", "mm", ".0f", 1e3),
+        ("moments of inertia", "kg m2", ".4f", 1.0),
+    )
+    for (what, unit, form, factor), one, other in zip(named, before, after, strict=True):
+        errors.add_row(what, unit, f"{one * factor:{form}}", f"{other * factor:{form}}")
+    out.print(errors)
+    rms = {stage: np.sqrt(np.mean(np.square(load), axis=0)) for stage, load in trial.residuals.items()}
+    out.print(
+        "residual at the pelvis, RMS: "
+        + "; ".join(f"{s} {_norm(v[:3]):.1f} N, {_norm(v[3:]):.1f} N m" for s, v in rms.items())
+        + "\n"
+    )
+    out.print(_verdict(before, after) + "\n")
+    for warning in fit.warnings:
+        out.print(f"warning: {warning}")
+    out.print(
+        f"results in {folder}, the laboratory's files in {folder / 'lab'}, truth against estimate in "
+        f"{folder / 'bsp_truth.csv'}\n"
+        f"next, with your own files: kinertia init FOLDER, then kinertia fit FOLDER/subject.toml -o out"
+    )
+
+
+def _norm(rms: np.ndarray) -> float:
+    """RMS over components of the components' RMS."""
+    return float(np.sqrt(np.mean(np.square(rms))))
+
+
+def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """What the comparison shows, by the numbers of this run."""
+    worse = sum(one < other for one, other in zip(before, after, strict=True))
+    if worse == len(before):
+        finding = "The estimate explains the forces far better, yet every class of parameters is further from the truth"
+    elif worse:
+        finding = f"The estimate explains the forces far better, yet {worse} of 3 classes of parameters are further off"
+    else:
+        return (
+            "The estimate is nearer to the truth than the literature in this run. With skin motion that is luck "
+            "rather than the rule: see docs/study.md."
+        )
+    return (
+        f"{finding} than the literature: with skin motion, small residuals do not mean right body segment parameters. "
+        "That is the finding of the study whose two-level method this is (docs/study.md); without noise the same "
+        "method finds them exactly (kinertia study table1)."
+    )
+
+
+@study.command()
+def table1(
+    repeats: Annotated[int, typer.Option(min=1, help="Independent draws of start and noise.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")] = 1,
+    trial: Annotated[
+        Path | None,
+        typer.Option(help="Subject file of a measured trial to start from; the package's walk if left out."),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+) -> None:
+    """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
+
+    [bold]Examples[/]
+
+    kinertia study table1 -o out
+
+    kinertia study table1 --repeats 3 --trial subject.toml -o out
+    """
+    check_folder(output)
+    with shown_progress() as progress:
+        if trial is None:
+            source, name = study_trial(), "synthetic walk"
+        else:
+            source, name = measured_trial(read_subject(trial), progress)
+        table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
+    _report_table1(table, source.deviation)
+    save_table1(table, output)
+    out.print(f"results in {output}: table1.json, table1.csv, table1.html, table1.png")
+
+
+def _report_table1(table: Table1, deviation: np.ndarray) -> None:
+    moved = f"{deviation[:3].max() * 1e3:.2g} mm and {np.degrees(deviation[3:]).max():.2g} degrees"
+    out.print(
+        f"\n{table.trial}; seed {table.seed}; {len(table.draws)} draws. The pelvis was moved by at most {moved} so "
+        "that the root equations hold exactly. RMS / max error: mean over the draws, spread (standard deviation), and "
+        "the published value.\n"
+    )
+    shown = plain_table("error", *(heading.replace(", ", ",\n") for heading in CONDITIONS.values()))
+    for row in table1_rows(table):
+        shown.add_row(*row)
+    out.print(shown)
+    stopped = {c: sum(not draw.converged[c] for draw in table.draws) for c in CONDITIONS}
+    for condition, count in stopped.items():
+        if count:
+            out.print(
+                f"{CONDITIONS[condition]}: {count} of {len(table.draws)} draws stopped at the limit of evaluations"
+            )

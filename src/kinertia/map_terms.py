@@ -1,0 +1,390 @@
+"""Terms of the simultaneous estimate: residuals, derivatives and normal equations of markers, root and priors.
+
+All derivatives are analytic, and come from Pinocchio's Jacobian, RNEA derivatives and joint torque regressor. Frames are
+summed knot interval by knot interval: the normal matrix is banded in the motion and bordered by what does not move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp_prior import BspPrior
+from kinertia.calibration import marker_jacobian
+from kinertia.dynamics import root_axes
+from kinertia.log_cholesky import (
+    dynamic_jacobian,
+    from_log_cholesky,
+    nearest_consistent,
+    table_jacobian,
+    to_log_cholesky,
+)
+from kinertia.motion_basis import MotionBasis
+from kinertia.skeleton import Marker, Skeleton
+from kinertia.splines import SmoothedSpline
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One trial as the estimator sees it.
+
+    Attributes:
+        time: (n,) s, uniform.
+        markers: (n, m, 3) m in the order of the skeleton's markers; NaN where not seen.
+        marker_sd: (m,) effective white deviation, m (inflated by the square root of the noise's correlation length).
+        q: (n, c) start.
+        dynamic: (n,) frames whose ground contacts are all measured.
+        plates: time -> (6 p) smoothed force and moment about the ground origin of every plate.
+        force_sd, moment_sd: effective deviations of the root residual, N and N m.
+    """
+
+    time: np.ndarray
+    markers: np.ndarray
+    marker_sd: np.ndarray
+    q: np.ndarray
+    dynamic: np.ndarray
+    plates: SmoothedSpline
+    force_sd: float
+    moment_sd: float
+
+    @property
+    def n_plates(self) -> int:
+        """Number of force plates."""
+        return len(self.plates.p) // 6
+
+
+@dataclass(frozen=True)
+class CalibrationPrior:
+    """Prior deviations of the calibration; the skeleton as it stands is the mean.
+
+    Attributes:
+        coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
+        marker_sd_m: (m,) of each marker's position in its segment, each axis.
+        plate_sd_m: of each plate's in-plane offset.
+        clock_sd_s: of the time between forces and markers.
+    """
+
+    coordinates: Mapping[str, float]
+    marker_sd_m: np.ndarray
+    plate_sd_m: float
+    clock_sd_s: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each kind of static unknown stands in the vector."""
+
+    theta: slice
+    coordinates: slice
+    locals: slice
+    plates: tuple[slice, ...]
+    clocks: tuple[int, ...]
+    size: int
+
+    @classmethod
+    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: Sequence[int]) -> Layout:
+        """The layout for these numbers of unknowns; plates per trial."""
+        at = n_bsp + n_coordinates + 3 * n_markers
+        plates, clocks = [], []
+        for count in n_plates:
+            plates.append(slice(at, at + 2 * count))
+            clocks.append(at + 2 * count)
+            at += 2 * count + 1
+        return cls(
+            slice(0, n_bsp),
+            slice(n_bsp, n_bsp + n_coordinates),
+            slice(n_bsp + n_coordinates, n_bsp + n_coordinates + 3 * n_markers),
+            tuple(plates),
+            tuple(clocks),
+            at,
+        )
+
+
+@dataclass
+class NormalEquations:
+    """Normal equations of one trial: banded (size, 6, c, c), border (size, c, S), static (S, S) and right-hand sides."""
+
+    band: np.ndarray
+    border: np.ndarray
+    static: np.ndarray
+    right: np.ndarray
+    static_right: np.ndarray
+    cost: float
+
+
+class MapProblem:
+    """Residuals and normal equations at a point."""
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        prior: BspPrior,
+        calibration: CalibrationPrior,
+        trials: Sequence[Observation],
+        spacing_s: float,
+    ) -> None:
+        self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
+        self.free = skeleton.free(calibration.coordinates)
+        names = list(self.free.coordinates)
+        self.moving = np.array([names.index(name) for name in skeleton.coordinates])
+        self.still = np.array([names.index(name) for name in calibration.coordinates], dtype=int)
+        self.segments = prior.mean.segments
+        self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
+        self.layout = Layout.of(
+            10 * len(self.segments), len(self.still), len(skeleton.markers), [trial.n_plates for trial in trials]
+        )
+        self.information = np.linalg.inv(prior.covariance)
+        self.start_static = np.zeros(self.layout.size)
+        self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
+        self.start_static[self.layout.coordinates] = [skeleton.locked[name] for name in calibration.coordinates]
+        self.start_static[self.layout.locals] = skeleton.marker_locals.ravel()
+        deviation = np.full(self.layout.size, np.inf)
+        deviation[self.layout.coordinates] = list(calibration.coordinates.values())
+        deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
+        for plates, clock in zip(self.layout.plates, self.layout.clocks, strict=True):
+            deviation[plates], deviation[clock] = calibration.plate_sd_m, calibration.clock_sd_s
+        self.weight = 1.0 / np.square(deviation)
+
+    def bsp(self, static: np.ndarray) -> BodySegmentParameters:
+        """Body segment parameters of the static unknowns."""
+        return from_log_cholesky(self.segments, static[self.layout.theta])
+
+    def placed(self, static: np.ndarray) -> Skeleton:
+        """The freed skeleton with markers where the static unknowns put them."""
+        positions = static[self.layout.locals].reshape(-1, 3)
+        markers = [Marker(m.label, m.segment, p) for m, p in zip(self.skeleton.markers, positions, strict=True)]
+        return self.free.with_markers(markers)
+
+    def shortened(self, step: np.ndarray) -> np.ndarray:
+        """The step with no logarithm (mass, second moments) changing by more than one."""
+        logs = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
+        step = step.copy()
+        step[logs] = np.clip(step[logs], -1.0, 1.0)
+        return step
+
+    def full(self, parts: Sequence[np.ndarray], static: np.ndarray) -> list[np.ndarray]:
+        """Coordinates and derivatives of the freed skeleton: the static ones do not move."""
+        result = []
+        for order, part in enumerate(parts):
+            every = np.zeros((len(part), len(self.free.coordinates)))
+            every[:, self.moving] = part
+            if order == 0:
+                every[:, self.still] = static[self.layout.coordinates]
+            result.append(every)
+        return result
+
+    def prior_terms(self, static: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Information (S, S), right-hand side (S,) and cost of all priors."""
+        bsp = self.bsp(static)
+        jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
+        gap = (bsp.table() - self.prior.mean.table()).ravel()
+        mass_row = jacobian[0::10].sum(axis=0) / self.prior.mass_sd_kg
+        mass_gap = (bsp.total_mass_kg - self.prior.mass_kg) / self.prior.mass_sd_kg
+        information = np.diag(self.weight)
+        right = -self.weight * (static - self.start_static)
+        cost = float(np.sum(self.weight * np.square(static - self.start_static)))
+        theta = self.layout.theta
+        information[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
+        right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
+        return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
+
+    def cost(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> float:
+        """Half the sum of squares."""
+        total = self.prior_terms(static)[2]
+        skeleton, bsp = self.placed(static), self.bsp(static)
+        for k, trial in enumerate(self.trials):
+            q, qd, qdd = self.full(self.bases[k].evaluate(coefficients[k]), static)
+            errors = trial.markers - skeleton.marker_positions(skeleton.pose(q))
+            total += 0.5 * float(np.nansum(np.square(errors / trial.marker_sd[:, None])))
+            frames = np.flatnonzero(trial.dynamic)
+            model = skeleton.model_with(bsp)
+            data = model.createData()
+            tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames])
+            wrench, _ = self.wrench(k, static)
+            left = (tau - _generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
+            total += 0.5 * float(np.square(left).sum())
+        return total
+
+    def root_sd(self, trial: Observation) -> np.ndarray:
+        """(6,) deviations of the root residual: N, N m."""
+        return np.repeat([trial.force_sd, trial.moment_sd], 3)
+
+    def wrench(self, k: int, static: np.ndarray, derivative: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """Sum of plates (n, 6) about the ground origin at the corrected place and time, and each plate's force (n, p, 3);
+        or their time derivatives.
+        """
+        trial = self.trials[k]
+        at = trial.time + static[self.layout.clocks[k]]
+        loads = trial.plates(at, derivative).reshape(len(trial.time), -1, 6)
+        force = loads[:, :, :3]
+        offset = np.zeros((trial.n_plates, 3))
+        offset[:, [0, 2]] = static[self.layout.plates[k]].reshape(-1, 2)
+        moment = loads[:, :, 3:] + np.cross(offset, force)
+        return np.concatenate([force.sum(axis=1), moment.sum(axis=1)], axis=1), force
+
+    def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
+        """Normal equations of trial k."""
+        trial, basis, layout = self.trials[k], self.bases[k], self.layout
+        parts = self.full(basis.evaluate(coefficients), static)
+        skeleton = self.placed(static)
+        c = len(self.moving)
+        normal = NormalEquations(
+            np.zeros((basis.size, 6, c, c)),
+            np.zeros((basis.size, c, layout.size)),
+            np.zeros((layout.size, layout.size)),
+            np.zeros((basis.size, c)),
+            np.zeros(layout.size),
+            0.0,
+        )
+        marker = self._marker_terms(trial, skeleton, parts[0])
+        root = self._root_terms(k, skeleton, parts, static)
+        _assemble(normal, basis, marker, root)
+        return normal
+
+    def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Per frame J^T J (n, c, c), J^T S (n, c, S), J^T r (n, c); and S^T S (S, S), S^T r (S,), r^T r."""
+        n, m = trial.markers.shape[:2]
+        pose = skeleton.pose(q)
+        weight = 1.0 / trial.marker_sd[None, :, None]
+        error = (trial.markers - skeleton.marker_positions(pose)) * weight
+        seen = np.isfinite(error)
+        error = np.where(seen, error, 0.0)
+        jacobian = marker_jacobian(skeleton, pose) * (weight * seen)[..., None]
+        turned = pose.rotation[:, skeleton.marker_segments] * (weight * seen)[..., None]
+        moving = jacobian[..., self.moving].reshape(n, 3 * m, -1)
+        still = jacobian[..., self.still].reshape(n, 3 * m, -1)
+        transposed = moving.transpose(0, 2, 1)
+        across = np.zeros((n, moving.shape[-1], self.layout.size))
+        across[:, :, self.layout.coordinates] = transposed @ still
+        by_marker = jacobian[..., self.moving].transpose(0, 1, 3, 2) @ turned
+        across[:, :, self.layout.locals] = by_marker.transpose(0, 2, 1, 3).reshape(n, -1, 3 * m)
+        gradient = (transposed @ error.reshape(n, -1, 1))[..., 0]
+        static = np.zeros((self.layout.size, self.layout.size))
+        at, of = self.layout.locals, self.layout.coordinates
+        flat = still.reshape(n * 3 * m, -1) if still.size else np.zeros((n * 3 * m, 0))
+        static[of, of] = flat.T @ flat
+        own = np.einsum("nmij,nmik->mjk", turned, turned)
+        for i in range(m):
+            block = slice(at.start + 3 * i, at.start + 3 * i + 3)
+            static[block, block] = own[i]
+        mixed = np.einsum("nmik,nmij->kmj", jacobian[..., self.still], turned).reshape(-1, 3 * m)
+        static[of, at], static[at, of] = mixed, mixed.T
+        right = np.zeros(self.layout.size)
+        right[of] = flat.T @ error.ravel()
+        right[at] = np.einsum("nmij,nmi->mj", turned, error).ravel()
+        return transposed @ moving, across, gradient, static, right, float(np.square(error).sum())
+
+    def _root_terms(
+        self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, S), residual."""
+        trial, layout = self.trials[k], self.layout
+        frames = np.flatnonzero(trial.dynamic)
+        q, qd, qdd = (part[frames] for part in parts)
+        bsp = self.bsp(static)
+        model = skeleton.model_with(bsp)
+        data, bare, bare_data = model.createData(), skeleton.model, skeleton.model.createData()
+        joints, place = skeleton.placement_of_parameters(self.segments)
+        columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
+        d, cf = len(frames), q.shape[1]
+        dq, dv, da = np.empty((d, 6, cf)), np.empty((d, 6, cf)), np.empty((d, 6, cf))
+        tau, regressor = np.empty((d, 6)), np.empty((d, 6, len(columns)))
+        for i in range(d):
+            pin.computeRNEADerivatives(model, data, q[i], qd[i], qdd[i])
+            tau[i] = data.tau[:6]
+            dq[i], dv[i], da[i] = data.dtau_dq[:6], data.dtau_dv[:6], data.M[:6]
+            regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, q[i], qd[i], qdd[i])[:6, columns]
+        square = da[:, :, :6]
+        da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
+        wrench, force = (part[frames] for part in self.wrench(k, static))
+        dq[:, :, :6] -= _generalised_derivative(q[:, :6], wrench)
+        by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
+        by_static = np.zeros((d, 6, layout.size))
+        chain = dynamic_jacobian(static[layout.theta])
+        by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, -1)
+        by_static[:, :, layout.coordinates] = dq[:, :, self.still]
+        for plate in range(trial.n_plates):
+            for j, axis in enumerate(np.eye(3)[[0, 2]]):
+                moment = np.concatenate([np.zeros((d, 3)), np.cross(axis, force[:, plate])], axis=1)
+                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -_generalised(
+                    np.hstack([np.zeros((d, 3)), q[:, 3:6]]), moment
+                )
+        rates = self.wrench(k, static, 1)[0][frames]
+        by_static[:, :, layout.clocks[k]] = -_generalised(q[:, :6], rates)
+        sd = self.root_sd(trial)[None, :, None]
+        left = (tau - _generalised(q[:, :6], wrench)) / sd[..., 0]
+        return (
+            frames,
+            dq[..., self.moving] / sd,
+            dv[..., self.moving] / sd,
+            da[..., self.moving] / sd,
+            by_static / sd,
+            left,
+        )
+
+
+def block_diagonal(blocks: np.ndarray) -> np.ndarray:
+    """(s k, s k) matrix of the blocks (s, k, k)."""
+    s, k, _ = blocks.shape
+    result = np.zeros((s, k, s, k))
+    result[np.arange(s), :, np.arange(s), :] = blocks
+    return result.reshape(s * k, s * k)
+
+
+def _generalised(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """Root generalised force (n, 6) of a wrench about the ground origin."""
+    moment = wrench[:, 3:] - np.cross(root[:, :3], wrench[:, :3])
+    return np.concatenate([wrench[:, :3], np.einsum("nij,ni->nj", root_axes(root), moment)], axis=1)
+
+
+def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """(n, 6, 6) derivative of `_generalised` with respect to the root coordinates."""
+    axes = root_axes(root)
+    moment = wrench[:, 3:] - np.cross(root[:, :3], wrench[:, :3])
+    result = np.zeros((len(root), 6, 6))
+    for i, unit in enumerate(np.eye(3)):
+        result[:, 3:, i] = -np.einsum("nij,ni->nj", axes, np.cross(unit, wrench[:, :3]))
+    for later in range(3):
+        for earlier in range(later):
+            turned = np.cross(axes[:, :, earlier], axes[:, :, later])
+            result[:, 3 + later, 3 + earlier] = np.einsum("ni,ni->n", turned, moment)
+    return result
+
+
+def _assemble(
+    normal: NormalEquations, basis: MotionBasis, marker: tuple[np.ndarray, ...], root: tuple[np.ndarray, ...]
+) -> None:
+    """Sum the terms of all frames into the normal equations, one knot interval at a time."""
+    per_frame, across, gradient, static, right, square = marker
+    frames, dq, dv, da, by_static, left = root
+    c, size = per_frame.shape[1], normal.static.shape[0]
+    flat = by_static.reshape(-1, size)
+    normal.static += static + flat.T @ flat
+    normal.static_right += right - flat.T @ left.ravel()
+    normal.cost = 0.5 * (square + float(np.square(left).sum()))
+    values = basis.values
+    for first in np.unique(basis.first):
+        here = np.flatnonzero(basis.first == first)
+        weight = values[0, here]
+        pairs = (weight[:, :, None] * weight[:, None]).reshape(len(here), 36)
+        block = (pairs.T @ per_frame[here].reshape(len(here), -1)).reshape(6, 6, c, c)
+        border = (weight.T @ across[here].reshape(len(here), -1)).reshape(6, c, size)
+        up = weight.T @ gradient[here]
+        rows = np.flatnonzero(np.isin(frames, here, assume_unique=True))
+        if rows.size:
+            at = frames[rows]
+            x = sum(
+                values[order, at][:, None, :, None] * part[rows][:, :, None] for order, part in enumerate((dq, dv, da))
+            )
+            x = x.reshape(len(rows) * 6, 6 * c)
+            block += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
+            border += (x.T @ by_static[rows].reshape(-1, size)).reshape(6, c, size)
+            up -= (x.T @ left[rows].ravel()).reshape(6, c)
+        normal.border[first : first + 6] += border
+        normal.right[first : first + 6] += up
+        for a in range(6):
+            normal.band[first + a, : 6 - a] += block[a, a:]

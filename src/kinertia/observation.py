@@ -1,0 +1,128 @@
+"""What the simultaneous estimate sees of a measured trial: its frames, its smoothed loads, and how noisy its markers
+are.
+
+Marker noise is not white (DESIGN section 6): skin motion lasts for many frames. Its deviation and correlation length
+are read from the errors that inverse kinematics leaves, and the deviation is inflated by the square root of the number
+of frames over which errors are alike. Inverse kinematics absorbs part of the noise; the deviation makes up for its
+degrees of freedom only on average.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.kinematics import Kinematics
+from kinertia.map_terms import Observation
+from kinertia.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.splines import smooth
+
+CUTOFF_HZ = 10.0
+"""Bandwidth where the user leaves the cutoff to cross-validation, which correlated noise deceives."""
+AROUND_WINDOW_S = 0.25
+"""Frames this near the measured window contribute their markers."""
+FORCE_SD_OF_WEIGHT = 0.005
+"""Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
+MOMENT_ARM_M = 0.3
+"""Deviation of the root moment over that of the force."""
+SMALLEST_MARKER_SD_M = 0.001
+_WANDERING = 3.0
+
+
+@dataclass(frozen=True)
+class MarkerNoise:
+    """Errors of the markers of one trial.
+
+    Attributes:
+        sd_m: per label, deviation of one coordinate in one frame, m.
+        correlation_s: time over which errors are alike.
+        wandering: labels whose deviation is more than three times the usual; they count accordingly less.
+    """
+
+    sd_m: Mapping[str, float]
+    correlation_s: float
+    wandering: tuple[str, ...]
+
+
+def observe(
+    skeleton: Skeleton, kinematics: Kinematics, mass_kg: float, cutoff_hz: float
+) -> tuple[Observation, MarkerNoise]:
+    """The observation of one trial and the noise of its markers.
+
+    Args:
+        skeleton: with exactly the markers to use, in the order of the observation; a trial may lack some.
+        kinematics: of the trial.
+        mass_kg: for the size of force errors.
+        cutoff_hz: bandwidth of the forces.
+    """
+    time = kinematics.trial.markers.time
+    start, end = kinematics.window_s
+    near = (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
+    frames = np.flatnonzero(near & np.isfinite(kinematics.ik.q).any(axis=1))
+    q = kinematics.ik.q[frames]
+    measured = _measured(skeleton, kinematics, frames)
+    known = np.where(np.isfinite(q), q, kinematics.spline(time[frames]))
+    errors = measured - skeleton.marker_positions(skeleton.pose(known))
+    noise, effective = _noise(skeleton, errors, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
+    loads = kinematics.trial.loads
+    inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
+    columns = np.concatenate([loads.force, loads.moment], axis=-1)[inside].reshape(-1, 12)
+    # within the band, neighbouring frames repeat one another
+    repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
+    force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
+    return (
+        Observation(
+            time=time[frames],
+            markers=measured,
+            marker_sd=effective,
+            q=q,
+            dynamic=(time[frames] >= start - 1e-9) & (time[frames] <= end + 1e-9),
+            plates=smooth(loads.time[inside], columns, cutoff_hz),
+            force_sd=force_sd,
+            moment_sd=MOMENT_ARM_M * force_sd,
+        ),
+        noise,
+    )
+
+
+def _measured(skeleton: Skeleton, kinematics: Kinematics, frames: np.ndarray) -> np.ndarray:
+    markers = kinematics.trial.markers
+    positions = np.full((len(frames), len(skeleton.markers), 3), np.nan)
+    for i, label in enumerate(skeleton.labels):
+        if label in markers.labels:
+            positions[:, i] = markers.positions[frames, markers.labels.index(label)]
+    return positions
+
+
+def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float) -> tuple[MarkerNoise, np.ndarray]:
+    """Noise of the markers and their effective white deviations (m,), from errors (n, m, 3)."""
+    seen = np.isfinite(errors)
+    filled = np.where(seen, errors, 0.0)
+    count = np.maximum(seen.sum(axis=(0, 2)), 1)
+    per_frame = seen.sum() / len(errors)
+    lost = np.sqrt(per_frame / max(per_frame - unknowns, 1.0))
+    sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
+    frames = _correlation_frames(filled.reshape(len(errors), -1))
+    usual = float(np.median(sd))
+    labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
+    deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
+    noise = MarkerNoise(
+        {label: deviations[label] for label in labels},
+        frames / rate_hz,
+        tuple(label for label in labels if deviations[label] > _WANDERING * usual),
+    )
+    return noise, sd * np.sqrt(frames)
+
+
+def _correlation_frames(errors: np.ndarray) -> float:
+    """Integrated autocorrelation of the columns (n, k), in frames: 1 for white noise."""
+    power = np.square(errors).sum()
+    total = 1.0
+    for lag in range(1, len(errors) // 2):
+        alike = float((errors[lag:] * errors[:-lag]).sum() / power) if power > 0 else 0.0
+        if alike < 0.05:
+            break
+        total += 2.0 * alike
+    return total

@@ -1,0 +1,163 @@
+"""The simultaneous estimate on measured trials of one person: priors, observations, outcome in the user's terms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.bsp_prior import BspPrior, literature_prior
+from kinertia.dynamics import Motion
+from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.kinematics import Kinematics
+from kinertia.map_terms import CalibrationPrior
+from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
+from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
+from kinertia.skeleton import Skeleton
+
+JOINT_CENTRE_SD_M = 0.010
+MARKER_SD_M = 0.005
+"""The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
+PLATE_SD_M = 0.005
+CLOCK_SD_S = 0.005
+_NOTABLE = 2.0
+_CONTRADICTION = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What the simultaneous estimate says beyond the estimate itself.
+
+    Attributes:
+        prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
+        covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
+        calibration: per quantity its value, prior and posterior deviation, and unit.
+        marker_noise: per trial.
+        iterations: Gauss-Newton steps.
+    """
+
+    prior_sd: np.ndarray
+    sd: np.ndarray
+    covariance: np.ndarray
+    calibration: Mapping[str, Mapping[str, float | str]]
+    marker_noise: tuple[MarkerNoise, ...]
+    iterations: int
+
+    @property
+    def information(self) -> np.ndarray:
+        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything."""
+        return 1.0 - np.square(self.sd / self.prior_sd)
+
+
+@dataclass(frozen=True, eq=False)
+class SimultaneousFit:
+    """Outcome of `fit_simultaneous`.
+
+    Attributes:
+        result: of the estimator.
+        posterior: deviations and calibration.
+        motions: per trial, at the frames of its measured window.
+        foot_loads: per trial (w, 2, 6) at the corrected place and time.
+        warnings: one sentence each.
+    """
+
+    result: SimultaneousResult
+    posterior: Posterior
+    motions: tuple[Motion, ...]
+    foot_loads: tuple[np.ndarray, ...]
+    warnings: tuple[str, ...]
+
+
+def fit_simultaneous(
+    skeleton: Skeleton,
+    literature: BodySegmentParameters,
+    trials: Sequence[Kinematics],
+    cutoff_hz: float | str,
+) -> SimultaneousFit:
+    """Estimate motion, BSPs and calibration of all trials together, with the literature as the prior.
+
+    Args:
+        skeleton: calibrated.
+        literature: body segment parameters whose total mass is the scale's.
+        trials: kinematics of the trials.
+        cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
+    """
+    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    shown = {label for k in trials for label in k.ik.labels}
+    used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
+    prior = literature_prior(literature)
+    seen = [observe(used, k, literature.total_mass_kg, cutoff) for k in trials]
+    centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
+    calibration = CalibrationPrior(
+        dict.fromkeys(centres, JOINT_CENTRE_SD_M), np.full(len(used.markers), MARKER_SD_M), PLATE_SD_M, CLOCK_SD_S
+    )
+    result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
+    motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
+    loads = tuple(
+        _corrected(o.plates, k.time, result.plate_offsets_m[i][0], result.clock_s[i][0])
+        for i, (k, (o, _)) in enumerate(zip(trials, seen, strict=True))
+    )
+    posterior = Posterior(
+        prior.sd,
+        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
+        result.bsp_covariance,
+        _calibration(used, result, [k.trial.name for k in trials]),
+        tuple(noise for _, noise in seen),
+        result.iterations,
+    )
+    return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
+
+
+def _corrected(plates, time: np.ndarray, offsets: np.ndarray, clock_s: float) -> np.ndarray:  # noqa: ANN001
+    """(w, p, 6) loads at the corrected place and time."""
+    loads = plates(time + clock_s).reshape(len(time), -1, 6)
+    shift = np.zeros((loads.shape[1], 3))
+    shift[:, [0, 2]] = offsets
+    loads[:, :, 3:] += np.cross(shift, loads[:, :, :3])
+    return loads
+
+
+def _calibration(
+    skeleton: Skeleton, result: SimultaneousResult, names: Sequence[str]
+) -> dict[str, dict[str, float | str]]:
+    found: dict[str, dict[str, float | str]] = {}
+    for name, (value, sd) in result.coordinates.items():
+        change = value - skeleton.locked[name]
+        found[name] = {"value": change, "prior_sd": JOINT_CENTRE_SD_M, "sd": sd, "unit": "m"}
+    for trial, (offsets, sds), (clock, clock_sd) in zip(names, result.plate_offsets_m, result.clock_s, strict=True):
+        for foot, offset, sd in zip(("right", "left"), offsets, sds, strict=True):
+            for axis, value, deviation in zip("xz", offset, sd, strict=True):
+                key = f"{trial}: loads under the {foot} foot, {axis}"
+                found[key] = {"value": float(value), "prior_sd": PLATE_SD_M, "sd": float(deviation), "unit": "m"}
+        found[f"{trial}: forces late by"] = {"value": clock, "prior_sd": CLOCK_SD_S, "sd": clock_sd, "unit": "s"}
+    return found
+
+
+def _warnings(
+    prior: BspPrior, result: SimultaneousResult, posterior: Posterior, trials: Sequence[Kinematics]
+) -> list[str]:
+    found = []
+    if not result.converged:
+        found.append(
+            f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
+        )
+    for name, told in posterior.calibration.items():
+        value, sd = float(told["value"]), float(told["prior_sd"])
+        if ":" in name and abs(value) > _NOTABLE * sd:
+            unit = "mm" if told["unit"] == "m" else "ms"
+            found.append(
+                f"{name}: {value * 1e3:+.1f} {unit} (expected within {sd * 1e3:.0f} {unit}); check the instruments"
+            )
+    for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
+        if noise.wandering:
+            listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
+            found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
+    away = (result.bsp.table() - prior.mean.table()) / prior.sd
+    for i, k in np.argwhere(np.abs(away) > _CONTRADICTION):
+        found.append(
+            f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
+            f"deviations from the literature; a wrong joint, plate or marker is likelier than an odd person"
+        )
+    return found
