@@ -182,16 +182,11 @@ def test_consistent_segments_have_no_inconsistencies() -> None:
         ),
         (
             one_segment(1.0, [2, 2, 2], (1.5, 0, 0)),
-            [
-                "shank_r: ixy, ixz, iyz are too large: triangle inequality of the principal moments violated "
-                "by 1 kg m2."
-            ],
+            ["shank_r: ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by 1 kg m2."],
         ),
     ],
 )
-def test_inconsistencies_name_segment_condition_and_amount(
-    bsp: BodySegmentParameters, sentences: list[str]
-) -> None:
+def test_inconsistencies_name_segment_condition_and_amount(bsp: BodySegmentParameters, sentences: list[str]) -> None:
     assert bsp.inconsistencies() == sentences
     assert not bsp.physically_consistent().any()
     assert np.linalg.eigvalsh(bsp.pseudo_inertia()[0])[0] <= 1e-12
@@ -251,10 +246,7 @@ def test_jacobian_against_finite_differences(symmetric: bool) -> None:
     theta = vector.values(random_bsp(seed=2))
     step = 1e-6 * np.eye(len(theta))
     numeric = np.column_stack(
-        [
-            (vector.bsp(theta + h).dynamic_parameters() - vector.bsp(theta - h).dynamic_parameters()) / 2e-6
-            for h in step
-        ]
+        [(vector.bsp(theta + h).dynamic_parameters() - vector.bsp(theta - h).dynamic_parameters()) / 2e-6 for h in step]
     )
     np.testing.assert_allclose(vector.jacobian(theta), numeric, rtol=1e-7, atol=1e-7)
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.checks import complete_subject, fit_warnings, mass_from_force_kg
+from kinertia.checks import complete_subject, fit_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.config import Subject
 from kinertia.errors import SubjectError
 from kinertia.trial import Markers, Recording
@@ -66,7 +66,7 @@ def test_mass_by_force_knows_the_movement_of_the_body(short_fit):
 def warned(fit, mass_kg=None, **changes):
     result = SimpleNamespace(**{"bsp": fit.literature, "converged": True, "evaluations": 7, **changes})
     mass = mass_from_force_kg(fit.literature, fit.trials[0]) if mass_kg is None else mass_kg
-    return fit_warnings(mass, fit.literature, result, fit.trials[:1])
+    return fit_warnings(mass, fit.literature, result.bsp, fit.trials[:1]) + two_level_warnings(result)
 
 
 def test_warnings_come_one_by_one(short_fit):

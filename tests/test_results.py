@@ -8,7 +8,8 @@ import pytest
 
 from kinertia.config import Settings
 from kinertia.errors import FileError
-from kinertia.results import check_folder, save_fit, summary
+from kinertia.io.folder import check_folder
+from kinertia.results import save_fit, summary
 
 STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {

@@ -201,9 +201,7 @@ def test_smoothing_is_linear_in_the_data(seed, a, b, cutoff):
     rng = np.random.default_rng(seed)
     time, x, y = irregular(40, seed), rng.standard_normal(40), rng.standard_normal(40)
     combined = smooth(time, a * x + b * y, cutoff)(time)
-    assert_allclose(
-        combined, a * smooth(time, x, cutoff)(time) + b * smooth(time, y, cutoff)(time), atol=1e-8
-    )
+    assert_allclose(combined, a * smooth(time, x, cutoff)(time) + b * smooth(time, y, cutoff)(time), atol=1e-8)
 
 
 @settings(max_examples=30, deadline=None)

@@ -94,9 +94,9 @@ def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> fl
 
 
 def fit_warnings(
-    mass_kg: float, literature: BodySegmentParameters, result: TwoLevelResult, trials: Sequence[TrialFit]
+    mass_kg: float, literature: BodySegmentParameters, estimate: BodySegmentParameters, trials: Sequence[TrialFit]
 ) -> list[str]:
-    """What the user should know before using the numbers."""
+    """What the user should know before using the numbers, whatever the estimator."""
     found = []
     for trial in trials:
         by_force = mass_from_force_kg(literature, trial)
@@ -105,32 +105,36 @@ def fit_warnings(
                 f"{trial.name}: the mean vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg "
                 f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
             )
+    total = estimate.total_mass_kg
+    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
+        found.append(
+            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
+            f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
+        )
+    moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
+    worst = int(np.argmax(moved))
+    if moved[worst] > 0.1:
+        found.append(
+            f"the estimate contradicts the literature: the centre of mass of {estimate.segments[worst]} "
+            f"moved by {moved[worst] * 1e3:.0f} mm"
+        )
+    return found
+
+
+def two_level_warnings(result: TwoLevelResult) -> list[str]:
+    """What the user should know of a two-level estimate: not converged, or physically impossible."""
+    found = []
     if not result.converged:
         found.append(
             f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is "
             f"reported"
         )
-    total = result.bsp.total_mass_kg
-    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
-        found.append(
-            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
-            f"({100 * (total / mass_kg - 1):+.1f} %): the two-level estimate leaves the total mass free, and it "
-            f"follows the plates' gain and the noise of the motion"
-        )
-    impossible = result.bsp.inconsistencies()
-    if impossible:
-        consistent = result.bsp.physically_consistent()
+    consistent = result.bsp.physically_consistent()
+    if not consistent.all():
         names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
         found.append(
             f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
             f"({', '.join(names)}): it explains the forces, but skin-motion noise decides single parameters; "
             f"do not use them as this person's"
-        )
-    moved = np.linalg.norm(result.bsp.com_m - literature.com_m, axis=1)
-    worst = int(np.argmax(moved))
-    if moved[worst] > 0.1:
-        found.append(
-            f"the estimate contradicts the literature: the centre of mass of {result.bsp.segments[worst]} "
-            f"moved by {moved[worst] * 1e3:.0f} mm"
         )
     return found

@@ -16,7 +16,8 @@ from kinertia.config import SubjectFile, read_subject, subject_from_options, wit
 from kinertia.errors import FileError, KinertiaError
 from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
-from kinertia.results import check_folder, save_fit, summary
+from kinertia.io.folder import check_folder
+from kinertia.results import save_fit, summary
 from kinertia.subject_draft import init_subject
 from kinertia.terminal import err, out, plain_table, shown_progress
 

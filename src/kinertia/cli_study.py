@@ -10,7 +10,7 @@ import typer
 
 from kinertia.config import read_subject
 from kinertia.demo import Demo, run_demo
-from kinertia.results import check_folder
+from kinertia.io.folder import check_folder
 from kinertia.study import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress

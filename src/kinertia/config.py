@@ -151,7 +151,9 @@ class TrialFiles(Table):
 class Settings(Table):
     """How to estimate."""
 
-    method: Literal["two-level"] = Field(default="two-level", description='estimator: "two-level"')
+    method: Literal["two-level", "simultaneous"] = Field(
+        default="two-level", description='estimator: "two-level" (the study\'s) or "simultaneous"'
+    )
     bsp: Literal["dumas", "deleva"] = Field(default="dumas", description='first guess: "dumas" or "deleva"')
     symmetry: bool = Field(default=True, description="true: left mirrors right, 49 parameters; false: 84")
     cutoff_hz: Cutoff = Field(default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz')

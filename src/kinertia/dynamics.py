@@ -29,7 +29,7 @@ class Motion:
         pairs = ((q, self.q), (qd, self.qd), (qdd, self.qdd))
         return Motion(*(np.hstack([root, every[:, 6:]]) for root, every in pairs))
 
-    def cut(self, frames: slice) -> Motion:
+    def cut(self, frames: slice | np.ndarray) -> Motion:
         """The motion at these frames."""
         return Motion(self.q[frames], self.qd[frames], self.qdd[frames])
 

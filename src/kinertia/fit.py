@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
 from kinertia.calibration import adapt, hold_uninformed, sampled
-from kinertia.checks import check_visible, complete_subject, fit_warnings, known
+from kinertia.checks import check_visible, complete_subject, fit_warnings, known, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
@@ -23,9 +23,10 @@ from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Ga
 from kinertia.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.labels import check_labels
 from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set
+from kinertia.simultaneous_fit import Posterior, fit_simultaneous
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording, Trial
-from kinertia.two_level import TwoLevelResult, Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.two_level import Window, correct_pelvis, estimate_two_level, stretches
 
 _LOWER_BODY_SD_M = 0.01
 _UPPER_BODY_SD_M = 0.04
@@ -84,6 +85,7 @@ class Fit:
         literature, estimate: body segment parameters before and after.
         trials: one entry per trial.
         converged: whether the estimator met its criterion.
+        posterior: error bars and calibration; None after two-level, which has none.
         warnings: what the user should know before using the numbers; one sentence each.
         notes: assumptions made on the way; one sentence each.
     """
@@ -95,14 +97,22 @@ class Fit:
     estimate: BodySegmentParameters
     trials: tuple[TrialFit, ...]
     converged: bool
+    posterior: Posterior | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
     @cached_property
     def bsp(self) -> pd.DataFrame:
-        """One row per segment and parameter: segment, parameter, unit, literature, estimate."""
+        """One row per segment and parameter: segment, parameter, unit, literature, estimate.
+
+        The simultaneous estimate adds prior_sd, sd (deviations before and after) and information.
+        """
         table = self.literature.to_frame().rename(columns={"value": "literature"})
-        return table.assign(estimate=self.estimate.to_frame()["value"])
+        table = table.assign(estimate=self.estimate.to_frame()["value"])
+        if self.posterior is None:
+            return table
+        told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
+        return table.assign(**told)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,17 +215,22 @@ def _estimate(
     progress: Progress,
 ) -> Fit:
     ready = prepare(subject, static, inputs, settings, marker_set, progress)
-    started = time.perf_counter()
-    result, trials = _two_level(ready, settings, started, progress)
-    warnings = ready.warnings + tuple(fit_warnings(known(ready.subject.mass_kg), ready.literature, result, trials))
+    estimator = _two_level if settings.method == "two-level" else _simultaneous
+    outcome = estimator(ready, settings, time.perf_counter(), progress)
+    warnings = (
+        *ready.warnings,
+        *outcome.warnings,
+        *fit_warnings(known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials),
+    )
     return Fit(
         subject=ready.subject,
         settings=settings,
-        skeleton=ready.skeleton,
+        skeleton=outcome.skeleton,
         literature=ready.literature,
-        estimate=result.bsp,
-        trials=trials,
-        converged=result.converged,
+        estimate=outcome.bsp,
+        trials=outcome.trials,
+        converged=outcome.converged,
+        posterior=outcome.posterior,
         warnings=tuple(dict.fromkeys(warnings)),
         notes=ready.notes,
     )
@@ -296,43 +311,83 @@ def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
     return replace(trial.rotated(rotation), notes=(*trial.notes, note)), angle
 
 
-def _two_level(
-    ready: Prepared, settings: Settings, started: float, progress: Progress
-) -> tuple[TwoLevelResult, tuple[TrialFit, ...]]:
-    skeleton, literature, kinematics = ready.skeleton, ready.literature, ready.kinematics
-    windows = [Window(k.time, k.motion, k.foot_loads.sum(axis=1)) for k in kinematics]
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """What an estimator makes of a prepared person."""
+
+    skeleton: Skeleton
+    bsp: BodySegmentParameters
+    trials: tuple[TrialFit, ...]
+    converged: bool
+    posterior: Posterior | None
+    warnings: tuple[str, ...]
+
+
+def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+    windows = [_window(k) for k in ready.kinematics]
     cut = [stretches(window) for window in windows]
     result = estimate_two_level(
-        skeleton,
-        literature,
+        ready.skeleton,
+        ready.literature,
         [part for parts in cut for part in parts],
         symmetric=settings.symmetry,
         progress=lambda share: progress("estimate", share),
     )
-    spent = (time.perf_counter() - started) / sum(len(window.time) for window in windows)
-    motions, trials = iter(result.motions), []
-    for k, window, parts, before in zip(kinematics, windows, cut, ready.seconds, strict=True):
-        motion = joined([next(motions) for _ in parts])
-        corrected = joined([correct_pelvis(skeleton, literature, part) for part in parts])
+    motions = iter(result.motions)
+    estimates = [
+        (joined([next(motions) for _ in parts]), k.foot_loads) for k, parts in zip(ready.kinematics, cut, strict=True)
+    ]
+    trials = _trial_fits(ready, ready.skeleton, result.bsp, estimates, started)
+    warnings = two_level_warnings(result)
+    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
+
+
+def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+    progress("estimate", 0.0)
+    fitted = fit_simultaneous(ready.skeleton, ready.literature, ready.kinematics, settings.cutoff_hz)
+    bsp, skeleton = fitted.result.bsp, fitted.result.skeleton
+    estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
+    trials = _trial_fits(ready, skeleton, bsp, estimates, started)
+    return _Outcome(skeleton, bsp, trials, fitted.result.converged, fitted.posterior, fitted.warnings)
+
+
+def _trial_fits(
+    ready: Prepared,
+    skeleton: Skeleton,
+    bsp: BodySegmentParameters,
+    estimates: Sequence[tuple[Motion, np.ndarray]],
+    started: float,
+) -> tuple[TrialFit, ...]:
+    """Every trial before and after; `estimates` holds its motion and its foot loads (w, 2, 6) as estimated."""
+    spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
+    before, literature = ready.skeleton, ready.literature
+    trials = []
+    for k, seconds, (motion, loads) in zip(ready.kinematics, ready.seconds, estimates, strict=True):
+        window = _window(k)
+        corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
         residuals = {
-            "literature": residual(skeleton, literature, window.motion, window.wrench),
-            "corrected": residual(skeleton, literature, corrected, window.wrench),
-            "estimate": residual(skeleton, result.bsp, motion, window.wrench),
+            "literature": residual(before, literature, window.motion, window.wrench),
+            "corrected": residual(before, literature, corrected, window.wrench),
+            "estimate": residual(skeleton, bsp, motion, loads.sum(axis=1)),
         }
         moments = {
-            "literature": inverse_dynamics(skeleton, literature, window.motion, k.foot_loads),
-            "estimate": inverse_dynamics(skeleton, result.bsp, motion, k.foot_loads),
+            "literature": inverse_dynamics(before, literature, window.motion, k.foot_loads),
+            "estimate": inverse_dynamics(skeleton, bsp, motion, loads),
         }
         errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
-        timing = {**before, "estimate": spent * len(window.time)}
+        timing = {**seconds, "estimate": spent * len(k.time)}
         timing["total"] = sum(timing.values())
         trials.append(TrialFit(k, motion, residuals, moments, errors, timing))
-    return result, tuple(trials)
+    return tuple(trials)
+
+
+def _window(kinematics: Kinematics) -> Window:
+    return Window(kinematics.time, kinematics.motion, kinematics.foot_loads.sum(axis=1))
 
 
 def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -> np.ndarray:
     labels = kinematics.ik.labels
     used = skeleton.with_markers([m for m in skeleton.markers if m.label in labels])
     modelled = used.marker_positions(used.pose(motion.q))
-    measured = kinematics.trial.markers.select(labels).positions[kinematics.frames]
+    measured = kinematics.trial.markers.select(used.labels).positions[kinematics.frames]
     return np.linalg.norm(measured - modelled, axis=-1)

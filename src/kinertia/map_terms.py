@@ -1,13 +1,14 @@
 """Terms of the simultaneous estimate: residuals, derivatives and normal equations of markers, root and priors.
 
-All derivatives are analytic, and come from Pinocchio's Jacobian, RNEA derivatives and joint torque regressor. Frames are
-summed knot interval by knot interval: the normal matrix is banded in the motion and bordered by what does not move.
+All derivatives are analytic, and come from Pinocchio's Jacobian, RNEA derivatives and joint torque regressor. Frames
+are summed knot interval by knot interval: the normal matrix is banded in the motion and bordered by what does not move.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -106,7 +107,7 @@ class Layout:
 
 @dataclass
 class NormalEquations:
-    """Normal equations of one trial: banded (size, 6, c, c), border (size, c, S), static (S, S) and right-hand sides."""
+    """Normal equations of a trial: band (size, 6, c, c), border (size, c, S), static (S, S), right-hand sides."""
 
     band: np.ndarray
     border: np.ndarray
@@ -214,8 +215,8 @@ class MapProblem:
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
     def wrench(self, k: int, static: np.ndarray, derivative: int = 0) -> tuple[np.ndarray, np.ndarray]:
-        """Sum of plates (n, 6) about the ground origin at the corrected place and time, and each plate's force (n, p, 3);
-        or their time derivatives.
+        """Sum of plates (n, 6) about the ground origin at the corrected place and time, and each plate's force
+        (n, p, 3); or their time derivatives.
         """
         trial = self.trials[k]
         at = trial.time + static[self.layout.clocks[k]]
@@ -245,7 +246,7 @@ class MapProblem:
         _assemble(normal, basis, marker, root)
         return normal
 
-    def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[Any, ...]:
         """Per frame J^T J (n, c, c), J^T S (n, c, S), J^T r (n, c); and S^T S (S, S), S^T r (S,), r^T r."""
         n, m = trial.markers.shape[:2]
         pose = skeleton.pose(q)
@@ -356,7 +357,7 @@ def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
 
 
 def _assemble(
-    normal: NormalEquations, basis: MotionBasis, marker: tuple[np.ndarray, ...], root: tuple[np.ndarray, ...]
+    normal: NormalEquations, basis: MotionBasis, marker: tuple[Any, ...], root: tuple[np.ndarray, ...]
 ) -> None:
     """Sum the terms of all frames into the normal equations, one knot interval at a time."""
     per_frame, across, gradient, static, right, square = marker
@@ -377,10 +378,10 @@ def _assemble(
         rows = np.flatnonzero(np.isin(frames, here, assume_unique=True))
         if rows.size:
             at = frames[rows]
-            x = sum(
+            parts = [
                 values[order, at][:, None, :, None] * part[rows][:, :, None] for order, part in enumerate((dq, dv, da))
-            )
-            x = x.reshape(len(rows) * 6, 6 * c)
+            ]
+            x = np.sum(parts, axis=0).reshape(len(rows) * 6, 6 * c)
             block += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
             border += (x.T @ by_static[rows].reshape(-1, size)).reshape(6, c, size)
             up -= (x.T @ left[rows].ravel()).reshape(6, c)

@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,28 +16,11 @@ import pandas as pd
 
 from kinertia import __version__
 from kinertia.checks import mass_from_force_kg
-from kinertia.errors import FileError
 from kinertia.fit import Fit, TrialFit
+from kinertia.io.folder import complete_folder
 from kinertia.io.sto import write_sto
 
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
-
-
-def check_folder(folder: str | Path) -> None:
-    """Raise FileError unless results can be written to `folder`, which need not exist yet.
-
-    Worth calling before a long computation.
-    """
-    existing = _existing(Path(folder))
-    if not existing.is_dir():
-        raise FileError(existing, "is a file; give a folder for the results")
-    if not os.access(existing, os.W_OK):
-        raise FileError(existing, "cannot be written to; give another folder for the results")
-
-
-def _existing(folder: Path) -> Path:
-    """The folder itself, or the nearest one above it that exists."""
-    return next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
 
 
 def save_fit(fit: Fit, folder: str | Path) -> Path:
@@ -51,24 +31,14 @@ def save_fit(fit: Fit, folder: str | Path) -> Path:
     Raises:
         FileError: the folder cannot be written to.
     """
-    folder = Path(folder)
-    check_folder(folder)
-    work = Path(tempfile.mkdtemp(dir=_existing(folder), prefix=".kinertia."))
-    try:
+    with complete_folder(folder) as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
             into.mkdir(exist_ok=True)
             _write_trial(fit, trial, into)
-        for path in sorted(work.rglob("*")):
-            if path.is_file():
-                target = folder / path.relative_to(work)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(path, target)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
-    return folder
+    return Path(folder)
 
 
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
@@ -101,9 +71,24 @@ def summary(fit: Fit) -> dict[str, Any]:
             "estimate": fit.estimate.total_mass_kg,
         },
         "converged": fit.converged,
+        **_posterior_summary(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
         "warnings": list(fit.warnings),
         "notes": list(fit.notes),
+    }
+
+
+def _posterior_summary(fit: Fit) -> dict[str, Any]:
+    if fit.posterior is None:
+        return {}
+    noise = {
+        trial.name: {"correlation_s": noise.correlation_s, "sd_m": dict(noise.sd_m), "wandering": list(noise.wandering)}
+        for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)
+    }
+    return {
+        "iterations": fit.posterior.iterations,
+        "calibration": {name: dict(told) for name, told in fit.posterior.calibration.items()},
+        "marker_noise": noise,
     }
 
 

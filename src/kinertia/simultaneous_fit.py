@@ -16,6 +16,7 @@ from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
+from kinertia.splines import SmoothedSpline
 
 JOINT_CENTRE_SD_M = 0.010
 MARKER_SD_M = 0.005
@@ -110,7 +111,7 @@ def fit_simultaneous(
     return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
 
 
-def _corrected(plates, time: np.ndarray, offsets: np.ndarray, clock_s: float) -> np.ndarray:  # noqa: ANN001
+def _corrected(plates: SmoothedSpline, time: np.ndarray, offsets: np.ndarray, clock_s: float) -> np.ndarray:
     """(w, p, 6) loads at the corrected place and time."""
     loads = plates(time + clock_s).reshape(len(time), -1, 6)
     shift = np.zeros((loads.shape[1], 3))
