@@ -8,7 +8,7 @@ from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.anthropometry import literature_bsp
 from kinertia.calibration import marker_jacobian
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.ik import _STEP_TOLERANCE, _ancestor_of, _normal_equations, solve_ik
+from kinertia.ik import _STEP_TOLERANCE, ancestor_of, normal_equations, solve_ik
 from kinertia.trial import Markers
 from opensim_model import build_opensim
 
@@ -52,11 +52,11 @@ def test_perfect_markers_give_back_the_coordinates(seed, heading):
     assert ik.marker_rms_m < 1e-7
 
 
-def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
+def testnormal_equations_are_those_of_the_explicit_jacobian(skeleton):
     q = random_coordinates(skeleton, 3)
     measured = without(noisy(markers_of(skeleton, q), 0.02), ["R.Heel", "Top.Head"], slice(1, 2)).positions
     pose = skeleton.pose(q + 0.05)
-    normal, gradient, cost = _normal_equations(skeleton, _ancestor_of(skeleton), measured, pose)
+    normal, gradient, cost = normal_equations(skeleton, ancestor_of(skeleton), measured, pose)
     jacobian = marker_jacobian(skeleton, pose)
     difference = measured - skeleton.marker_positions(pose)
     for k in range(3):

@@ -150,9 +150,9 @@ def _gauss_newton(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple
     active = np.arange(n)
     normal = np.zeros((n, q.shape[1], q.shape[1]))
     gradient = np.zeros_like(q)
-    above = _ancestor_of(model)
+    above = ancestor_of(model)
     for _ in range(_MAX_STEPS):
-        h, g, cost = _normal_equations(model, above, measured[active], model.pose(q[active]))
+        h, g, cost = normal_equations(model, above, measured[active], model.pose(q[active]))
         better = cost <= best[active] * (1 + 1e-12)
         up = active[better]
         best[up], accepted[up] = cost[better], q[up]
@@ -178,19 +178,25 @@ def _damped_step(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) 
     return np.linalg.solve(damped, gradient[..., None])[..., 0]
 
 
-def _normal_equations(
-    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose
+def normal_equations(
+    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose, weight: np.ndarray | float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model."""
+    """J^T W J (n, c, c), J^T W r (n, c) and r^T W r (n,) of the visible markers; r = measured - model.
+
+    `above` is the model's `ancestor_of`; `weight` (m,) is per marker.
+    """
     positions = model.marker_positions(pose)
     residual = measured - positions
     seen = np.isfinite(residual).all(axis=-1)
     residual = np.where(seen[..., None], residual, 0.0)
+    weights = seen * np.broadcast_to(weight, len(model.markers))
+    square = np.einsum("nm,nmi->n", weights, np.square(residual))
+    residual = residual * weights[..., None]
     per_segment = np.zeros((len(model.segments), len(model.markers)))
     per_segment[model.marker_segments, np.arange(len(model.markers))] = 1.0
     wrench = per_segment @ np.concatenate([residual, np.cross(positions, residual)], axis=-1)
     support = model.support.astype(float)
-    blocks = _marker_blocks(positions, seen.astype(float), per_segment)
+    blocks = _marker_blocks(positions, weights, per_segment)
     n, c = len(measured), support.shape[1]
     carried = (support.T @ blocks.reshape(n, -1, 36)).reshape(n, c, 6, 6)
     columns = pose.jacobian.transpose(0, 2, 1)
@@ -198,10 +204,10 @@ def _normal_equations(
     upper = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
     normal = upper + np.triu(upper, 1).transpose(0, 2, 1)
     gradient = np.einsum("ncd,ncd->nc", columns, support.T @ wrench)
-    return normal, gradient, np.square(residual).sum(axis=(1, 2))
+    return normal, gradient, square
 
 
-def _ancestor_of(model: Skeleton) -> np.ndarray:
+def ancestor_of(model: Skeleton) -> np.ndarray:
     """(c, c) True where coordinate i is coordinate j or moves it (parents come first, so this is upper triangular)."""
     tree = model.model
     above = np.zeros((tree.nv, tree.nv), dtype=bool)

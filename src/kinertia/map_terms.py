@@ -15,8 +15,8 @@ import pinocchio as pin
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
-from kinertia.calibration import marker_jacobian
 from kinertia.dynamics import root_axes
+from kinertia.ik import ancestor_of, normal_equations
 from kinertia.log_cholesky import (
     dynamic_jacobian,
     from_log_cholesky,
@@ -25,8 +25,12 @@ from kinertia.log_cholesky import (
     to_log_cholesky,
 )
 from kinertia.motion_basis import MotionBasis
+from kinertia.normal_equations import NormalEquations, assemble
 from kinertia.skeleton import Marker, Skeleton
 from kinertia.splines import SmoothedSpline
+
+COEFFICIENT_SD = 1.0
+"""Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
 
 
 @dataclass(frozen=True)
@@ -105,18 +109,6 @@ class Layout:
         )
 
 
-@dataclass
-class NormalEquations:
-    """Normal equations of a trial: band (size, 6, c, c), border (size, c, S), static (S, S), right-hand sides."""
-
-    band: np.ndarray
-    border: np.ndarray
-    static: np.ndarray
-    right: np.ndarray
-    static_right: np.ndarray
-    cost: float
-
-
 class MapProblem:
     """Residuals and normal equations at a point."""
 
@@ -135,9 +127,11 @@ class MapProblem:
         self.still = np.array([names.index(name) for name in calibration.coordinates], dtype=int)
         self.segments = prior.mean.segments
         self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
+        self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
         self.layout = Layout.of(
             10 * len(self.segments), len(self.still), len(skeleton.markers), [trial.n_plates for trial in trials]
         )
+        self.above = ancestor_of(self.free)
         self.information = np.linalg.inv(prior.covariance)
         self.start_static = np.zeros(self.layout.size)
         self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
@@ -196,6 +190,8 @@ class MapProblem:
     def cost(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> float:
         """Half the sum of squares."""
         total = self.prior_terms(static)[2]
+        for part, start in zip(coefficients, self.start, strict=True):
+            total += 0.5 * float(np.square(part - start).sum()) / COEFFICIENT_SD**2
         skeleton, bsp = self.placed(static), self.bsp(static)
         for k, trial in enumerate(self.trials):
             q, qd, qdd = self.full(self.bases[k].evaluate(coefficients[k]), static)
@@ -243,41 +239,41 @@ class MapProblem:
         )
         marker = self._marker_terms(trial, skeleton, parts[0])
         root = self._root_terms(k, skeleton, parts, static)
-        _assemble(normal, basis, marker, root)
+        shared = slice(layout.coordinates.start, layout.locals.stop)
+        assemble(normal, basis, marker, root, shared)
+        normal.band[:, 0] += np.eye(c) / COEFFICIENT_SD**2
+        normal.right -= (coefficients - self.start[k]) / COEFFICIENT_SD**2
         return normal
 
     def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[Any, ...]:
-        """Per frame J^T J (n, c, c), J^T S (n, c, S), J^T r (n, c); and S^T S (S, S), S^T r (S,), r^T r."""
+        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,), r^T r.
+
+        S holds the static coordinates and the marker positions, which stand side by side in the layout.
+        """
         n, m = trial.markers.shape[:2]
+        still, moving = self.still, self.moving
         pose = skeleton.pose(q)
-        weight = 1.0 / trial.marker_sd[None, :, None]
-        error = (trial.markers - skeleton.marker_positions(pose)) * weight
-        seen = np.isfinite(error)
-        error = np.where(seen, error, 0.0)
-        jacobian = marker_jacobian(skeleton, pose) * (weight * seen)[..., None]
-        turned = pose.rotation[:, skeleton.marker_segments] * (weight * seen)[..., None]
-        moving = jacobian[..., self.moving].reshape(n, 3 * m, -1)
-        still = jacobian[..., self.still].reshape(n, 3 * m, -1)
-        transposed = moving.transpose(0, 2, 1)
-        across = np.zeros((n, moving.shape[-1], self.layout.size))
-        across[:, :, self.layout.coordinates] = transposed @ still
-        by_marker = jacobian[..., self.moving].transpose(0, 1, 3, 2) @ turned
-        across[:, :, self.layout.locals] = by_marker.transpose(0, 2, 1, 3).reshape(n, -1, 3 * m)
-        gradient = (transposed @ error.reshape(n, -1, 1))[..., 0]
-        static = np.zeros((self.layout.size, self.layout.size))
-        at, of = self.layout.locals, self.layout.coordinates
-        flat = still.reshape(n * 3 * m, -1) if still.size else np.zeros((n * 3 * m, 0))
-        static[of, of] = flat.T @ flat
-        own = np.einsum("nmij,nmik->mjk", turned, turned)
-        for i in range(m):
-            block = slice(at.start + 3 * i, at.start + 3 * i + 3)
-            static[block, block] = own[i]
-        mixed = np.einsum("nmik,nmij->kmj", jacobian[..., self.still], turned).reshape(-1, 3 * m)
-        static[of, at], static[at, of] = mixed, mixed.T
-        right = np.zeros(self.layout.size)
-        right[of] = flat.T @ error.ravel()
-        right[at] = np.einsum("nmij,nmi->mj", turned, error).ravel()
-        return transposed @ moving, across, gradient, static, right, float(np.square(error).sum())
+        weight = 1.0 / np.square(trial.marker_sd)
+        normal, gradient, square = normal_equations(skeleton, self.above, trial.markers, pose, weight)
+        positions = skeleton.marker_positions(pose)
+        error = trial.markers - positions
+        weights = np.isfinite(error).all(axis=-1) * weight
+        turned = pose.rotation[:, skeleton.marker_segments]
+        twist = (
+            np.concatenate([turned, np.cross(positions[..., None], turned, axis=2)], axis=2) * weights[..., None, None]
+        )
+        by_marker = pose.jacobian.transpose(0, 2, 1) @ twist.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
+        by_marker *= np.repeat(skeleton.support[skeleton.marker_segments].T, 3, axis=1)
+        across = np.concatenate([normal[:, moving[:, None], still], by_marker[:, moving]], axis=-1)
+        k = len(still)
+        static = np.zeros((k + 3 * m, k + 3 * m))
+        static[:k, :k] = normal[:, still[:, None], still].sum(axis=0)
+        static[:k, k:] = by_marker[:, still].sum(axis=0)
+        static[k:, :k] = static[:k, k:].T
+        static[range(k, k + 3 * m), range(k, k + 3 * m)] = np.repeat(weights.sum(axis=0), 3)
+        pulled = np.nan_to_num(error) * weights[..., None]
+        right = np.concatenate([gradient[:, still].sum(axis=0), np.einsum("nmij,nmi->mj", turned, pulled).ravel()])
+        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right, float(square.sum())
 
     def _root_terms(
         self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray
@@ -288,17 +284,22 @@ class MapProblem:
         q, qd, qdd = (part[frames] for part in parts)
         bsp = self.bsp(static)
         model = skeleton.model_with(bsp)
-        data, bare, bare_data = model.createData(), skeleton.model, skeleton.model.createData()
-        joints, place = skeleton.placement_of_parameters(self.segments)
+        data = model.createData()
+        # the regressor needs no static coordinates: a model without them is smaller
+        names = list(self.calibration.coordinates)
+        smaller = skeleton.lock(dict(zip(names, static[layout.coordinates].tolist(), strict=True)))
+        bare, bare_data = smaller.model, smaller.model.createData()
+        joints, place = smaller.placement_of_parameters(self.segments)
         columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
         d, cf = len(frames), q.shape[1]
+        few = np.stack([part[:, self.moving] for part in (q, qd, qdd)])
         dq, dv, da = np.empty((d, 6, cf)), np.empty((d, 6, cf)), np.empty((d, 6, cf))
         tau, regressor = np.empty((d, 6)), np.empty((d, 6, len(columns)))
         for i in range(d):
             pin.computeRNEADerivatives(model, data, q[i], qd[i], qdd[i])
             tau[i] = data.tau[:6]
             dq[i], dv[i], da[i] = data.dtau_dq[:6], data.dtau_dv[:6], data.M[:6]
-            regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, q[i], qd[i], qdd[i])[:6, columns]
+            regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
         square = da[:, :, :6]
         da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
         wrench, force = (part[frames] for part in self.wrench(k, static))
@@ -354,38 +355,3 @@ def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
             turned = np.cross(axes[:, :, earlier], axes[:, :, later])
             result[:, 3 + later, 3 + earlier] = np.einsum("ni,ni->n", turned, moment)
     return result
-
-
-def _assemble(
-    normal: NormalEquations, basis: MotionBasis, marker: tuple[Any, ...], root: tuple[np.ndarray, ...]
-) -> None:
-    """Sum the terms of all frames into the normal equations, one knot interval at a time."""
-    per_frame, across, gradient, static, right, square = marker
-    frames, dq, dv, da, by_static, left = root
-    c, size = per_frame.shape[1], normal.static.shape[0]
-    flat = by_static.reshape(-1, size)
-    normal.static += static + flat.T @ flat
-    normal.static_right += right - flat.T @ left.ravel()
-    normal.cost = 0.5 * (square + float(np.square(left).sum()))
-    values = basis.values
-    for first in np.unique(basis.first):
-        here = np.flatnonzero(basis.first == first)
-        weight = values[0, here]
-        pairs = (weight[:, :, None] * weight[:, None]).reshape(len(here), 36)
-        block = (pairs.T @ per_frame[here].reshape(len(here), -1)).reshape(6, 6, c, c)
-        border = (weight.T @ across[here].reshape(len(here), -1)).reshape(6, c, size)
-        up = weight.T @ gradient[here]
-        rows = np.flatnonzero(np.isin(frames, here, assume_unique=True))
-        if rows.size:
-            at = frames[rows]
-            parts = [
-                values[order, at][:, None, :, None] * part[rows][:, :, None] for order, part in enumerate((dq, dv, da))
-            ]
-            x = np.sum(parts, axis=0).reshape(len(rows) * 6, 6 * c)
-            block += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
-            border += (x.T @ by_static[rows].reshape(-1, size)).reshape(6, c, size)
-            up -= (x.T @ left[rows].ravel()).reshape(6, c)
-        normal.border[first : first + 6] += border
-        normal.right[first : first + 6] += up
-        for a in range(6):
-            normal.band[first + a, : 6 - a] += block[a, a:]

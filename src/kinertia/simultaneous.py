@@ -20,7 +20,8 @@ from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
 from kinertia.log_cholesky import table_jacobian
-from kinertia.map_terms import CalibrationPrior, MapProblem, NormalEquations, Observation, block_diagonal
+from kinertia.map_terms import CalibrationPrior, MapProblem, Observation, block_diagonal
+from kinertia.normal_equations import NormalEquations
 from kinertia.skeleton import Skeleton
 
 
@@ -38,7 +39,7 @@ class SimultaneousResult:
         motions: per trial q, qd, qdd at its frames.
         residuals: per trial (n, 6) root residual at the dynamic frames' rows, NaN elsewhere; force N, moment N m in
         ground axes.
-        converged: the last step lowered the cost by less than a share of CONVERGED.
+        converged: the last step lowered the cost by less than CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
     """
@@ -55,7 +56,8 @@ class SimultaneousResult:
     cost: tuple[float, float]
 
 
-CONVERGED = 1e-5
+CONVERGED = 0.05
+"""Stop when a step lowers half the sum of squares by less: a third of one standard deviation, over all unknowns."""
 _MAX_ITERATIONS = 40
 
 
@@ -64,7 +66,7 @@ def estimate_simultaneous(
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
-    coefficients = [basis.fit(trial.q) for basis, trial in zip(problem.bases, trials, strict=True)]
+    coefficients = [start.copy() for start in problem.start]
     values = problem.start_static.copy()
     begin = current = problem.cost(coefficients, values)
     damping, iterations, converged = 1e-3, 0, False
@@ -85,7 +87,7 @@ def estimate_simultaneous(
             damping *= 10.0
         else:
             break
-        converged = current - new < CONVERGED * current and damping <= 1e-3
+        converged = current - new < CONVERGED and damping <= 1e-3
         values, coefficients, current = trial_values, trial_coefficients, new
         damping = max(damping * 0.1, 1e-9)
     normals = [problem.normal(k, part, values) for k, part in enumerate(coefficients)]
@@ -148,7 +150,7 @@ def _blocks(band: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
     inside = np.arange(5 * b * c) < size * c
     entries = np.einsum("bii->bi", diagonal)
     entries *= 1.0 + damping
-    entries += np.where(inside, 1e-6, 1.0).reshape(b, -1)
+    entries += np.where(inside, 0.0, 1.0).reshape(b, -1)
     return diagonal, below.reshape(b, 5 * c, 5 * c)[:-1]
 
 

@@ -138,8 +138,8 @@ def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share
     """The study's trial from a measured one, and what to call it.
 
     The first trial of the subject file goes through reading, calibration, inverse kinematics and smoothing; of its
-    measured window, the middle `_STRIDE_S` with margins (or all, if it is shorter) is made consistent with the
-    literature BSPs.
+    measured window, the middle `_STRIDE_S` (or all, if it is shorter) is made consistent with the literature BSPs; the
+    margins are inside it, because the pelvis goes astray with the square of the time.
 
     Raises:
         KinertiaError: the trial cannot be used, or no pelvis motion near the measured one balances its ground
@@ -150,8 +150,7 @@ def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share
         ready = prepare(wanted.subject, static, inputs[:1], wanted.settings, marker_set, progress)
         measured = ready.kinematics[0]
         worn = [m for m in ready.skeleton.markers if m.label in measured.ik.labels]
-        spare = max(0.0, (np.ptp(measured.time) - _STRIDE_S) / 2 - MARGIN_S)
-        inside = np.abs(measured.time - measured.time.mean()) <= np.ptp(measured.time) / 2 - spare + 1e-9
+        inside = np.abs(measured.time - measured.time.mean()) <= _STRIDE_S / 2 + 1e-9
         frames = slice(int(np.argmax(inside)), int(len(inside) - np.argmax(inside[::-1])))
         trial = consistent_trial(
             ready.skeleton.with_markers(worn),

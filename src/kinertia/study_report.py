@@ -61,13 +61,20 @@ def table1_frame(table: Table1) -> pd.DataFrame:
 
 def table1_rows(table: Table1) -> list[list[str]]:
     """The table in the study's form: quantity, then "RMS / max" per condition: mean, spread and published value."""
-    sources = {"  spread": table.spread, "  published": PUBLISHED.__getitem__}
     rows = []
     for heading, *names in QUANTITIES.values():
-        for label, source in ((heading, table.mean), *sources.items()):
+        for label, source, digits in (
+            (heading, table.mean, 2),
+            ("  spread", table.spread, 2),
+            ("  published", PUBLISHED.__getitem__, 3),
+        ):
             values = [asdict(source(condition)) for condition in CONDITIONS]
-            rows.append([label, *(" / ".join(f"{value[name]:.3g}" for name in names) for value in values)])
+            rows.append([label, *(" / ".join(_short(value[name], digits) for name in names) for value in values)])
     return rows
+
+
+def _short(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("e-0", "e-")
 
 
 def table1_figure(table: Table1) -> Figure:

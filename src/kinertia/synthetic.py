@@ -138,7 +138,11 @@ def unlike_literature(subject: SyntheticSubject, rng: np.random.Generator) -> Sy
 
 
 def walk(
-    subject: SyntheticSubject, duration_s: float | None = None, rate_hz: float = 100.0, start: float = 0.0
+    subject: SyntheticSubject,
+    duration_s: float | None = None,
+    rate_hz: float = 100.0,
+    start: float = 0.0,
+    trapezoid: bool = True,
 ) -> SyntheticTrial:
     """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same; without the markers `STATIC_ONLY`.
 
@@ -147,15 +151,18 @@ def walk(
         duration_s: one stride if None.
         rate_hz: frames per second.
         start: share of the stride at which the trial begins (0: shortly before the left heel strikes).
+        trapezoid: integrate the pelvis by the trapezoid rule, as the study's pelvis correction does; False keeps
+            position and velocity that are exact integrals of the acceleration.
     """
     series = _WalkSeries.read()
     skeleton = subject.skeleton.with_markers([m for m in subject.skeleton.markers if m.label not in STATIC_ONLY])
     duration_s = series.period_s if duration_s is None else duration_s
     time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
     motion = series.motion(skeleton.coordinates, time + start * series.period_s)
-    position, velocity = Integration(time).track(motion.qdd[:, :6], motion.q[:, :6])
-    deviation = np.abs(position - motion.q[:, :6]).max(axis=0)
-    motion = motion.with_root(position, velocity, motion.qdd[:, :6])
+    periodic = motion.q[:, :6]
+    if trapezoid:
+        motion = motion.with_root(*Integration(time).track(motion.qdd[:, :6], periodic), motion.qdd[:, :6])
+    deviation = np.abs(motion.q[:, :6] - periodic).max(axis=0)
     at_pelvis = residual(skeleton, subject.bsp, motion, np.zeros((len(time), 6)))
     force = at_pelvis[:, :3]
     wrench = np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])

@@ -1,0 +1,64 @@
+"""Normal equations of a trial's motion and of what does not move, summed over frames knot interval by knot interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinertia.motion_basis import MotionBasis
+
+
+@dataclass
+class NormalEquations:
+    """Normal equations of a trial: band (size, 6, c, c), border (size, c, S), static (S, S), right-hand sides."""
+
+    band: np.ndarray
+    border: np.ndarray
+    static: np.ndarray
+    right: np.ndarray
+    static_right: np.ndarray
+    cost: float
+
+
+def assemble(
+    normal: NormalEquations,
+    basis: MotionBasis,
+    marker: tuple[Any, ...],
+    root: tuple[np.ndarray, ...],
+    still: slice,
+) -> None:
+    """Sum the terms of all frames into the normal equations, one knot interval at a time."""
+    per_frame, across, gradient, static, right, square = marker
+    frames, dq, dv, da, by_static, left = root
+    c, size = per_frame.shape[1], normal.static.shape[0]
+    flat = by_static.reshape(-1, size)
+    normal.static += flat.T @ flat
+    normal.static[still, still] += static
+    normal.static_right -= flat.T @ left.ravel()
+    normal.static_right[still] += right
+    normal.cost = 0.5 * (square + float(np.square(left).sum()))
+    values = basis.values
+    for first in np.unique(basis.first):
+        here = np.flatnonzero(basis.first == first)
+        weight = values[0, here]
+        pairs = (weight[:, :, None] * weight[:, None]).reshape(len(here), 36)
+        block = (pairs.T @ per_frame[here].reshape(len(here), -1)).reshape(6, 6, c, c)
+        border = np.zeros((6, c, size))
+        border[:, :, still] = (weight.T @ across[here].reshape(len(here), -1)).reshape(6, c, -1)
+        up = weight.T @ gradient[here]
+        rows = np.flatnonzero(np.isin(frames, here, assume_unique=True))
+        if rows.size:
+            at = frames[rows]
+            parts = [
+                values[order, at][:, None, :, None] * part[rows][:, :, None] for order, part in enumerate((dq, dv, da))
+            ]
+            x = np.sum(parts, axis=0).reshape(len(rows) * 6, 6 * c)
+            block += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
+            border += (x.T @ by_static[rows].reshape(-1, size)).reshape(6, c, size)
+            up -= (x.T @ left[rows].ravel()).reshape(6, c)
+        normal.border[first : first + 6] += border
+        normal.right[first : first + 6] += up
+        for a in range(6):
+            normal.band[first + a, : 6 - a] += block[a, a:]
