@@ -1,7 +1,7 @@
 import numpy as np
 import opensim as osim
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from generic_static import generic_model, random_coordinates, smooth_motion
@@ -41,9 +41,12 @@ def without(markers: Markers, labels, frames=slice(None)) -> Markers:
 
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), heading=st.floats(-3.0, 3.0))
+@example(seed=8912, heading=-1.40625)
 def test_perfect_markers_give_back_the_coordinates(seed, heading):
     skeleton = generic_model().skeleton
     q = random_coordinates(skeleton, 4, seed, spread=0.6)
+    # beyond a right angle the middle one of three angles has an equal twin on the other side
+    q[:, skeleton.rotational] = np.clip(q[:, skeleton.rotational], -1.3, 1.3)
     q[:, 5] += heading
     ik = solve_ik(skeleton, markers_of(skeleton, q), consecutive=False)
     turns = np.where(skeleton.rotational, (ik.q - q + np.pi) % (2 * np.pi) - np.pi, ik.q - q)
@@ -52,7 +55,7 @@ def test_perfect_markers_give_back_the_coordinates(seed, heading):
     assert ik.marker_rms_m < 1e-7
 
 
-def testnormal_equations_are_those_of_the_explicit_jacobian(skeleton):
+def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
     q = random_coordinates(skeleton, 3)
     measured = without(noisy(markers_of(skeleton, q), 0.02), ["R.Heel", "Top.Head"], slice(1, 2)).positions
     pose = skeleton.pose(q + 0.05)

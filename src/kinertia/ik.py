@@ -97,9 +97,18 @@ def solve_ik(
     errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
+    _turn_back(q)
     if consecutive:
         _unwrap(q, model)
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
+
+
+def _turn_back(q: np.ndarray) -> None:
+    """Give the root's orientation by the three angles whose list is within a right angle; the others are its twin."""
+    twin = np.cos(q[:, 4]) < 0
+    q[twin, 3] += np.pi
+    q[twin, 4] = np.arcsin(np.sin(q[twin, 4]))
+    q[twin, 5] += np.pi
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> None:

@@ -1,0 +1,162 @@
+import numpy as np
+import pytest
+
+from kinertia.log_cholesky import nearest_consistent
+from kinertia.map_terms import MapProblem
+from small_problem import point, residuals, small_problem
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return small_problem()
+
+
+@pytest.fixture(scope="module")
+def here(problem):
+    coefficients, static = point(problem)
+    return coefficients[0], static
+
+
+def cost(problem: MapProblem, coefficients: np.ndarray, static: np.ndarray) -> float:
+    return problem.cost([coefficients], static)
+
+
+def sloped(function, size: float) -> float:
+    """Derivative at zero of a function of one number, by central differences."""
+    return (function(size) - function(-size)) / (2 * size)
+
+
+@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "plates", "clocks"])
+def test_gradient_of_static_unknowns(problem, here, kind):
+    coefficients, static = here
+    part = getattr(problem.layout, kind)
+    part = part[0] if isinstance(part, tuple) else part
+    step = np.zeros_like(static)
+    step[part] = np.random.default_rng(0).normal(size=step[part].shape)
+    right = problem.normal(0, coefficients, static).static_right + problem.prior_terms(static)[1]
+    slope = sloped(lambda h: cost(problem, coefficients, static + h * step), 1e-6)
+    assert -right @ step == pytest.approx(slope, rel=1e-5)
+
+
+@pytest.mark.parametrize("coordinate", ["pelvis_tx", "pelvis_list", "hip_flexion_r", "ankle_angle_l", "arm_add_l"])
+def test_gradient_of_the_motion(problem, here, coordinate):
+    coefficients, static = here
+    step = np.zeros_like(coefficients)
+    column = problem.skeleton.coordinates.index(coordinate)
+    step[:, column] = np.random.default_rng(0).normal(size=len(step))
+    slope = sloped(lambda h: cost(problem, coefficients + h * step, static), 1e-6)
+    assert -(problem.normal(0, coefficients, static).right * step).sum() == pytest.approx(slope, rel=1e-5)
+
+
+def test_cost_is_half_the_sum_of_squares(problem, here):
+    coefficients, static = here
+    expected = 0.5 * np.square(residuals(problem, 0, coefficients, static)).sum()
+    assert problem.normal(0, coefficients, static).cost == pytest.approx(expected)
+    assert cost(problem, coefficients, static) == pytest.approx(expected + problem.prior_terms(static)[2])
+
+
+def test_normal_equations_are_those_of_a_dense_jacobian(problem, here):
+    coefficients, static = here
+    size, c = coefficients.shape
+    motion = np.arange(size * c)
+    still = size * c + np.arange(len(static))
+    start = np.concatenate([coefficients.ravel(), static])
+
+    def left(x):
+        return residuals(problem, 0, x[motion].reshape(size, c), x[still])
+
+    h = 1e-6
+    columns = []
+    for j in range(len(start)):
+        ahead, behind = start.copy(), start.copy()
+        ahead[j] += h
+        behind[j] -= h
+        columns.append((left(ahead) - left(behind)) / (2 * h))
+    jacobian = np.stack(columns, axis=1)
+    dense, gradient = jacobian.T @ jacobian, jacobian.T @ left(start)
+    normal = problem.normal(0, coefficients, static)
+
+    banded = np.zeros((size, c, size, c))
+    for i in range(size):
+        for offset in range(min(6, size - i)):
+            banded[i, :, i + offset] = normal.band[i, offset]
+            banded[i + offset, :, i] = normal.band[i, offset].T
+    tolerance = 1e-6 * np.sqrt(np.outer(np.diag(dense), np.diag(dense))) + 1e-6
+    found = np.block(
+        [
+            [banded.reshape(size * c, -1), normal.border.reshape(size * c, -1)],
+            [normal.border.reshape(size * c, -1).T, normal.static],
+        ]
+    )
+    assert (np.abs(found - dense) <= tolerance).all()
+    right = np.concatenate([normal.right.ravel(), normal.static_right])
+    np.testing.assert_allclose(-right, gradient, atol=1e-6 * np.abs(gradient).max())
+
+
+def test_prior_information_is_the_derivative_of_its_gradient(problem):
+    """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
+    static = problem.start_static
+    information, right, value = problem.prior_terms(static)
+    np.testing.assert_allclose(right, 0.0, atol=1e-6 * np.sqrt(np.diag(information)))
+    assert value == pytest.approx(0.0, abs=1e-12)
+    scale = 1.0 / np.sqrt(np.diag(information))
+    h = 1e-5
+    for j in np.random.default_rng(0).choice(len(static), 30, replace=False):
+        step = np.zeros_like(static)
+        step[j] = h * scale[j]
+        slope = (problem.prior_terms(static - step)[1] - problem.prior_terms(static + step)[1]) / (2 * h)
+        np.testing.assert_allclose(slope * scale, information[:, j] * scale[j] * scale, atol=1e-4)
+
+
+def test_prior_cost_counts_deviations(problem):
+    """One deviation of a quantity that nothing else is tied to costs one half."""
+    layout = problem.layout
+    prior = problem.calibration
+    cases = [(layout.coordinates.start, 0.01), (layout.locals.start + 4, prior.marker_sd_m[1])]
+    cases += [(layout.plates[0].start, prior.plate_sd_m), (layout.clocks[0], prior.clock_sd_s)]
+    for at, deviation in cases:
+        static = problem.start_static.copy()
+        static[at] += deviation
+        assert problem.prior_terms(static)[2] == pytest.approx(0.5)
+
+
+def test_prior_cost_of_a_body_is_its_mahalanobis_distance_and_the_scale(problem, here):
+    _, static = here
+    static = np.where(np.arange(len(static)) < problem.layout.theta.stop, static, problem.start_static)
+    bsp, prior = problem.bsp(static), problem.prior
+    gap = (bsp.table() - prior.mean.table()).ravel()
+    scale = (bsp.total_mass_kg - prior.mass_kg) / prior.mass_sd_kg
+    expected = 0.5 * (gap @ np.linalg.solve(prior.covariance, gap) + scale**2)
+    assert problem.prior_terms(static)[2] == pytest.approx(expected, rel=1e-6)
+
+
+def test_start_is_the_prior_s_mean(problem):
+    start = problem.bsp(problem.start_static)
+    np.testing.assert_allclose(start.table(), nearest_consistent(problem.prior.mean).table(), rtol=1e-9, atol=1e-12)
+    positions = problem.start_static[problem.layout.locals].reshape(-1, 3)
+    np.testing.assert_array_equal(positions, problem.skeleton.marker_locals)
+    assert not problem.start_static[problem.layout.plates[0]].any()
+    assert problem.start_static[problem.layout.clocks[0]] == 0.0
+
+
+def test_each_trial_has_its_own_plates_and_clock():
+    pair = small_problem(2)
+    coefficients, static = point(pair)
+    for k, other in ((0, 1), (1, 0)):
+        normal = pair.normal(k, coefficients[k], static)
+        foreign = np.r_[np.arange(*pair.layout.plates[other].indices(len(static))), pair.layout.clocks[other]]
+        own = np.r_[np.arange(*pair.layout.plates[k].indices(len(static))), pair.layout.clocks[k]]
+        assert not normal.static[foreign].any()
+        assert not normal.border[..., foreign].any()
+        assert np.abs(normal.static[own]).max(axis=1).min() > 0
+
+
+def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):
+    """Body segment parameters appear in the root equations only."""
+    coefficients, static = here
+    normal = problem.normal(0, coefficients, static)
+    basis, trial = problem.bases[0], problem.trials[0]
+    touched = np.unique(basis.active[trial.dynamic])
+    silent = np.setdiff1d(np.arange(basis.size), touched)
+    assert not normal.border[silent][..., problem.layout.theta].any()
+    assert np.abs(normal.border[touched][..., problem.layout.theta]).max(axis=(1, 2)).min() > 0
