@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from kinertia.bsp_prior import literature_prior
 from kinertia.gait27 import HIP_OFFSETS
-from kinertia.map_terms import CalibrationPrior, MapProblem, Observation
+from kinertia.map_terms import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
 
@@ -75,4 +75,5 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     data = model.createData()
     left = np.array([pin.rnea(model, data, *rows)[:6] for rows in zip(q, qd, qdd, strict=True)]) - reaction
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
-    return np.concatenate([errors[np.isfinite(errors)], left[trial.dynamic].ravel()])
+    moved = (coefficients - problem.bases[k].fit(trial.q)) / COEFFICIENT_SD
+    return np.concatenate([errors[np.isfinite(errors)], left[trial.dynamic].ravel(), moved.ravel()])

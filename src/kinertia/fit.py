@@ -274,6 +274,10 @@ def prepare(
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
 
     notes = [f"marker set: {marker_set.name}", *static.notes, *notes]
+    for trial, _ in turned:
+        absent = [label for label in skeleton.labels if label not in trial.markers.labels]
+        if absent:
+            notes.append(f"{trial.name}: markers of the static trial that it does not have: {', '.join(absent)}")
     notes += [note for k in kinematics for note in k.notes]
     return Prepared(
         subject=subject,

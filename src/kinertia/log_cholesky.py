@@ -14,6 +14,8 @@ import numpy as np
 from kinertia.bsp import BodySegmentParameters
 
 _ROWS, _COLUMNS = np.array([0, 1, 2, 1, 2, 2]), np.array([0, 1, 2, 0, 0, 1])
+_ROUNDING = 1e-9
+"""Share of a segment's largest second moment below which the smallest counts as not positive."""
 
 
 def to_log_cholesky(bsp: BodySegmentParameters) -> np.ndarray:
@@ -74,9 +76,13 @@ def dynamic_jacobian(theta: np.ndarray) -> np.ndarray:
 
 
 def nearest_consistent(bsp: BodySegmentParameters, floor: float = 0.05) -> BodySegmentParameters:
-    """The same with second moments about the CoM raised to at least this share of the segment's largest."""
+    """The same with physically consistent second moments about the CoM.
+
+    Those of an inconsistent segment are raised to at least this share of its largest; consistent segments stay.
+    """
     values, vectors = np.linalg.eigh(_second_moments(bsp.inertia_kgm2))
-    values = np.maximum(values, floor * values[:, -1:])
+    largest = values[:, -1:]
+    values = np.where(values[:, :1] > _ROUNDING * largest, values, np.maximum(values, floor * largest))
     raised = (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
     return BodySegmentParameters(bsp.segments, bsp.mass_kg, bsp.com_m, _inertia(raised))
 
