@@ -27,12 +27,12 @@ from kinertia.anthropometry import literature_bsp
 from kinertia.config import Subject
 from kinertia.contacts import build_trial
 from kinertia.dynamics import Motion, inverse_dynamics
-from kinertia.fit import calibrate
 from kinertia.ik import solve_ik
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from kinertia.marker_set import MarkerSet, choose_marker_set
+from kinertia.prepare import calibrate
 from kinertia.splines import smooth
 from kinertia.trial import Markers
 from kinertia.two_level import Window, estimate_two_level, stretches

@@ -21,10 +21,10 @@ from scipy.optimize import minimize_scalar
 from kinertia.config import Subject
 from kinertia.contacts import build_trial
 from kinertia.dynamics import Motion, residual, root_derivatives
-from kinertia.fit import calibrate
 from kinertia.io.recording import read_recording
 from kinertia.kinematics import Kinematics, solve_kinematics
 from kinertia.marker_set import read_marker_set
+from kinertia.prepare import calibrate
 from kinertia.skeleton import Skeleton
 from kinertia.synthetic import walking_subject
 from kinertia.trial import Recording, Trial, runs

@@ -20,10 +20,10 @@ from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
 from kinertia.contacts import build_trial
 from kinertia.dynamics import joined, residual
-from kinertia.fit import calibrate
 from kinertia.ik import rms
 from kinertia.kinematics import facing, solve_kinematics
 from kinertia.marker_set import choose_marker_set
+from kinertia.prepare import calibrate
 from kinertia.two_level import Window, correct_pelvis, estimate_two_level, stretches
 
 

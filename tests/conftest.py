@@ -8,8 +8,9 @@ import pytest
 
 from command_line import fitted
 from kinertia.config import Subject
-from kinertia.fit import TrialInput, estimate_bsp
+from kinertia.fit import estimate_bsp
 from kinertia.io.recording import read_recording
+from kinertia.prepare import TrialInput
 from walks import fit_arguments
 
 FEW_EVALUATIONS = 30

@@ -8,8 +8,8 @@ from command_line import run
 from kinertia import demo as demo_module
 from kinertia.cli_study import _verdict
 from kinertia.config import read_subject
-from kinertia.fit import prepare
 from kinertia.inputs import read_inputs
+from kinertia.prepare import prepare
 from kinertia.synthetic import unlike_literature, walking_subject
 from kinertia.two_level import TwoLevelResult, correct_pelvis
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from kinertia.config import Settings, Subject
-from kinertia.fit import TrialInput, estimate_bsp
+from kinertia.fit import estimate_bsp
 from kinertia.io.recording import read_recording
+from kinertia.prepare import TrialInput
 
 walks = pytest.mark.parametrize(
     "name",

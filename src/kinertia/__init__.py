@@ -11,9 +11,10 @@ __version__ = version("kinertia")
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import Settings, Subject, read_subject
 from kinertia.errors import KinertiaError
-from kinertia.fit import Fit, TrialFit, TrialInput, estimate_bsp
+from kinertia.fit import Fit, TrialFit, estimate_bsp
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import read_marker_set
+from kinertia.prepare import TrialInput
 from kinertia.results import save_fit
 
 __all__ = [

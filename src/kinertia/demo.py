@@ -15,9 +15,10 @@ import pandas as pd
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject
-from kinertia.fit import Fit, Progress, estimate_bsp
+from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import check_folder, complete_folder
+from kinertia.prepare import Progress
 from kinertia.results import save_fit
 from kinertia.synthetic import unlike_literature, walk, walking_subject
 from kinertia.synthetic_lab import LabNoise, record, write_lab

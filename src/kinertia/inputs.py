@@ -6,9 +6,9 @@ import time
 from dataclasses import replace
 
 from kinertia.config import SubjectFile
-from kinertia.fit import Progress, TrialInput
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import MarkerSet, read_marker_set
+from kinertia.prepare import Progress, TrialInput
 from kinertia.trial import Recording
 
 

@@ -19,10 +19,10 @@ from threadpoolctl import threadpool_limits
 from kinertia.bsp import BodySegmentParameters, ParameterVector
 from kinertia.config import SubjectFile
 from kinertia.dynamics import Motion
-from kinertia.fit import Progress, prepare
 from kinertia.ik import solve_ik
 from kinertia.inputs import read_inputs
 from kinertia.noise import study_noise
+from kinertia.prepare import Progress, prepare
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.two_level import Window, estimate_two_level
