@@ -34,13 +34,17 @@ def check_outcome(outcome, folder):
     names = {"static.trc", "walk.trc", "walk_grf.mot", "subject.toml"}
     assert {path.name for path in (folder / "lab").iterdir()} == names
     table = pd.read_csv(folder / "bsp_truth.csv")
-    assert list(table.columns) == ["segment", "parameter", "unit", "truth", "literature", "estimate"]
+    columns = ["segment", "parameter", "unit", "truth", "literature", "estimate", "simultaneous", "simultaneous_sd"]
+    assert list(table.columns) == columns
     assert len(table) == 120
     mass = table[table["parameter"] == "mass"]
     assert mass["truth"].sum() == pytest.approx(72.6)
     assert np.abs(mass["truth"] / mass["literature"] - 1).max() > 0.03
     assert json.loads((folder / "fit.json").read_text())["trials"][0]["n_dynamic_frames"] > 90
-    assert {"bsp.csv", "kinematics.mot", "residuals.sto"} <= {path.name for path in folder.iterdir()}
+    for results in (folder, folder / "simultaneous"):
+        assert {"bsp.csv", "kinematics.mot", "residuals.sto"} <= {path.name for path in results.iterdir()}
+    off = {name: np.sqrt(np.mean((mass[name] - mass["truth"]) ** 2)) for name in ("literature", "simultaneous")}
+    assert off["simultaneous"] < off["literature"]
 
 
 def test_demo_without_the_iterations(tmp_path, quick_estimator):
@@ -78,7 +82,7 @@ def test_files_hold_nothing_of_the_truth(tmp_path, quick_estimator):
 def test_errors_against_the_truth():
     subject = walking_subject()
     truth = unlike_literature(subject, np.random.default_rng(0)).bsp
-    demo = demo_module.Demo(fit=None, truth=truth, subject_file=None)
+    demo = demo_module.Demo(fit=None, simultaneous=None, truth=truth, subject_file=None)
     assert demo.rms_errors(truth) == (0.0, 0.0, 0.0)
     mass, com, inertia = demo.rms_errors(subject.literature)
     assert mass == pytest.approx(np.sqrt(np.mean((subject.literature.mass_kg - truth.mass_kg) ** 2)))

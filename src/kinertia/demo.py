@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from kinertia.bsp import BodySegmentParameters
-from kinertia.config import read_subject
+from kinertia.config import read_subject, with_settings
 from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import check_folder, complete_folder
@@ -31,24 +31,26 @@ DURATION_S, START = 2.7, 0.75
 
 @dataclass(frozen=True, eq=False)
 class Demo:
-    """A fit of synthetic files, and the truth behind them.
+    """Fits of synthetic files by both estimators, and the truth behind them.
 
     Attributes:
-        fit: what the pipeline made of the files.
+        fit: the two-level estimate.
+        simultaneous: the simultaneous estimate from the same files.
         truth: the BSPs that the files were made with.
         subject_file: of the synthetic laboratory.
     """
 
     fit: Fit
+    simultaneous: Fit
     truth: BodySegmentParameters
     subject_file: Path
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Columns segment, parameter, unit, truth, literature, estimate."""
-        table = self.fit.bsp
+        """Columns segment, parameter, unit, truth, literature, estimate (two-level), simultaneous, simultaneous_sd."""
+        table, other = self.fit.bsp, self.simultaneous.bsp
         table.insert(3, "truth", self.truth.to_frame()["value"])
-        return table
+        return table.assign(simultaneous=other["estimate"], simultaneous_sd=other["sd"])
 
     def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
         """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
@@ -67,6 +69,8 @@ def run_demo(
     progress: Progress = lambda stage, share: None,
 ) -> Demo:
     """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
+
+    The two-level results stand in `folder` itself, those of the simultaneous estimate in `folder`/simultaneous.
 
     Args:
         folder: is made if need be.
@@ -88,9 +92,12 @@ def run_demo(
 
     wanted = read_subject(subject_file)
     static, inputs, marker_set = read_inputs(wanted, progress)
-    fit = estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
-    save_fit(fit, folder)
-    demo = Demo(fit, subject.bsp, subject_file)
+    fits = []
+    for method, results in (("two-level", folder), ("simultaneous", folder / "simultaneous")):
+        settings = with_settings(wanted, method=method).settings
+        fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
+        save_fit(fits[-1], results)
+    demo = Demo(fits[0], fits[1], subject.bsp, subject_file)
     with complete_folder(folder) as work:
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generic_static import generic_model
+from kinertia.anthropometry import literature_bsp
+from kinertia.bsp import MIRROR_SIGNS, PARAMETERS
+from kinertia.bsp_prior import MASS_SD, SCALE_SD, SIDES_CORRELATION, BspPrior, literature_prior, with_symmetry
+
+
+@pytest.fixture(scope="module")
+def prior():
+    return literature_prior(literature_bsp(70.0, 1.75, "male", generic_model().geometry))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    mass_kg=st.floats(15.0, 180.0),
+    height_m=st.floats(1.0, 2.1),
+    sex=st.sampled_from(["male", "female"]),
+    source=st.sampled_from(["dumas", "deleva"]),
+)
+def test_literature_prior_is_positive_definite(mass_kg, height_m, sex, source):
+    geometry = generic_model(height_m).geometry
+    prior = literature_prior(literature_bsp(mass_kg, height_m, sex, geometry, source))
+    correlation = prior.covariance / np.outer(prior.sd.ravel(), prior.sd.ravel())
+    assert np.linalg.eigvalsh(correlation)[0] > 0.01
+    assert prior.mass_kg == pytest.approx(mass_kg)
+    assert prior.mass_sd_kg == pytest.approx(SCALE_SD * mass_kg)
+
+
+def test_deviations_are_the_documented_ones(prior):
+    table, segments = prior.mean.table(), prior.mean.segments
+    thigh, foot = segments.index("thigh_r"), segments.index("foot_r")
+    assert prior.sd[thigh, 0] == pytest.approx(MASS_SD["thigh"] * table[thigh, 0])
+    assert prior.sd[thigh, 4:7] == pytest.approx(0.2 * table[thigh, 4:7])
+    assert prior.sd[:, 1:4].min() == pytest.approx(0.008)
+    length = 2 * abs(table[thigh, 2])
+    assert prior.sd[thigh, 1:4] == pytest.approx([0.05 * length, 0.035 * length, 0.05 * length])
+    assert prior.sd[foot, 0] == pytest.approx(MASS_SD["foot"] * table[foot, 0])
+
+
+def test_left_and_right_are_tied_as_mirror_images(prior):
+    segments, sd = prior.mean.segments, prior.sd
+    right, left = (10 * segments.index(f"shank_{side}") for side in "rl")
+    for k, name in enumerate(PARAMETERS):
+        together = prior.covariance[right + k, left + k] / np.sqrt(
+            prior.covariance[right + k, right + k] * prior.covariance[left + k, left + k]
+        )
+        assert together == pytest.approx(SIDES_CORRELATION * MIRROR_SIGNS[k]), name
+    assert sd[segments.index("shank_r")] == pytest.approx(sd[segments.index("shank_l")])
+
+
+def test_mass_of_the_thigh_is_mass_the_trunk_lacks(prior):
+    at = {name: 10 * i for i, name in enumerate(prior.mean.segments)}
+    for side in "rl":
+        for trunk in ("pelvis", "torso"):
+            assert prior.covariance[at[f"thigh_{side}"], at[trunk]] < 0
+    assert prior.covariance[at["shank_r"], at["torso"]] == 0
+
+
+def test_symmetry_leaves_segments_without_partner_alone(prior):
+    plain = np.diag(np.square(prior.sd.ravel()))
+    tied = with_symmetry(plain, prior.mean.segments, 0.5)
+    assert tied[:10] == pytest.approx(plain[:10])
+    assert not np.allclose(tied, plain)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c[:-1, :-1], "must be 120 x 120"),
+        (lambda c: c - 2.0 * np.diag(np.diag(c)) * (np.arange(120) == 7), "every prior deviation must be positive"),
+        (lambda c: c * (np.arange(120) != 3) * (np.arange(120) != 3)[:, None], "every prior deviation must be positive"),
+        (lambda c: c * np.where(np.eye(120) == 1, 1.0, 1.5), "positive definite"),
+        (lambda c: c + np.triu(np.full_like(c, 1e-2), 1), "symmetric"),
+    ],
+)  # fmt: skip
+def test_bad_covariances_are_refused(prior, change, message):
+    with pytest.raises(ValueError, match=message):
+        BspPrior(prior.mean, change(prior.covariance), prior.mass_kg, prior.mass_sd_kg)
+
+
+@pytest.mark.parametrize("sd", [0.0, -1.0])
+def test_bad_deviation_of_the_scale_is_refused(prior, sd):
+    with pytest.raises(ValueError, match="every prior deviation must be positive"):
+        BspPrior(prior.mean, prior.covariance, prior.mass_kg, sd)
+
+
+def test_tiny_deviations_beside_large_ones_are_positive_definite(prior):
+    """Variances of a torso's mass and of a forearm's products differ by 1e12: definiteness does not depend on units."""
+    sd = prior.sd.copy()
+    sd[:, 7:] = 1e-6
+    covariance = with_symmetry(np.diag(np.square(sd.ravel())), prior.mean.segments, 0.9999)
+    assert BspPrior(prior.mean, covariance, prior.mass_kg, prior.mass_sd_kg).sd == pytest.approx(sd)

@@ -1,0 +1,169 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kinertia.simultaneous as simultaneous
+from accuracy import DISTURBANCES, calibrated
+from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp_prior import literature_prior
+from kinertia.map_terms import CalibrationPrior, Observation
+from kinertia.motion_basis import MotionBasis
+from kinertia.simultaneous import estimate_simultaneous
+from kinertia.splines import smooth
+from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
+
+SPACING_S = 0.05
+
+
+@pytest.fixture(scope="module")
+def person():
+    return unlike_literature(walking_subject(), np.random.default_rng(3))
+
+
+@pytest.fixture(scope="module")
+def prior(person):
+    return literature_prior(person.literature)
+
+
+@pytest.fixture(scope="module")
+def trial(person):
+    return walk(person, 0.8, 60.0, trapezoid=False)
+
+
+@pytest.fixture(scope="module")
+def calibration(trial):
+    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), 0.005, 0.005)
+
+
+def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: float = 0.0, seed: int = 0) -> Observation:
+    """Exact forces, markers with white noise, and a start that is the truth."""
+    rng = np.random.default_rng(seed)
+    time, loads = trial.time, trial.foot_loads.reshape(len(trial.time), 12)
+    markers = trial.markers.positions + rng.normal(0.0, noise_m, trial.markers.positions.shape) if noise_m else None
+    markers = trial.markers.positions if markers is None else markers
+    return Observation(
+        time=time[frames],
+        markers=markers[frames],
+        marker_sd=np.full(markers.shape[1], max(noise_m, 0.001)),
+        q=trial.motion.q[frames],
+        dynamic=np.ones(len(time[frames]), dtype=bool),
+        plates=smooth(time, loads, 25.0),
+        force_sd=3.0,
+        moment_sd=1.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def exact(trial, prior, calibration):
+    return estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)], SPACING_S)
+
+
+def test_exact_data_give_back_the_motion(trial, exact):
+    """As well as splines of this spacing can say it."""
+    basis = MotionBasis(trial.time, SPACING_S)
+    best = basis.evaluate(basis.fit(trial.motion.q))[0]
+    limit = np.abs(best - trial.motion.q).max()
+    assert exact.converged
+    assert exact.cost[1] < 0.01 * exact.cost[0]
+    inner = slice(6, -6)
+    angles = trial.skeleton.rotational
+    off = np.abs(exact.motions[0].q - trial.motion.q)[inner]
+    assert off[:, ~angles].max() < limit + 0.001
+    assert np.sqrt(np.mean(np.square(off[:, angles]))) < limit + 0.01
+
+
+def test_exact_data_pull_the_body_towards_the_truth(person, prior, exact):
+    before = (person.bsp.table() - prior.mean.table()) / prior.sd
+    after = (person.bsp.table() - exact.bsp.table()) / prior.sd
+    assert np.square(after).sum() < 0.8 * np.square(before).sum()
+    sd = np.sqrt(np.diag(exact.bsp_covariance)).reshape(-1, 10)
+    assert (sd < prior.sd * (1.0 + 1e-9)).all()
+    assert np.abs((person.bsp.table() - exact.bsp.table()) / sd).max() < 4.0
+    assert exact.bsp.total_mass_kg == pytest.approx(person.bsp.total_mass_kg, rel=0.005)
+
+
+def test_same_input_same_result(trial, prior, calibration, exact):
+    again = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)], SPACING_S)
+    np.testing.assert_array_equal(again.bsp.table(), exact.bsp.table())
+    np.testing.assert_array_equal(again.motions[0].q, exact.motions[0].q)
+    assert again.cost == exact.cost
+
+
+def test_two_trials_tell_more_than_either(trial, prior, calibration):
+    first, second = (observation(trial, noise_m=0.003, seed=seed) for seed in (1, 2))
+
+    def deviation(trials):
+        result = estimate_simultaneous(trial.skeleton, prior, calibration, trials, SPACING_S)
+        return np.sqrt(np.diag(result.bsp_covariance))
+
+    both = deviation([first, second])
+    for alone in (first, second):
+        ratio = both / deviation([alone])
+        assert ratio.max() < 1.02
+        assert ratio.mean() < 0.99
+
+
+def test_halves_pooled_give_about_the_whole(person, prior, calibration):
+    trial = walk(person, 1.6, 60.0, trapezoid=False)
+    middle = len(trial.time) // 2
+    halves = [observation(trial, part, 0.003) for part in (slice(None, middle), slice(middle, None))]
+    whole, pooled = (
+        estimate_simultaneous(trial.skeleton, prior, calibration, trials, SPACING_S)
+        for trials in ([observation(trial, noise_m=0.003)], halves)
+    )
+    sd = np.sqrt(np.diag(whole.bsp_covariance)).reshape(-1, 10)
+    away = (pooled.bsp.table() - whole.bsp.table()) / sd
+    assert np.sqrt(np.mean(np.square(away))) < 0.3
+    assert np.abs(away).max() < 1.0
+    assert (np.sqrt(np.diag(pooled.bsp_covariance)) / sd.ravel()).mean() == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("name", DISTURBANCES)
+def test_what_was_put_in_comes_back_within_its_error_bars(name):
+    found = calibrated(DISTURBANCES[name], seed=1, duration_s=1.3, compare=False)
+    for quantity, (error, sd) in found.deviations.items():
+        assert abs(error) < 3.0 * sd, quantity
+        assert sd < 0.75 * {"clock": 0.010, "right plate, x": 0.020}.get(quantity, 0.010), quantity
+
+
+def test_without_forces_only_markers_count(trial, prior, calibration):
+    """A body and instruments that no equation of motion asks about stay as they were believed to be."""
+    dynamic = np.zeros(len(trial.time), dtype=bool)
+    seen = replace(observation(trial, noise_m=0.003), dynamic=dynamic)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [seen], SPACING_S)
+    np.testing.assert_allclose(result.bsp.table(), prior.mean.table(), rtol=0, atol=1e-6)
+    assert result.clock_s[0] == (pytest.approx(0.0, abs=1e-9), pytest.approx(0.005))
+    np.testing.assert_allclose(result.plate_offsets_m[0][0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(result.motions[0].q[6:-6], trial.motion.q[6:-6], atol=0.08)
+
+
+def test_wrong_forces_in_unmeasured_frames_do_not_matter(trial, prior, calibration):
+    seen = observation(trial, noise_m=0.003)
+    seen = replace(seen, dynamic=np.arange(len(trial.time)) < 24)
+    loads = trial.foot_loads.reshape(len(trial.time), 12).copy()
+    cut = smooth(trial.time[:28], loads[:28], 25.0)
+    results = [
+        estimate_simultaneous(trial.skeleton, prior, calibration, [replace(seen, plates=plates)], SPACING_S)
+        for plates in (cut, smooth(trial.time, np.where(np.arange(len(loads))[:, None] < 28, loads, 0.0), 1e6))
+    ]
+    away = (results[0].bsp.table() - results[1].bsp.table()) / prior.sd
+    assert np.abs(away).max() < 0.1
+
+
+def test_impossible_priors_still_give_a_possible_body(trial, prior, calibration):
+    table = prior.mean.table()
+    table[:, 4] *= 3.0
+    impossible = BodySegmentParameters.from_table(prior.mean.segments, table)
+    assert not impossible.physically_consistent().any()
+    start = replace(prior, mean=impossible)
+    result = estimate_simultaneous(trial.skeleton, start, calibration, [observation(trial)], SPACING_S)
+    assert result.bsp.physically_consistent().all()
+
+
+def test_an_unfinished_run_says_so_and_keeps_the_best_iterate(trial, prior, calibration, monkeypatch):
+    monkeypatch.setattr(simultaneous, "_MAX_ITERATIONS", 1)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)], SPACING_S)
+    assert not result.converged
+    assert result.iterations == 1
+    assert result.cost[1] < result.cost[0]
