@@ -4,9 +4,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.checks import complete_subject, fit_warnings, mass_from_force_kg, two_level_warnings
+from kinertia.checks import check_masses, complete_subject, fit_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.config import Subject
-from kinertia.errors import SubjectError
+from kinertia.errors import SubjectError, TrialError
 from kinertia.trial import Markers, Recording
 
 MARKERS = Markers(np.array([0.0, 0.1]), ("A",), np.zeros((2, 1, 3)))
@@ -84,3 +84,11 @@ def test_warnings_come_one_by_one(short_fit):
     flat[2] = np.diag([1.0, 0.1, 0.1])
     (said,) = warned(short_fit, bsp=replace(fine, inertia_kgm2=flat))
     assert "physically impossible for 1 of 12 segments (thigh_r)" in said
+
+
+def test_masses_that_contradict_each_other_or_the_scale():
+    check_masses(70.0, {"a": 68.0, "b": 72.0})
+    with pytest.raises(TrialError, match=r"trial 'b'.*90\.0 kg.*'a' 70\.0 kg.*one person"):
+        check_masses(70.0, {"a": 70.0, "b": 90.0})
+    with pytest.raises(TrialError, match=r"trial 'a'.*60\.0 kg, the scale says 70\.0 kg"):
+        check_masses(70.0, {"a": 60.0, "b": 63.5})

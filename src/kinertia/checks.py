@@ -5,7 +5,7 @@ Errors come before the estimation, warnings after it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 FORCE_MASS_TOLERANCE = 0.02
 """Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
+CONTRADICTING_MASS = 0.10
+"""Scale and vertical force, or two trials, may differ by this share before the simultaneous estimate refuses."""
 ESTIMATE_TOLERANCE = 0.03
 """Scale and estimated total mass may differ by this share before a warning."""
 
@@ -82,15 +84,47 @@ def check_visible(skeleton: Skeleton, trial: Trial) -> None:
             )
 
 
-def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
-    """Body mass by the vertical ground reaction over the window, whatever the CoM's acceleration.
+def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, residual: np.ndarray) -> float:
+    """Body mass by the vertical ground reaction over a window, whatever the CoM's acceleration.
 
     The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no
     mean vertical residual is m F / (F + P), with means over the window.
+
+    Args:
+        literature: the BSPs of the residual.
+        foot_loads: (w, 2, 6) ground reactions.
+        residual: (w, 6) root residual of the literature BSPs on the uncorrected motion.
     """
-    force = float(trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean())
-    excess = float(trial.residuals["literature"][:, 1].mean())
-    return literature.total_mass_kg * force / (force + excess)
+    force = float(foot_loads[:, :, 1].sum(axis=1).mean())
+    return literature.total_mass_kg * force / (force + float(residual[:, 1].mean()))
+
+
+def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
+    """Body mass by the vertical ground reaction of a fitted trial."""
+    return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
+
+
+def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
+    """Raise TrialError when trials cannot be of one person, or not of the one on the scale.
+
+    Args:
+        mass_kg: by the scale.
+        by_force_kg: per trial, `mass_by_force_kg`.
+    """
+    heaviest, lightest = max(by_force_kg, key=by_force_kg.__getitem__), min(by_force_kg, key=by_force_kg.__getitem__)
+    if by_force_kg[heaviest] > (1 + CONTRADICTING_MASS) * by_force_kg[lightest]:
+        raise TrialError(
+            heaviest,
+            f"the vertical force carries {by_force_kg[heaviest]:.1f} kg, in '{lightest}' "
+            f"{by_force_kg[lightest]:.1f} kg; pool only trials of one person, with the same plates",
+        )
+    for name, by_force in by_force_kg.items():
+        if abs(by_force - mass_kg) > CONTRADICTING_MASS * mass_kg:
+            raise TrialError(
+                name,
+                f"the vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg; correct the mass, or "
+                f"the gain and zero of the plates",
+            )
 
 
 def fit_warnings(

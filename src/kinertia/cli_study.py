@@ -109,9 +109,9 @@ def _simultaneous_verdict(before: tuple[float, float, float], after: tuple[float
         for what, one, other in zip(("mass", "centre of mass", "inertia"), before, after, strict=True)
     )
     return (
-        f"The simultaneous estimate (--method simultaneous) changes the literature's errors by: {shares}. It weighs "
-        "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says per "
-        "parameter how much was measured."
+        f"The simultaneous estimate (--method simultaneous) changes these errors by: {shares}. It weighs "
+        "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says "
+        "per parameter how much was measured."
     )
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from kinertia.bsp import BodySegmentParameters
-from kinertia.checks import fit_warnings, known, two_level_warnings
+from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.kinematics import Kinematics
@@ -205,6 +205,11 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
 
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
+    by_force = {}
+    for k in ready.kinematics:
+        left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
+        by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
+    check_masses(known(ready.subject.mass_kg), by_force)
     fitted = fit_simultaneous(ready.skeleton, ready.literature, ready.kinematics, settings.cutoff_hz)
     bsp, skeleton = fitted.result.bsp, fitted.result.skeleton
     estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
