@@ -317,11 +317,10 @@ def measured_section(runs: dict[str, dict[str, Any]]) -> str:
         (trial,) = run["trials"]
         markers, mass = trial["marker_rms_m"], run["total_mass_kg"]
         force, moment = (trial[f"residual_{kind}"]["estimate"] for kind in ("force_rms_N", "moment_rms_Nm"))
-        rows.append(
-            [WALKS[name], f"{force:.1f}", f"{moment:.1f}", f"{1e3 * markers['ik']:.1f}", f"{1e3 * markers['final']:.1f}"]
-            + [f"{mass['estimate']:.2f} ({mass['measured']:.1f})", run["worst"], str(run["iterations"])]
-            + ["yes" if run["converged"] else "no", f"{trial['seconds']['estimate']:.2f}"]
-        )  # fmt: skip
+        rows.append([WALKS[name], f"{force:.1f}", f"{moment:.1f}"])
+        rows[-1] += [f"{1e3 * markers['ik']:.1f}", f"{1e3 * markers['final']:.1f}"]
+        rows[-1] += [f"{mass['estimate']:.2f} ({mass['measured']:.1f})", run["worst"], str(run["iterations"])]
+        rows[-1] += ["yes" if run["converged"] else "no", f"{trial['seconds']['estimate']:.2f}"]
     headings = ["walk", "force (N)", "moment (N m)", "markers, IK (mm)", "markers, estimate (mm)"]
     headings += ["total mass (scale; kg)", "farthest from the literature (prior sd)", "steps", "converged", "s"]
     return table(headings, rows)
@@ -337,16 +336,16 @@ def pooling_section(values: dict[str, np.ndarray], sds: dict[str, np.ndarray]) -
         rows.append([name, f"{np.sqrt(np.mean(away**2)):.2f}", f"{largest:.2f}", f"{ratio.mean():.3f}"])
     smaller = np.mean(sds["halves"] <= np.minimum(sds["first half"], sds["second half"]))
     text = table(["estimate from", "RMS difference", "largest", "sd / sd of the whole, mean"], rows)
-    return f"{text}\n\nDeviations of the halves together are at most those of either half for {100 * smaller:.0f} % of the BSPs."
+    share = f"Deviations of the halves together are at most those of either half for {100 * smaller:.0f} % of the BSPs."
+    return f"{text}\n\n{share}"
 
 
 def speed_section(timings: Sequence[Timing]) -> str:
     """Seconds, and microseconds a frame and iteration beside bare Pinocchio calls."""
-    rows = [
-        [f"{t.duration_s:.0f} s", str(t.frames), str(t.iterations), f"{t.seconds:.2f}", f"{t.each_us:.0f}"]
-        + [f"{t.bare_us:.0f}", f"{t.each_us / t.bare_us:.1f}"]
-        for t in timings
-    ]
+    rows = []
+    for t in timings:
+        rows.append([f"{t.duration_s:.0f} s", str(t.frames), str(t.iterations), f"{t.seconds:.2f}"])
+        rows[-1] += [f"{t.each_us:.0f}", f"{t.bare_us:.0f}", f"{t.each_us / t.bare_us:.1f}"]
     headings = ["walk", "frames", "steps", "seconds", "us a frame and step", "bare calls (us)", "ratio"]
     return table(headings, rows)
 

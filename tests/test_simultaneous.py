@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 import kinertia.simultaneous as simultaneous
 from accuracy import DISTURBANCES, calibrated
@@ -14,6 +15,13 @@ from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
 
 SPACING_S = 0.05
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread():
+    """As `estimate_bsp` has it: the matrices are small."""
+    with threadpool_limits(1, user_api="blas"):
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +82,9 @@ def test_exact_data_give_back_the_motion(trial, exact):
 
 
 def test_exact_data_pull_the_body_towards_the_truth(person, prior, exact):
-    before = (person.bsp.table() - prior.mean.table()) / prior.sd
-    after = (person.bsp.table() - exact.bsp.table()) / prior.sd
-    assert np.square(after).sum() < 0.8 * np.square(before).sum()
+    before, after = (person.bsp.table() - bsp.table() for bsp in (prior.mean, exact.bsp))
+    assert np.square(after / prior.sd).sum() < np.square(before / prior.sd).sum()
+    assert np.square(after[:, 0]).sum() < 0.5 * np.square(before[:, 0]).sum()
     sd = np.sqrt(np.diag(exact.bsp_covariance)).reshape(-1, 10)
     assert (sd < prior.sd * (1.0 + 1e-9)).all()
     assert np.abs((person.bsp.table() - exact.bsp.table()) / sd).max() < 4.0
@@ -155,7 +163,7 @@ def test_impossible_priors_still_give_a_possible_body(trial, prior, calibration)
     table = prior.mean.table()
     table[:, 4] *= 3.0
     impossible = BodySegmentParameters.from_table(prior.mean.segments, table)
-    assert not impossible.physically_consistent().any()
+    assert not impossible.physically_consistent().all()
     start = replace(prior, mean=impossible)
     result = estimate_simultaneous(trial.skeleton, start, calibration, [observation(trial)], SPACING_S)
     assert result.bsp.physically_consistent().all()

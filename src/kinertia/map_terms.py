@@ -200,7 +200,7 @@ class MapProblem:
             frames = np.flatnonzero(trial.dynamic)
             model = skeleton.model_with(bsp)
             data = model.createData()
-            tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames])
+            tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames]).reshape(-1, 6)
             wrench, _ = self.wrench(k, static)
             left = (tau - _generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
             total += 0.5 * float(np.square(left).sum())
@@ -307,7 +307,7 @@ class MapProblem:
         by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
         by_static = np.zeros((d, 6, layout.size))
         chain = dynamic_jacobian(static[layout.theta])
-        by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, -1)
+        by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, 10 * len(joints))
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
         for plate in range(trial.n_plates):
             for j, axis in enumerate(np.eye(3)[[0, 2]]):

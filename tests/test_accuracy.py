@@ -1,0 +1,43 @@
+"""The accuracy benchmark in its smallest form: that it runs and fills its page."""
+
+import re
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+import accuracy
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread():
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
+
+def test_errors_of_the_truth_are_zero():
+    trial = accuracy.study_walk(0.5)
+    assert accuracy.errors(trial.bsp, trial.bsp) == (0.0, 0.0, 0.0)
+
+
+def test_page():
+    draw = accuracy.study_draw(0, two_level=False)
+    outcome = accuracy.calibrated(accuracy.PRIOR, 0, duration_s=0.8)
+    values = {name: np.arange(3.0) for name in ("whole", "first half", "second half", "halves")}
+    sds = {"whole": np.ones(3), "first half": np.full(3, 2.0), "second half": np.full(3, 2.0), "halves": np.ones(3)}
+    timing = accuracy.timed(1.0)
+    page = accuracy.document(
+        {
+            "draws": "1",
+            "study": accuracy.study_section([draw]),
+            "calibration": accuracy.calibration_section({"all three": [outcome]}),
+            "measured": "",
+            "pooling": accuracy.pooling_section(values, sds),
+            "speed": accuracy.speed_section([timing]),
+        }
+    )
+    mass, com, inertia = draw["simultaneous"]
+    assert f"| simultaneous | {mass:.2f} | {1e3 * com:.1f} | {inertia:.3f} |" in page
+    assert "those of either half for 100 % of the BSPs" in page
+    assert re.search(r"\| all three \| [\d.]+ / [\d.]+ \([\d.]+\)", page)
+    assert re.search(rf"\| 1 s \| 101 \| {timing.iterations} \|", page)

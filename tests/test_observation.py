@@ -1,0 +1,95 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from accuracy import kinematics_of, study_walk
+from kinertia.noise import camera_noise, study_noise
+from kinertia.observation import (
+    AROUND_WINDOW_S,
+    FORCE_SD_OF_WEIGHT,
+    MOMENT_ARM_M,
+    SMALLEST_MARKER_SD_M,
+    observe,
+)
+from kinertia.skeleton import GRAVITY_M_S2
+
+MASS_KG = 72.6
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return study_walk(1.0)
+
+
+def observed(trial, markers, cutoff_hz=10.0):
+    return observe(trial.skeleton, kinematics_of(trial, markers), MASS_KG, cutoff_hz)
+
+
+@pytest.fixture(scope="module")
+def white(trial):
+    return observed(trial, camera_noise(trial.markers, 0.005, np.random.default_rng(0)))
+
+
+def test_effective_deviation_of_white_noise_is_its_deviation(trial, white):
+    seen, noise = white
+    assert np.median(list(noise.sd_m.values())) == pytest.approx(0.005, rel=0.1)
+    assert noise.correlation_s == pytest.approx(1.0 / trial.markers.rate_hz, rel=0.2)
+    assert np.median(seen.marker_sd) == pytest.approx(0.005, rel=0.15)
+    assert noise.wandering == ()
+
+
+def test_effective_deviation_of_slow_noise_is_larger(trial, white):
+    """The study's noise is correlated over some pi / 25 s, more than ten frames."""
+    slow = study_noise(trial.markers, np.random.default_rng(0))
+    seen, noise = observed(trial, slow)
+    sd = np.std(slow.positions - trial.markers.positions)
+    assert np.median(list(noise.sd_m.values())) == pytest.approx(sd, rel=0.3)
+    assert 0.05 < noise.correlation_s < 0.5
+    assert np.median(seen.marker_sd) > 2.0 * sd
+
+
+def test_exact_markers_keep_a_smallest_deviation(trial):
+    seen, noise = observed(trial, trial.markers)
+    assert set(noise.sd_m.values()) == {SMALLEST_MARKER_SD_M}
+    assert np.isfinite(seen.marker_sd).all()
+
+
+def test_a_wandering_marker_counts_less_and_is_named(trial):
+    rng = np.random.default_rng(0)
+    noisy = camera_noise(trial.markers, 0.002, rng)
+    at = noisy.labels.index("R.Thigh.Front")
+    positions = noisy.positions.copy()
+    positions[:, at] += rng.normal(0.0, 0.05, positions[:, at].shape)
+    seen, noise = observed(trial, replace(noisy, positions=positions))
+    assert noise.wandering == ("R.Thigh.Front",)
+    assert seen.marker_sd[at] > 3.0 * np.median(seen.marker_sd)
+
+
+def test_gaps_are_missing_and_a_marker_that_the_trial_lacks_too(trial):
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions.copy()
+    positions[40:50, 3] = np.nan
+    kept = [i for i in range(positions.shape[1]) if i != 7]
+    markers = replace(trial.markers, positions=positions).select([trial.markers.labels[i] for i in kept])
+    seen, noise = observed(trial, markers)
+    offset = np.flatnonzero(np.isclose(trial.time, seen.time[0]))[0]
+    assert np.isnan(seen.markers[40 - offset : 50 - offset, 3]).all()
+    assert np.isnan(seen.markers[:, 7]).all()
+    assert trial.markers.labels[7] not in noise.sd_m
+    assert np.isfinite(seen.markers[:, 8]).all()
+
+
+def test_only_the_window_is_dynamic_and_its_surroundings_are_markers(trial):
+    kinematics = replace(kinematics_of(trial, trial.markers), window_s=(0.4, 0.6))
+    seen, _ = observe(trial.skeleton, kinematics, MASS_KG, 10.0)
+    assert seen.time[seen.dynamic][[0, -1]] == pytest.approx([0.4, 0.6])
+    assert seen.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
+    assert seen.plates.time[[0, -1]] == pytest.approx([0.4, 0.6])
+
+
+def test_deviation_of_forces_grows_with_weight_and_with_repeated_frames(trial, white):
+    seen, _ = white
+    assert seen.force_sd == pytest.approx(np.sqrt(100.0 / 20.0) * FORCE_SD_OF_WEIGHT * MASS_KG * GRAVITY_M_S2)
+    assert seen.moment_sd == pytest.approx(MOMENT_ARM_M * seen.force_sd)
+    wide, _ = observed(trial, trial.markers, 100.0)
+    assert wide.force_sd == pytest.approx(FORCE_SD_OF_WEIGHT * MASS_KG * GRAVITY_M_S2)

@@ -1,0 +1,144 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from threadpoolctl import threadpool_limits
+
+from accuracy import kinematics_of
+from kinertia.bsp import PARAMETERS
+from kinertia.config import Settings, Subject
+from kinertia.fit import Fit, estimate_bsp
+from kinertia.io.recording import read_recording
+from kinertia.noise import camera_noise
+from kinertia.prepare import TrialInput
+from kinertia.results import save_fit
+from kinertia.simultaneous_fit import CLOCK_SD_S, JOINT_CENTRE_SD_M, PLATE_SD_M, fit_simultaneous
+from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return walk(walking_subject(), 0.9, trapezoid=False)
+
+
+def fitted(trial: SyntheticTrial, literature=None, disturb=lambda positions, loads: None):
+    """Outcome for 2 mm of camera noise, after `disturb` has changed marker positions and loads in place."""
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions
+    loads = trial.foot_loads.copy()
+    disturb(positions, loads)
+    kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
+    with threadpool_limits(1, user_api="blas"):
+        return fit_simultaneous(trial.skeleton, literature or walking_subject().literature, [kinematics], "gcv")
+
+
+@pytest.fixture(scope="module")
+def plain(trial):
+    return fitted(trial)
+
+
+def test_a_person_like_the_literature_raises_no_warning(plain):
+    assert plain.warnings == ()
+    assert plain.result.converged
+    assert plain.result.bsp.physically_consistent().all()
+
+
+def test_information_is_between_nothing_and_everything(plain):
+    posterior = plain.posterior
+    assert posterior.information.shape == (12, 10)
+    assert posterior.information.min() > -1e-6
+    assert posterior.information.max() < 1.0
+    np.testing.assert_allclose(posterior.sd, posterior.prior_sd * np.sqrt(1 - posterior.information))
+    np.testing.assert_allclose(np.sqrt(np.diag(posterior.covariance)), posterior.sd.ravel())
+    mass = dict(zip(plain.result.bsp.segments, posterior.information[:, 0], strict=True))
+    assert mass["thigh_r"] > mass["forearm_r"]
+
+
+def test_calibration_is_told_with_its_deviations(plain):
+    told = plain.posterior.calibration
+    assert told["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
+    assert told["walk: loads under the right foot, x"]["prior_sd"] == PLATE_SD_M
+    assert told["walk: forces late by"] == {
+        "value": plain.result.clock_s[0][0],
+        "prior_sd": CLOCK_SD_S,
+        "sd": plain.result.clock_s[0][1],
+        "unit": "s",
+    }
+    for name, one in told.items():
+        assert 0 < one["sd"] <= one["prior_sd"] * (1 + 1e-9), name
+
+
+def test_loads_and_motion_cover_the_window(trial, plain):
+    (motion,), (loads,) = plain.motions, plain.foot_loads
+    assert len(motion.q) == len(loads)
+    assert loads.shape[1:] == (2, 6)
+    window = trial.window.wrench[5 : 5 + len(loads)]
+    np.testing.assert_allclose(loads.sum(axis=1)[10:-10], window[10:-10], atol=25.0)
+
+
+def test_a_displaced_plate_is_named(trial):
+    def shift(positions, loads):
+        loads[:, 0, 3:] += np.cross([0.0, 0.0, 0.03], loads[:, 0, :3])
+
+    outcome = fitted(trial, disturb=shift)
+    (said,) = [w for w in outcome.warnings if "check the instruments" in w]
+    assert said.startswith("walk: loads under the right foot, z: -")
+
+
+def test_a_wandering_marker_is_named(trial):
+    def wander(positions, loads):
+        at = trial.markers.labels.index("R.Bicep")
+        positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
+
+    assert any("wandering markers" in w and "R.Bicep (" in w for w in fitted(trial, disturb=wander).warnings)
+
+
+def test_a_model_that_is_contradicted_is_called_so(trial):
+    """Half the forces belong to half the person."""
+
+    def halve(positions, loads):
+        loads *= 0.5
+
+    said = [w for w in fitted(trial, disturb=halve).warnings if w.startswith("the data contradict the model")]
+    assert said
+    assert any(f"{parameter} of " in said[0] for parameter in PARAMETERS)
+
+
+def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
+    monkeypatch.setattr("kinertia.simultaneous._MAX_ITERATIONS", 1)
+    assert any("did not converge within 1 steps" in w for w in fitted(trial).warnings)
+
+
+@pytest.fixture(scope="module")
+def measured(shared_data) -> Fit:
+    walked, static = (read_recording(shared_data / "pig_c3d" / f"subject_b_{kind}.c3d") for kind in ("walk", "static"))
+    return estimate_bsp(Subject(name="B", sex="female"), static, [TrialInput(walked)], Settings(method="simultaneous"))
+
+
+def test_measured_walk_meets_residuals_and_markers(measured):
+    (trial,) = measured.trials
+    residual = np.sqrt(np.square(trial.residuals["estimate"]).reshape(-1, 2, 3).sum(axis=2).mean(axis=0))
+    assert residual[0] < 5.0
+    assert residual[1] < 3.0
+    rms = {stage: np.sqrt(np.nanmean(np.square(errors))) for stage, errors in trial.marker_errors_m.items()}
+    assert rms["final"] < 0.012
+    assert rms["final"] < 1.3 * rms["ik"]
+    assert measured.converged
+    assert measured.estimate.physically_consistent().all()
+
+
+def test_files_of_a_simultaneous_fit(measured, tmp_path):
+    folder = save_fit(measured, tmp_path / "out")
+    bsp = pd.read_csv(folder / "bsp.csv")
+    assert len(bsp) == 120
+    np.testing.assert_allclose(bsp["information"], 1 - (bsp["sd"] / bsp["prior_sd"]) ** 2, atol=1e-9)
+    told = json.loads((folder / "fit.json").read_text())
+    assert told["method"] == "simultaneous"
+    assert told["converged"] is True
+    assert told["iterations"] > 1
+    assert set(told["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
+    noise = told["marker_noise"][measured.trials[0].name]
+    assert noise["correlation_s"] > 0
+    assert min(noise["sd_m"].values()) >= 0.001
+    assert isinstance(noise["wandering"], list)
