@@ -60,9 +60,10 @@ def test_a_wandering_marker_counts_less_and_is_named(trial):
     noisy = camera_noise(trial.markers, 0.002, rng)
     at = noisy.labels.index("R.Thigh.Front")
     positions = noisy.positions.copy()
-    positions[:, at] += rng.normal(0.0, 0.05, positions[:, at].shape)
+    positions[:, at] += rng.normal(0.0, 0.02, positions[:, at].shape)
     seen, noise = observed(trial, replace(noisy, positions=positions))
     assert noise.wandering == ("R.Thigh.Front",)
+    assert max(noise.sd_m, key=lambda label: noise.sd_m[label]) == "R.Thigh.Front"
     assert seen.marker_sd[at] > 3.0 * np.median(seen.marker_sd)
 
 

@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 import kinertia.simultaneous as simultaneous
 from accuracy import DISTURBANCES, calibrated
 from kinertia.bsp import BodySegmentParameters
-from kinertia.bsp_prior import literature_prior
+from kinertia.bsp_prior import literature_prior, with_symmetry
 from kinertia.map_terms import CalibrationPrior, Observation
 from kinertia.motion_basis import MotionBasis
 from kinertia.simultaneous import estimate_simultaneous
@@ -175,3 +175,17 @@ def test_an_unfinished_run_says_so_and_keeps_the_best_iterate(trial, prior, cali
     assert not result.converged
     assert result.iterations == 1
     assert result.cost[1] < result.cost[0]
+
+
+def test_deviations_of_every_size_have_a_covariance(trial, prior, calibration):
+    """Products of inertia known to a millionth of a mass: the information matrix spans more than double precision."""
+    sd = prior.sd.copy()
+    sd[:, 7:] = 1e-7
+    covariance = with_symmetry(np.diag(np.square(sd.ravel())), prior.mean.segments, 0.9999)
+    seen = observation(trial, noise_m=0.003)
+    result = estimate_simultaneous(
+        trial.skeleton, replace(prior, covariance=covariance), calibration, [seen], SPACING_S
+    )
+    found = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
+    assert (found > 0).all()
+    assert (found <= sd * 1.001).all()

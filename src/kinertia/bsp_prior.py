@@ -65,7 +65,8 @@ class BspPrior:
             raise ValueError(f"the covariance must be {size} x {size}, got {self.covariance.shape}")
         if not np.all(np.diag(self.covariance) > 0) or self.mass_sd_kg <= 0:
             raise ValueError("every prior deviation must be positive")
-        if not np.allclose(self.covariance, self.covariance.T) or np.linalg.eigvalsh(self.covariance)[0] <= 0:
+        correlation = self.covariance / np.outer(self.sd, self.sd)
+        if not np.allclose(correlation, correlation.T) or np.linalg.eigvalsh(correlation)[0] <= 0:
             raise ValueError("the prior covariance must be symmetric and positive definite")
 
     @property

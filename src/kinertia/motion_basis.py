@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
 
 _DEGREE = 5
 _ACTIVE = _DEGREE + 1
+_RIDGE = 1e-8
+"""Keeps splines that no frame touches at zero."""
 
 
 class MotionBasis:
@@ -43,11 +46,19 @@ class MotionBasis:
 
     def fit(self, q: np.ndarray) -> np.ndarray:
         """(size, c) least-squares coefficients of q (n, c); NaN rows of a column are left out."""
-        design = np.zeros((len(q), self.size))
-        np.put_along_axis(design, self.active, self.values[0], axis=1)
-        ridge = 1e-8 * np.eye(self.size)
-        columns = []
-        for column in q.T:
-            seen = np.isfinite(column)
-            columns.append(np.linalg.solve(design[seen].T @ design[seen] + ridge, design[seen].T @ column[seen]))
-        return np.column_stack(columns)
+        seen = np.isfinite(q)
+        filled = np.where(seen, q, 0.0)
+        coefficients = np.empty((self.size, q.shape[1]))
+        masks, column_mask = np.unique(seen, axis=1, return_inverse=True)
+        for k, mask in enumerate(masks.T):
+            columns = column_mask.ravel() == k
+            value = self.values[0] * mask[:, None]
+            band = np.zeros((_ACTIVE, self.size))
+            right = np.zeros((self.size, int(columns.sum())))
+            for a in range(_ACTIVE):
+                np.add.at(right, self.active[:, a], value[:, a, None] * filled[:, columns])
+                for b in range(a, _ACTIVE):
+                    np.add.at(band[b - a], self.active[:, a], value[:, a] * value[:, b])
+            band[0] += _RIDGE
+            coefficients[:, columns] = solveh_banded(band, right, lower=True)
+        return coefficients

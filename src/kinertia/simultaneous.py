@@ -74,7 +74,7 @@ def estimate_simultaneous(
     while iterations < _MAX_ITERATIONS and not converged:
         normals = [problem.normal(k, part, values) for k, part in enumerate(coefficients)]
         prior_terms = problem.prior_terms(values)
-        iterations += 1
+        iterations, linearised = iterations + 1, values
         scale = np.maximum(scale, np.diag(prior_terms[0]) + sum(np.diag(normal.static) for normal in normals))
         for _ in range(12):
             step, moves = _step(normals, prior_terms, damping, scale)
@@ -92,7 +92,13 @@ def estimate_simultaneous(
         damping = max(damping * 0.1, 1e-9)
     normals = [problem.normal(k, part, values) for k, part in enumerate(coefficients)]
     information = problem.prior_terms(values)[0] + sum(_reduced(normal, 0.0)[0] for normal in normals)
-    return _result(problem, coefficients, values, np.linalg.inv(information), converged, iterations, (begin, current))
+    return _result(problem, coefficients, values, _inverse(information), converged, iterations, (begin, current))
+
+
+def _inverse(information: np.ndarray) -> np.ndarray:
+    """Inverse by way of a unit diagonal: information on metres, kilograms and seconds differs by ten orders."""
+    scale = 1.0 / np.sqrt(np.diag(information))
+    return scale[:, None] * np.linalg.inv(scale[:, None] * information * scale) * scale
 
 
 def _step(
@@ -159,13 +165,13 @@ def _result(
     coefficients: Sequence[np.ndarray],
     values: np.ndarray,
     covariance: np.ndarray,
+    chain: np.ndarray,
     converged: bool,
     iterations: int,
     cost: tuple[float, float],
 ) -> SimultaneousResult:
     layout = problem.layout
     bsp = problem.bsp(values)
-    chain = block_diagonal(table_jacobian(values[layout.theta]))
     sd = np.sqrt(np.diag(covariance))
     names = list(problem.calibration.coordinates)
     found = {
