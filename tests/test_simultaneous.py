@@ -178,7 +178,7 @@ def test_an_unfinished_run_says_so_and_keeps_the_best_iterate(trial, prior, cali
 
 
 def test_deviations_of_every_size_have_a_covariance(trial, prior, calibration):
-    """Products of inertia known to a millionth of a mass: the information matrix spans more than double precision."""
+    """Products of inertia known to 1e-7 kg m2 beside masses known to 1 kg: data only ever lower a deviation."""
     sd = prior.sd.copy()
     sd[:, 7:] = 1e-7
     covariance = with_symmetry(np.diag(np.square(sd.ravel())), prior.mean.segments, 0.9999)
@@ -189,3 +189,17 @@ def test_deviations_of_every_size_have_a_covariance(trial, prior, calibration):
     found = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
     assert (found > 0).all()
     assert (found <= sd * 1.001).all()
+
+
+def test_singular_information_has_a_covariance():
+    """At the edge of what is possible the information on a logarithm rounds to zero, or below."""
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(6, 6)) * [1e6, 1.0, 1.0, 1e-3, 1.0, 1.0]
+    information = factor.T @ factor
+    np.testing.assert_allclose(simultaneous._inverse(information), np.linalg.inv(information), rtol=1e-6)
+    factor[:, 4] = factor[:, 5] * (1.0 + 1e-12)
+    singular = factor.T @ factor - 1e-12 * np.outer(np.arange(6) == 4, np.arange(6) == 4)
+    assert np.linalg.eigvalsh(singular)[0] < 0
+    covariance = simultaneous._inverse(singular)
+    assert np.isfinite(covariance).all()
+    assert np.linalg.eigvalsh(covariance)[0] > -1e-9 * np.abs(covariance).max()

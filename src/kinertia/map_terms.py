@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -235,7 +234,6 @@ class MapProblem:
             np.zeros((layout.size, layout.size)),
             np.zeros((basis.size, c)),
             np.zeros(layout.size),
-            0.0,
         )
         marker = self._marker_terms(trial, skeleton, parts[0])
         root = self._root_terms(k, skeleton, parts, static)
@@ -245,8 +243,8 @@ class MapProblem:
         normal.right -= (coefficients - self.start[k]) / COEFFICIENT_SD**2
         return normal
 
-    def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[Any, ...]:
-        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,), r^T r.
+    def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,).
 
         S holds the static coordinates and the marker positions, which stand side by side in the layout.
         """
@@ -254,7 +252,7 @@ class MapProblem:
         still, moving = self.still, self.moving
         pose = skeleton.pose(q)
         weight = 1.0 / np.square(trial.marker_sd)
-        normal, gradient, square = normal_equations(skeleton, self.above, trial.markers, pose, weight)
+        normal, gradient, _ = normal_equations(skeleton, self.above, trial.markers, pose, weight)
         positions = skeleton.marker_positions(pose)
         error = trial.markers - positions
         weights = np.isfinite(error).all(axis=-1) * weight
@@ -273,7 +271,7 @@ class MapProblem:
         static[range(k, k + 3 * m), range(k, k + 3 * m)] = np.repeat(weights.sum(axis=0), 3)
         pulled = np.nan_to_num(error) * weights[..., None]
         right = np.concatenate([gradient[:, still].sum(axis=0), np.einsum("nmij,nmi->mj", turned, pulled).ravel()])
-        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right, float(square.sum())
+        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right
 
     def _root_terms(
         self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,18 +18,17 @@ class NormalEquations:
     static: np.ndarray
     right: np.ndarray
     static_right: np.ndarray
-    cost: float
 
 
 def assemble(
     normal: NormalEquations,
     basis: MotionBasis,
-    marker: tuple[Any, ...],
+    marker: tuple[np.ndarray, ...],
     root: tuple[np.ndarray, ...],
     still: slice,
 ) -> None:
     """Sum the terms of all frames into the normal equations, one knot interval at a time."""
-    per_frame, across, gradient, static, right, square = marker
+    per_frame, across, gradient, static, right = marker
     frames, dq, dv, da, by_static, left = root
     c, size = per_frame.shape[1], normal.static.shape[0]
     flat = by_static.reshape(-1, size)
@@ -38,7 +36,6 @@ def assemble(
     normal.static[still, still] += static
     normal.static_right -= flat.T @ left.ravel()
     normal.static_right[still] += right
-    normal.cost = 0.5 * (square + float(np.square(left).sum()))
     values = basis.values
     for first in np.unique(basis.first):
         here = np.flatnonzero(basis.first == first)

@@ -59,6 +59,8 @@ class SimultaneousResult:
 CONVERGED = 0.05
 """Stop when a step lowers half the sum of squares by less: a third of one standard deviation, over all unknowns."""
 _MAX_ITERATIONS = 40
+_SINGULAR = 1e-13
+"""Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
 
 
 def estimate_simultaneous(
@@ -74,7 +76,7 @@ def estimate_simultaneous(
     while iterations < _MAX_ITERATIONS and not converged:
         normals = [problem.normal(k, part, values) for k, part in enumerate(coefficients)]
         prior_terms = problem.prior_terms(values)
-        iterations, linearised = iterations + 1, values
+        iterations += 1
         scale = np.maximum(scale, np.diag(prior_terms[0]) + sum(np.diag(normal.static) for normal in normals))
         for _ in range(12):
             step, moves = _step(normals, prior_terms, damping, scale)
@@ -96,9 +98,14 @@ def estimate_simultaneous(
 
 
 def _inverse(information: np.ndarray) -> np.ndarray:
-    """Inverse by way of a unit diagonal: information on metres, kilograms and seconds differs by ten orders."""
+    """Covariance; finite also where a segment has come near the edge of what is physically possible.
+
+    There the logarithm of a second moment tells nothing any more, and the information on it may round to below zero.
+    """
     scale = 1.0 / np.sqrt(np.diag(information))
-    return scale[:, None] * np.linalg.inv(scale[:, None] * information * scale) * scale
+    values, vectors = np.linalg.eigh(scale[:, None] * information * scale)
+    half = scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+    return half @ half.T
 
 
 def _step(
@@ -165,13 +172,13 @@ def _result(
     coefficients: Sequence[np.ndarray],
     values: np.ndarray,
     covariance: np.ndarray,
-    chain: np.ndarray,
     converged: bool,
     iterations: int,
     cost: tuple[float, float],
 ) -> SimultaneousResult:
     layout = problem.layout
     bsp = problem.bsp(values)
+    chain = block_diagonal(table_jacobian(values[layout.theta]))
     sd = np.sqrt(np.diag(covariance))
     names = list(problem.calibration.coordinates)
     found = {
