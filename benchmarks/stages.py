@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import opensim
@@ -24,6 +23,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from kinertia.anthropometry import literature_bsp
+from kinertia.bsp import ParameterVector
 from kinertia.config import Subject
 from kinertia.contacts import build_trial
 from kinertia.dynamics import Motion, inverse_dynamics
@@ -35,7 +35,7 @@ from kinertia.marker_set import MarkerSet, choose_marker_set
 from kinertia.prepare import calibrate
 from kinertia.splines import smooth
 from kinertia.trial import Markers
-from kinertia.two_level import Window, estimate_two_level, stretches
+from kinertia.two_level import TwoLevelProblem, Window, stretches
 from measured_trials import table
 from walks import WALKS, data_folder, fit_arguments
 
@@ -46,7 +46,6 @@ SETUPS = {
 }
 WINDOW_S = {"gait2354": (0.0, 2.5), "rajagopal": (0.5, 1.9)}
 """Stretches in which all ground contact is measured: they can be repeated back and forth."""
-EVALUATIONS = 10
 STAGES = ("read", "calibration", "inverse kinematics", "smoothing", "two-level evaluation", "inverse dynamics")
 
 
@@ -122,9 +121,9 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     loads = smooth(trial.loads.time, columns, 10.0)(ik.time).reshape(-1, 2, 6)
     bsp = literature_bsp(one.mass_kg, one.subject.height_m or 0.0, one.subject.sex, model.geometry, "dumas")
     parts = stretches(Window(ik.time, motion, loads.sum(axis=1)))
-    with mock.patch("kinertia.two_level._MAX_EVALUATIONS", EVALUATIONS):
-        spent, result = best(min(runs, 2), lambda: estimate_two_level(skeleton, bsp, parts))
-    seconds["two-level evaluation"] = spent / result.evaluations
+    vector = ParameterVector(bsp, symmetric=True)
+    problem, theta = TwoLevelProblem(skeleton, vector, parts, True, 0.5), vector.values(bsp)
+    seconds["two-level evaluation"], _ = best(runs, lambda: (problem.residuals(theta), problem.jacobian(theta)))
     seconds["inverse dynamics"], _ = best(runs, lambda: inverse_dynamics(skeleton, bsp, motion, loads))
     return seconds, len(ik.time)
 
@@ -229,7 +228,7 @@ Splines: the choice of the smoothing by cross-validation, `smooth` against `GCVS
 The same walk {" and ".join(f"{k}x" for k in lengths)}, every second time backwards so that nothing jumps. Linear cost
 means the same milliseconds per frame in every column, or fewer where a fixed part weighs on the short trial; the last
 column is the longest's divided by the shortest's. Calibration looks at ten frames per second of trial, 60 at most. A
-two-level evaluation is the residual, its derivative with respect to 49 parameters, and the step that follows.
+two-level evaluation is the residual and its derivative with respect to 49 parameters.
 
 {table(["stage", *(f"{k}x (ms)" for k in lengths), f"{lengths[-1]}x / {lengths[0]}x"], scaling)}
 """

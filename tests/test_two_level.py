@@ -8,8 +8,8 @@ from kinertia.dynamics import residual, root_regressor
 from kinertia.two_level import (
     MAX_STRETCH_S,
     Integration,
+    TwoLevelProblem,
     Window,
-    _Problem,
     correct_pelvis,
     estimate_two_level,
     stretches,
@@ -57,7 +57,7 @@ def started(bsp: BodySegmentParameters, symmetric: bool, seed: int, spread: floa
 def test_jacobian_agrees_with_finite_differences(model, truth, correct):
     windows = [disturbed(window_of(model.skeleton, truth, n, seed=n), n) for n in (12, 9)]
     vector = ParameterVector(truth, True)
-    problem = _Problem(model.skeleton, vector, windows, correct, 0.5)
+    problem = TwoLevelProblem(model.skeleton, vector, windows, correct, 0.5)
     theta = vector.values(started(truth, True, 1))
     analytic = problem.jacobian(theta)
     assert analytic.shape == (6 * 21, 49)

@@ -152,7 +152,7 @@ def estimate_two_level(
     """
     vector = ParameterVector(start, symmetric)
     length = _radius_of_gyration(skeleton, start, windows)
-    problem = _Problem(skeleton, vector, windows, correct, length)
+    problem = TwoLevelProblem(skeleton, vector, windows, correct, length)
     theta = vector.values(start)
     begin = 0.5 * float(np.square(problem.residuals(theta)).sum())
     positive = vector.lower_bounds == 0.0
@@ -165,7 +165,10 @@ def estimate_two_level(
 
 
 def _minimise(
-    problem: _Problem, theta: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], progress: Callable[[float], None]
+    problem: TwoLevelProblem,
+    theta: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    progress: Callable[[float], None],
 ) -> OptimizeResult:
     """Least squares within bounds.
 
@@ -200,7 +203,7 @@ def _minimise(
 
 
 def _minimise_freely(
-    problem: _Problem, theta: np.ndarray, scale: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+    problem: TwoLevelProblem, theta: np.ndarray, scale: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
 ) -> OptimizeResult | None:
     """Levenberg-Marquardt without bounds; None unless it converges, and inside them."""
     with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
@@ -228,7 +231,7 @@ def _radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows:
 
 
 @dataclass(frozen=True)
-class _Problem:
+class TwoLevelProblem:
     """Scaled residuals and their Jacobian with respect to the parameter vector."""
 
     skeleton: Skeleton
@@ -242,14 +245,17 @@ class _Problem:
         return np.repeat([1.0, 1.0 / self.length], 3)
 
     def motion(self, bsp: BodySegmentParameters, window: Window) -> Motion:
+        """The motion that goes with these BSPs: corrected, or as measured."""
         return correct_pelvis(self.skeleton, bsp, window) if self.correct else window.motion
 
     def residuals(self, theta: np.ndarray) -> np.ndarray:
+        """Scaled residuals of all frames of all windows, in one row."""
         bsp = self.vector.bsp(theta)
         parts = [residual(self.skeleton, bsp, self.motion(bsp, w), w.wrench) * self._scale for w in self.windows]
         return np.concatenate([part.ravel() for part in parts])
 
     def jacobian(self, theta: np.ndarray) -> np.ndarray:
+        """Derivative of `residuals` with respect to theta."""
         bsp = self.vector.bsp(theta)
         change = self.vector.jacobian(theta)
         parts = [self._jacobian(bsp, change, window) for window in self.windows]
