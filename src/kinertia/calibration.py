@@ -63,7 +63,7 @@ def adapt(
     rest = [marker for marker in skeleton.markers if marker.label not in present]
     base = skeleton.with_markers(kept)
     few = [sampled(markers) for markers in trials]
-    measured = np.concatenate([_positions(base, markers) for markers in few])
+    measured = np.concatenate([markers.arranged(base.labels) for markers in few])
     start = np.concatenate([solve_ik(base, markers).q for markers in few])
     seen = np.isfinite(start).all(axis=1)
     measured, moving = measured[seen], start[seen]
@@ -135,15 +135,6 @@ def sampled(markers: Markers) -> Markers:
     count = min(_MAX_FRAMES, len(markers.time), 1 + int(duration / FRAME_SPACING_S))
     every = -(-len(markers.time) // count)
     return Markers(markers.time[::every], markers.labels, markers.positions[::every])
-
-
-def _positions(skeleton: Skeleton, markers: Markers) -> np.ndarray:
-    """(n, m, 3) measured markers in the skeleton's order, NaN where the trial does not have one."""
-    positions = np.full((len(markers.time), len(skeleton.markers), 3), np.nan)
-    for i, marker in enumerate(skeleton.markers):
-        if marker.label in markers.labels:
-            positions[:, i] = markers.positions[:, markers.labels.index(marker.label)]
-    return positions
 
 
 def _relocated(markers: Sequence[Marker], positions: np.ndarray) -> list[Marker]:

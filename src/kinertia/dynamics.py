@@ -78,6 +78,11 @@ def _ground_load_at_pelvis(q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     return np.concatenate([force, moment - np.cross(q[:, :3], force)], axis=1)
 
 
+def ground_load_to_generalised(q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """Root generalised force (n, 6) of ground reactions (n, 6: force, moment about the ground origin)."""
+    return _load_to_generalised(q, _ground_load_at_pelvis(q, wrench))
+
+
 def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
     """Root residual P (n, 6), equation (1): inertial and gravity load minus the ground reactions.
 

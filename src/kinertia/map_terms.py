@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
-from kinertia.dynamics import root_axes
+from kinertia.dynamics import ground_load_to_generalised, root_axes
 from kinertia.ik import ancestor_of, normal_equations
 from kinertia.log_cholesky import (
     dynamic_jacobian,
@@ -201,7 +201,7 @@ class MapProblem:
             data = model.createData()
             tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames]).reshape(-1, 6)
             wrench, _ = self.wrench(k, static)
-            left = (tau - _generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
+            left = (tau - ground_load_to_generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
             total += 0.5 * float(np.square(left).sum())
         return total
 
@@ -310,13 +310,13 @@ class MapProblem:
         for plate in range(trial.n_plates):
             for j, axis in enumerate(np.eye(3)[[0, 2]]):
                 moment = np.concatenate([np.zeros((d, 3)), np.cross(axis, force[:, plate])], axis=1)
-                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -_generalised(
+                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -ground_load_to_generalised(
                     np.hstack([np.zeros((d, 3)), q[:, 3:6]]), moment
                 )
         rates = self.wrench(k, static, 1)[0][frames]
-        by_static[:, :, layout.clocks[k]] = -_generalised(q[:, :6], rates)
+        by_static[:, :, layout.clocks[k]] = -ground_load_to_generalised(q[:, :6], rates)
         sd = self.root_sd(trial)[None, :, None]
-        left = (tau - _generalised(q[:, :6], wrench)) / sd[..., 0]
+        left = (tau - ground_load_to_generalised(q[:, :6], wrench)) / sd[..., 0]
         return (
             frames,
             dq[..., self.moving] / sd,
@@ -335,14 +335,8 @@ def block_diagonal(blocks: np.ndarray) -> np.ndarray:
     return result.reshape(s * k, s * k)
 
 
-def _generalised(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """Root generalised force (n, 6) of a wrench about the ground origin."""
-    moment = wrench[:, 3:] - np.cross(root[:, :3], wrench[:, :3])
-    return np.concatenate([wrench[:, :3], np.einsum("nij,ni->nj", root_axes(root), moment)], axis=1)
-
-
 def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """(n, 6, 6) derivative of `_generalised` with respect to the root coordinates."""
+    """(n, 6, 6) derivative of `ground_load_to_generalised` with respect to the root coordinates."""
     axes = root_axes(root)
     moment = wrench[:, 3:] - np.cross(root[:, :3], wrench[:, :3])
     result = np.zeros((len(root), 6, 6))

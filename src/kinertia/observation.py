@@ -62,7 +62,7 @@ def observe(
     near = (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
     frames = np.flatnonzero(near & np.isfinite(kinematics.ik.q).any(axis=1))
     q = kinematics.ik.q[frames]
-    measured = _measured(skeleton, kinematics, frames)
+    measured = kinematics.trial.markers.arranged(skeleton.labels)[frames]
     known = np.where(np.isfinite(q), q, kinematics.spline(time[frames]))
     errors = measured - skeleton.marker_positions(skeleton.pose(known))
     noise, effective = _noise(skeleton, errors, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
@@ -85,15 +85,6 @@ def observe(
         ),
         noise,
     )
-
-
-def _measured(skeleton: Skeleton, kinematics: Kinematics, frames: np.ndarray) -> np.ndarray:
-    markers = kinematics.trial.markers
-    positions = np.full((len(frames), len(skeleton.markers), 3), np.nan)
-    for i, label in enumerate(skeleton.labels):
-        if label in markers.labels:
-            positions[:, i] = markers.positions[frames, markers.labels.index(label)]
-    return positions
 
 
 def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float) -> tuple[MarkerNoise, np.ndarray]:

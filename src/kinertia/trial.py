@@ -84,6 +84,14 @@ class Markers:
         columns = [self.labels.index(label) for label in labels]
         return Markers(self.time, tuple(labels), self.positions[:, columns])
 
+    def arranged(self, labels: Sequence[str]) -> FloatArray:
+        """Positions (n, len(labels), 3) m in this order; NaN for a label that the trial does not have."""
+        positions = np.full((len(self.time), len(labels), 3), np.nan)
+        for column, label in enumerate(labels):
+            if label in self.labels:
+                positions[:, column] = self.positions[:, self.labels.index(label)]
+        return positions
+
     def rotated(self, rotation: FloatArray) -> Markers:
         """The same markers in axes turned by `rotation` (3, 3): new = rotation @ old."""
         return replace(self, positions=self.positions @ rotation.T)
