@@ -222,8 +222,8 @@ def _bsp_table(fit: Fit) -> Table:
             table.add_row(segment, source, *cells)
             segment = ""
         if fit.posterior is not None:
-            mass, *com, ixx, iyy, izz = fit.posterior.sd[i, :7]
+            sd = fit.posterior.sd[i]
             table.add_row(
-                "", "sd", f"{mass:.2f}", *(f"{v * 1e3:.0f}" for v in com), *(f"{v:.4f}" for v in (ixx, iyy, izz))
+                "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
             )
     return table

@@ -152,7 +152,8 @@ def _words(segments: Sequence[str], vector: np.ndarray) -> str:
                     name = f"both {_PLURALS.get(stem, stem + 's')}" if same else f"the right {stem} and not of the left"
             terms.append((float(value), f"{_QUANTITIES[parameter]} of {name}"))
     terms.sort(key=lambda term: -abs(term[0]))
-    told, share = [], 0.0
+    told: list[str] = []
+    share = 0.0
     for value, name in terms[:_MOST_NAMES]:
         told.append(f"{'with' if value * terms[0][0] > 0 else 'against'} {name}" if told else name)
         share += value**2
