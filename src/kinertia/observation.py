@@ -14,15 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.kinematics import Kinematics
+from kinertia.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.map_terms import Observation
 from kinertia.skeleton import GRAVITY_M_S2, Skeleton
-from kinertia.splines import smooth
 
 CUTOFF_HZ = 10.0
 """Bandwidth where the user leaves the cutoff to cross-validation, which correlated noise deceives."""
-AROUND_WINDOW_S = 0.25
-"""Frames this near the measured window contribute their markers."""
 FORCE_SD_OF_WEIGHT = 0.005
 """Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
 MOMENT_ARM_M = 0.3
@@ -66,9 +63,6 @@ def observe(
     known = np.where(np.isfinite(q), q, kinematics.spline(time[frames]))
     errors = measured - skeleton.marker_positions(skeleton.pose(known))
     noise, effective = _noise(skeleton, errors, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
-    loads = kinematics.trial.loads
-    inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
-    columns = np.concatenate([loads.force, loads.moment], axis=-1)[inside].reshape(-1, 12)
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
@@ -79,7 +73,7 @@ def observe(
             marker_sd=effective,
             q=q,
             dynamic=(time[frames] >= start - 1e-9) & (time[frames] <= end + 1e-9),
-            plates=smooth(loads.time[inside], columns, cutoff_hz),
+            plates=kinematics.smoothed_loads(cutoff_hz),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
