@@ -72,7 +72,7 @@ class Kinematics:
 
     @cached_property
     def foot_loads(self) -> np.ndarray:
-        """(w, 2, 6) ground reactions on the right and left foot inside the window: force, moment about ground origin."""
+        """(w, 2, 6) ground reactions on right and left foot in the window: force, moment about the ground origin."""
         return self.smoothed_loads(self.cutoff_hz)(self.time).reshape(-1, 2, 6)
 
     def smoothed_loads(self, cutoff_hz: float) -> SmoothedSpline:

@@ -13,10 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from kinertia.instruments import FootPlates
 from kinertia.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.map_terms import Observation
 from kinertia.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.trial import nearest_samples
 
 CUTOFF_HZ = 10.0
 """Bandwidth where the user leaves the cutoff to cross-validation, which correlated noise deceives."""
@@ -73,12 +76,21 @@ def observe(
             marker_sd=effective,
             q=q,
             dynamic=(time[frames] >= start - 1e-9) & (time[frames] <= end + 1e-9),
-            plates=kinematics.smoothed_loads(cutoff_hz),
+            ground=_ground(kinematics, time[frames], cutoff_hz),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
         noise,
     )
+
+
+def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float) -> FootPlates:
+    loads = kinematics.trial.loads
+    nearest = nearest_samples(loads.time, time)
+    turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
+    used, carrier = np.unique(loads.carrier[nearest], return_inverse=True)
+    names = tuple(loads.plates[i] for i in used)
+    return FootPlates(kinematics.smoothed_loads(cutoff_hz), names, carrier.reshape(-1, 2), turn)
 
 
 def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float) -> tuple[MarkerNoise, np.ndarray]:
