@@ -16,6 +16,7 @@ from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import ground_load_to_generalised, root_axes
 from kinertia.ik import ancestor_of, normal_equations
+from kinertia.instruments import PLATE_UNKNOWNS, FootPlates
 from kinertia.log_cholesky import (
     dynamic_jacobian,
     from_log_cholesky,
@@ -26,7 +27,6 @@ from kinertia.log_cholesky import (
 from kinertia.motion_basis import MotionBasis
 from kinertia.normal_equations import NormalEquations, assemble
 from kinertia.skeleton import Marker, Skeleton
-from kinertia.splines import SmoothedSpline
 
 COEFFICIENT_SD = 1.0
 """Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
@@ -42,7 +42,7 @@ class Observation:
         marker_sd: (m,) effective white deviation, m (inflated by the square root of the noise's correlation length).
         q: (n, c) start.
         dynamic: (n,) frames whose ground contacts are all measured.
-        plates: time -> (6 p) smoothed force and moment about the ground origin of every plate.
+        ground: the loads on the feet, and the plates that measured them.
         force_sd, moment_sd: effective deviations of the root residual, N and N m.
     """
 
@@ -51,14 +51,9 @@ class Observation:
     marker_sd: np.ndarray
     q: np.ndarray
     dynamic: np.ndarray
-    plates: SmoothedSpline
+    ground: FootPlates
     force_sd: float
     moment_sd: float
-
-    @property
-    def n_plates(self) -> int:
-        """Number of force plates."""
-        return len(self.plates.p) // 6
 
 
 @dataclass(frozen=True)
@@ -69,12 +64,14 @@ class CalibrationPrior:
         coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
         plate_sd_m: of each plate's in-plane offset.
+        gain_sd: of each plate's relative error of gain.
         clock_sd_s: of the time between forces and markers.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
     plate_sd_m: float
+    gain_sd: float
     clock_sd_s: float
 
 
@@ -85,27 +82,20 @@ class Layout:
     theta: slice
     coordinates: slice
     locals: slice
-    plates: tuple[slice, ...]
-    clocks: tuple[int, ...]
-    size: int
+    plates: slice
+    clock: int
 
     @classmethod
-    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: Sequence[int]) -> Layout:
-        """The layout for these numbers of unknowns; plates per trial."""
-        at = n_bsp + n_coordinates + 3 * n_markers
-        plates, clocks = [], []
-        for count in n_plates:
-            plates.append(slice(at, at + 2 * count))
-            clocks.append(at + 2 * count)
-            at += 2 * count + 1
-        return cls(
-            slice(0, n_bsp),
-            slice(n_bsp, n_bsp + n_coordinates),
-            slice(n_bsp + n_coordinates, n_bsp + n_coordinates + 3 * n_markers),
-            tuple(plates),
-            tuple(clocks),
-            at,
-        )
+    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int) -> Layout:
+        """The layout for these numbers of unknowns."""
+        ends = np.cumsum([n_bsp, n_coordinates, 3 * n_markers, len(PLATE_UNKNOWNS) * n_plates]).tolist()
+        parts = [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
+        return cls(parts[0], parts[1], parts[2], parts[3], ends[-1])
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.clock + 1
 
 
 class MapProblem:
@@ -127,9 +117,9 @@ class MapProblem:
         self.segments = prior.mean.segments
         self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
         self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
-        self.layout = Layout.of(
-            10 * len(self.segments), len(self.still), len(skeleton.markers), [trial.n_plates for trial in trials]
-        )
+        self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
+        self.carriers = [trial.ground.columns(self.plates) for trial in trials]
+        self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
         self.above = ancestor_of(self.free)
         self.information = np.linalg.inv(prior.covariance)
         self.start_static = np.zeros(self.layout.size)
@@ -139,8 +129,9 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        for plates, clock in zip(self.layout.plates, self.layout.clocks, strict=True):
-            deviation[plates], deviation[clock] = calibration.plate_sd_m, calibration.clock_sd_s
+        each = (calibration.plate_sd_m, calibration.plate_sd_m, calibration.gain_sd)
+        deviation[self.layout.plates] = each * len(self.plates)
+        deviation[self.layout.clock] = calibration.clock_sd_s
         self.weight = 1.0 / np.square(deviation)
 
     def bsp(self, static: np.ndarray) -> BodySegmentParameters:
@@ -200,7 +191,7 @@ class MapProblem:
             model = skeleton.model_with(bsp)
             data = model.createData()
             tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames]).reshape(-1, 6)
-            wrench, _ = self.wrench(k, static)
+            wrench = self.foot_loads(k, static).sum(axis=1)
             left = (tau - ground_load_to_generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
             total += 0.5 * float(np.square(left).sum())
         return total
@@ -209,18 +200,15 @@ class MapProblem:
         """(6,) deviations of the root residual: N, N m."""
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
-    def wrench(self, k: int, static: np.ndarray, derivative: int = 0) -> tuple[np.ndarray, np.ndarray]:
-        """Sum of plates (n, 6) about the ground origin at the corrected place and time, and each plate's force
-        (n, p, 3); or their time derivatives.
-        """
+    def plate_values(self, static: np.ndarray) -> np.ndarray:
+        """(p, 3) offsets and gain error of every plate."""
+        return static[self.layout.plates].reshape(-1, len(PLATE_UNKNOWNS))
+
+    def foot_loads(self, k: int, static: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
         trial = self.trials[k]
-        at = trial.time + static[self.layout.clocks[k]]
-        loads = trial.plates(at, derivative).reshape(len(trial.time), -1, 6)
-        force = loads[:, :, :3]
-        offset = np.zeros((trial.n_plates, 3))
-        offset[:, [0, 2]] = static[self.layout.plates[k]].reshape(-1, 2)
-        moment = loads[:, :, 3:] + np.cross(offset, force)
-        return np.concatenate([force.sum(axis=1), moment.sum(axis=1)], axis=1), force
+        at = trial.time + static[self.layout.clock]
+        return trial.ground.corrected(at, self.carriers[k], self.plate_values(static), derivative)
 
     def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
         """Normal equations of trial k."""
@@ -300,21 +288,19 @@ class MapProblem:
             regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
         square = da[:, :, :6]
         da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
-        wrench, force = (part[frames] for part in self.wrench(k, static))
+        loads = self.foot_loads(k, static)[frames]
+        wrench = loads.sum(axis=1)
         dq[:, :, :6] -= _generalised_derivative(q[:, :6], wrench)
         by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
         by_static = np.zeros((d, 6, layout.size))
         chain = dynamic_jacobian(static[layout.theta])
         by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, 10 * len(joints))
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
-        for plate in range(trial.n_plates):
-            for j, axis in enumerate(np.eye(3)[[0, 2]]):
-                moment = np.concatenate([np.zeros((d, 3)), np.cross(axis, force[:, plate])], axis=1)
-                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -ground_load_to_generalised(
-                    np.hstack([np.zeros((d, 3)), q[:, 3:6]]), moment
-                )
-        rates = self.wrench(k, static, 1)[0][frames]
-        by_static[:, :, layout.clocks[k]] = -ground_load_to_generalised(q[:, :6], rates)
+        by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
+        for column in range(by_plate.shape[2]):
+            by_static[:, :, layout.plates.start + column] = -ground_load_to_generalised(q[:, :6], by_plate[..., column])
+        rates = self.foot_loads(k, static, 1)[frames].sum(axis=1)
+        by_static[:, :, layout.clock] = -ground_load_to_generalised(q[:, :6], rates)
         sd = self.root_sd(trial)[None, :, None]
         left = (tau - ground_load_to_generalised(q[:, :6], wrench)) / sd[..., 0]
         return (

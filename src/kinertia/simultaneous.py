@@ -2,10 +2,10 @@
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
-segments, each plate's in-plane offset and each trial's time offset. Minimised is the sum of squares, each over its
-deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg damping, all
-derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`);
-its Schur complement is the information on them, and its inverse their covariance.
+segments, each plate's in-plane offset and gain, and the time offset of the forces. Minimised is the sum of squares,
+each over its deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg
+damping, all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns
+(`block_band`); its Schur complement is the information on them, and its inverse their covariance.
 """
 
 from __future__ import annotations
@@ -34,11 +34,10 @@ class SimultaneousResult:
         bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
         skeleton: with the estimated marker positions and static coordinates.
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        plate_offsets_m: per trial (p, 2) x and z, and their posterior deviations (p, 2).
-        clock_s: per trial the time offset and its posterior deviation, s.
+        plates: per plate its offsets x and z (m) and gain error, (3,), and their posterior deviations (3,).
+        clock_s: the time offset and its posterior deviation, s.
+        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
-        residuals: per trial (n, 6) root residual at the dynamic frames' rows, NaN elsewhere; force N, moment N m in
-        ground axes.
         converged: the last step lowered the cost by less than CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
@@ -48,8 +47,9 @@ class SimultaneousResult:
     bsp_covariance: np.ndarray
     skeleton: Skeleton
     coordinates: dict[str, tuple[float, float]]
-    plate_offsets_m: tuple[tuple[np.ndarray, np.ndarray], ...]
-    clock_s: tuple[tuple[float, float], ...]
+    plates: dict[str, tuple[np.ndarray, np.ndarray]]
+    clock_s: tuple[float, float]
+    foot_loads: tuple[np.ndarray, ...]
     motions: tuple[Motion, ...]
     converged: bool
     iterations: int
@@ -187,13 +187,15 @@ def _result(
     }
     markers = problem.placed(values).markers
     skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in found.items()})
+    plates = zip(problem.plate_values(values), problem.plate_values(sd), strict=True)
     return SimultaneousResult(
         bsp,
         chain @ covariance[layout.theta, layout.theta] @ chain.T,
         skeleton,
         found,
-        tuple((values[p].reshape(-1, 2), sd[p].reshape(-1, 2)) for p in layout.plates),
-        tuple((float(values[i]), float(sd[i])) for i in layout.clocks),
+        dict(zip(problem.plates, plates, strict=True)),
+        (float(values[layout.clock]), float(sd[layout.clock])),
+        tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, coefficients, strict=True)),
         converged,
         iterations,
