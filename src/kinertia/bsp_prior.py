@@ -7,7 +7,8 @@ the spread between published methods; collected in the project's `reference/anth
   %, upper arm 9 %, forearm 9 %, trunk parts 10-12 %) and the spread between methods (4c: thigh 14 %, upper arm 16 %,
   foot 15 %);
 - CoM: 3.5 % of the segment's length along it (4a: 1.2-5.6 % of length), and 5 % of the length across it, or 8 mm (no
-  source gives the transverse deviation; tables differ by that much from one another);
+  source gives the transverse deviation; tables differ by that much from one another); 10 mm to the side for pelvis and
+  torso, which are nearly symmetric (no source; organs are not);
 - moments of inertia: 20 % (4b: 12-24 % for the large ones); products of inertia: 8 % of the mean moment (no source; it
   covers principal axes some 5 degrees off).
 
@@ -33,7 +34,7 @@ MASS_SD = {
     "forearm": 0.10,
 }
 """Relative deviation of the mass, by segment."""
-COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M = 0.035, 0.05, 0.008
+COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M, MIDLINE_SD_M = 0.035, 0.05, 0.008, 0.010
 MOMENT_SD, PRODUCT_SD = 0.20, 0.08
 SIDES_CORRELATION = 0.9
 THIGH_TRUNK_CORRELATION = -0.35
@@ -86,6 +87,8 @@ def literature_prior(literature: BodySegmentParameters) -> BspPrior:
         length = 2.0 * abs(table[row, 1 + along])
         sd[row, 1:4] = np.maximum(COM_ACROSS_SD * length, SMALLEST_COM_SD_M)
         sd[row, 1 + along] = max(COM_ALONG_SD * length, SMALLEST_COM_SD_M)
+        if not literature.segments[row].endswith(("_r", "_l")):
+            sd[row, 3] = MIDLINE_SD_M
     sd[:, 4:7] = MOMENT_SD * table[:, 4:7]
     sd[:, 7:] = PRODUCT_SD * table[:, 4:7].mean(axis=1, keepdims=True)
     covariance = with_symmetry(np.diag(np.square(sd.ravel())), literature.segments, SIDES_CORRELATION)
