@@ -130,3 +130,16 @@ def test_inertia_varies_alike_in_all_axes(prior):
     scale = np.sqrt(np.einsum("sii->si", expected))
     gap = (_inertia_covariance(turned) - expected) / (scale[:, :, None] * scale[:, None])
     assert np.abs(gap).max() < 1e-9
+
+
+def test_people_drawn_have_the_prior_s_mean_and_covariance_and_the_scale_s_total(prior):
+    rng = np.random.default_rng(1)
+    people = [prior.draw(rng) for _ in range(800)]
+    tables = np.array([person.table() for person in people])
+    assert np.std([person.total_mass_kg for person in people]) == pytest.approx(prior.mass_sd_kg, rel=0.1)
+    away = (tables - prior.mean.table()) / prior.sd
+    assert np.abs(away.mean(axis=0)).max() < 0.2
+    assert (away.std(axis=0)[:, 1:]).min() > 0.85
+    assert (away.std(axis=0)).max() < 1.15
+    feet = [prior.mean.segments.index(f"foot_{side}") for side in "rl"]
+    assert np.corrcoef(away[:, feet[0], 2], away[:, feet[1], 2])[0, 1] == pytest.approx(SIDES_CORRELATION, abs=0.05)

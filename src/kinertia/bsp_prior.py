@@ -7,7 +7,8 @@ the spread between published methods; collected in the project's `reference/anth
   %, upper arm 9 %, forearm 9 %, trunk parts 10-12 %) and the spread between methods (4c: thigh 14 %, upper arm 16 %,
   foot 15 %);
 - CoM: 3.5 % of the segment's length along it (4a: 1.2-5.6 % of length), and 5 % of the length across it, or 8 mm (no
-  source gives the transverse deviation; tables differ by that much from one another);
+  source gives the transverse deviation; tables differ by that much from one another); 10 mm to the side for pelvis and
+  torso, which are nearly symmetric (no source; organs are not);
 - inertia: 20 % on the second moment of the mass in every direction, half of the variance common to all directions;
   moments of inertia come out at 16-20 % (4b: 12-24 %, much the same in all directions). They cannot vary independently:
   with 20 % on each, hardly a person in a thousand would be physically possible.
@@ -34,7 +35,7 @@ MASS_SD = {
     "forearm": 0.10,
 }
 """Relative deviation of the mass, by segment."""
-COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M = 0.035, 0.05, 0.008
+COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M, MIDLINE_SD_M = 0.035, 0.05, 0.008, 0.010
 SECOND_MOMENT_SD, COMMON_SHARE = 0.20, 0.5
 """Relative deviation of second moments, and the share of its variance that all directions have in common (size)."""
 SIDES_CORRELATION = 0.9
@@ -76,6 +77,22 @@ class BspPrior:
         """(s, 10) prior deviations, in the table's order and units."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 10)
 
+    def draw(self, rng: np.random.Generator) -> BodySegmentParameters:
+        """A person of this prior whose scale said `mass_kg`; drawn again until every segment is physically possible."""
+        scale = np.zeros(self.covariance.shape[0])
+        scale[::10] = 1.0
+        with_total = self.covariance @ scale
+        variance = scale @ with_total + self.mass_sd_kg**2
+        mean = self.mean.table().ravel() + with_total * (self.mass_kg - self.mean.total_mass_kg) / variance
+        covariance = self.covariance - np.outer(with_total, with_total) / variance
+        sd = np.sqrt(np.diag(covariance))
+        root = sd[:, None] * np.linalg.cholesky(covariance / np.outer(sd, sd))
+        while True:
+            table = mean + root @ rng.standard_normal(len(sd))
+            person = BodySegmentParameters.from_table(self.mean.segments, table)
+            if person.physically_consistent().all():
+                return person
+
 
 def literature_prior(literature: BodySegmentParameters) -> BspPrior:
     """The prior around literature values of the 27-DOF model's segments, whose total mass is the scale's."""
@@ -88,6 +105,8 @@ def literature_prior(literature: BodySegmentParameters) -> BspPrior:
         length = 2.0 * abs(table[row, 1 + along])
         sd[row, 1:4] = np.maximum(COM_ACROSS_SD * length, SMALLEST_COM_SD_M)
         sd[row, 1 + along] = max(COM_ALONG_SD * length, SMALLEST_COM_SD_M)
+        if not literature.segments[row].endswith(("_r", "_l")):
+            sd[row, 3] = MIDLINE_SD_M
     blocks = np.zeros((len(names), 10, 10))
     blocks[:, range(4), range(4)] = np.square(sd[:, :4])
     blocks[:, 4:, 4:] = _inertia_covariance(literature)

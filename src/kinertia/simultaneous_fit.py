@@ -21,7 +21,7 @@ from kinertia.skeleton import Skeleton
 JOINT_CENTRE_SD_M = 0.010
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
-PLATE_SD_M = 0.005
+PLATE_SD_M = 0.010
 GAIN_SD = 0.02
 """Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
 CLOCK_SD_S = 0.005
