@@ -20,7 +20,7 @@ def here(problem):
 
 
 def cost(problem: MapProblem, coefficients: np.ndarray, static: np.ndarray) -> float:
-    return problem.cost([coefficients], static)
+    return problem.at([coefficients], static).cost
 
 
 def sloped(function, size: float) -> float:

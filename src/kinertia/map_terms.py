@@ -80,22 +80,47 @@ class Layout:
     """Where each kind of static unknown stands in the vector."""
 
     theta: slice
-    coordinates: slice
-    locals: slice
     plates: slice
     clock: int
+    coordinates: slice
+    locals: slice
 
     @classmethod
     def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int) -> Layout:
         """The layout for these numbers of unknowns."""
-        ends = np.cumsum([n_bsp, n_coordinates, 3 * n_markers, len(PLATE_UNKNOWNS) * n_plates]).tolist()
-        parts = [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
-        return cls(parts[0], parts[1], parts[2], parts[3], ends[-1])
+        counts = [n_bsp, len(PLATE_UNKNOWNS) * n_plates, 1, n_coordinates, 3 * n_markers]
+        ends = np.cumsum(counts).tolist()
+        theta, plates, clock, coordinates, places = (
+            slice(end - count, end) for end, count in zip(ends, counts, strict=True)
+        )
+        return cls(theta, plates, clock.start, coordinates, places)
+
+    @property
+    def in_root(self) -> slice:
+        """What the root equations depend on: all but the marker positions."""
+        return slice(0, self.coordinates.stop)
+
+    @property
+    def in_markers(self) -> slice:
+        """What the markers depend on: static coordinates and marker positions."""
+        return slice(self.coordinates.start, self.locals.stop)
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.clock + 1
+        return self.locals.stop
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
+    squares of everything.
+    """
+
+    normals: tuple[NormalEquations, ...]
+    information: np.ndarray
+    right: np.ndarray
+    cost: float
 
 
 class MapProblem:
@@ -177,24 +202,11 @@ class MapProblem:
         right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
         return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
 
-    def cost(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> float:
-        """Half the sum of squares."""
-        total = self.prior_terms(static)[2]
-        for part, start in zip(coefficients, self.start, strict=True):
-            total += 0.5 * float(np.square(part - start).sum()) / COEFFICIENT_SD**2
-        skeleton, bsp = self.placed(static), self.bsp(static)
-        for k, trial in enumerate(self.trials):
-            q, qd, qdd = self.full(self.bases[k].evaluate(coefficients[k]), static)
-            errors = trial.markers - skeleton.marker_positions(skeleton.pose(q))
-            total += 0.5 * float(np.nansum(np.square(errors / trial.marker_sd[:, None])))
-            frames = np.flatnonzero(trial.dynamic)
-            model = skeleton.model_with(bsp)
-            data = model.createData()
-            tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames]).reshape(-1, 6)
-            wrench = self.foot_loads(k, static).sum(axis=1)
-            left = (tau - ground_load_to_generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
-            total += 0.5 * float(np.square(left).sum())
-        return total
+    def at(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> Linearised:
+        """Cost and normal equations at a point."""
+        normals = tuple(self.normal(k, part, static) for k, part in enumerate(coefficients))
+        information, right, cost = self.prior_terms(static)
+        return Linearised(normals, information, right, cost + sum(normal.cost for normal in normals))
 
     def root_sd(self, trial: Observation) -> np.ndarray:
         """(6,) deviations of the root residual: N, N m."""
@@ -222,17 +234,19 @@ class MapProblem:
             np.zeros((layout.size, layout.size)),
             np.zeros((basis.size, c)),
             np.zeros(layout.size),
+            0.0,
         )
         marker = self._marker_terms(trial, skeleton, parts[0])
         root = self._root_terms(k, skeleton, parts, static)
-        shared = slice(layout.coordinates.start, layout.locals.stop)
-        assemble(normal, basis, marker, root, shared)
+        assemble(normal, basis, marker, root, layout.in_markers, layout.in_root)
+        moved = coefficients - self.start[k]
         normal.band[:, 0] += np.eye(c) / COEFFICIENT_SD**2
-        normal.right -= (coefficients - self.start[k]) / COEFFICIENT_SD**2
+        normal.right -= moved / COEFFICIENT_SD**2
+        normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
         return normal
 
     def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,).
+        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,), r^T r.
 
         S holds the static coordinates and the marker positions, which stand side by side in the layout.
         """
@@ -240,7 +254,7 @@ class MapProblem:
         still, moving = self.still, self.moving
         pose = skeleton.pose(q)
         weight = 1.0 / np.square(trial.marker_sd)
-        normal, gradient, _ = normal_equations(skeleton, self.above, trial.markers, pose, weight)
+        normal, gradient, square = normal_equations(skeleton, self.above, trial.markers, pose, weight)
         positions = skeleton.marker_positions(pose)
         error = trial.markers - positions
         weights = np.isfinite(error).all(axis=-1) * weight
@@ -259,12 +273,12 @@ class MapProblem:
         static[range(k, k + 3 * m), range(k, k + 3 * m)] = np.repeat(weights.sum(axis=0), 3)
         pulled = np.nan_to_num(error) * weights[..., None]
         right = np.concatenate([gradient[:, still].sum(axis=0), np.einsum("nmij,nmi->mj", turned, pulled).ravel()])
-        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right
+        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right, square.sum()
 
     def _root_terms(
         self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, S), residual."""
+        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, s), residual."""
         trial, layout = self.trials[k], self.layout
         frames = np.flatnonzero(trial.dynamic)
         q, qd, qdd = (part[frames] for part in parts)
@@ -292,7 +306,7 @@ class MapProblem:
         wrench = loads.sum(axis=1)
         dq[:, :, :6] -= _generalised_derivative(q[:, :6], wrench)
         by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
-        by_static = np.zeros((d, 6, layout.size))
+        by_static = np.zeros((d, 6, layout.in_root.stop))
         chain = dynamic_jacobian(static[layout.theta])
         by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, 10 * len(joints))
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
