@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import ground_load_to_generalised, root_axes
 from kinertia.ik import ancestor_of, normal_equations
@@ -325,14 +325,6 @@ class MapProblem:
             by_static / sd,
             left,
         )
-
-
-def block_diagonal(blocks: np.ndarray) -> np.ndarray:
-    """(s k, s k) matrix of the blocks (s, k, k)."""
-    s, k, _ = blocks.shape
-    result = np.zeros((s, k, s, k))
-    result[np.arange(s), :, np.arange(s), :] = blocks
-    return result.reshape(s * k, s * k)
 
 
 def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.block_band import BlockBand
-from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
 from kinertia.log_cholesky import table_jacobian
-from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation, block_diagonal
+from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation
 from kinertia.normal_equations import NormalEquations
 from kinertia.skeleton import Skeleton
 

@@ -11,6 +11,7 @@ from kinertia.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.dynamics import Motion
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.identifiability import BaseParameters, base_parameters
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
@@ -38,6 +39,7 @@ class Posterior:
         calibration: per quantity its value, prior and posterior deviation, and unit.
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
+        base: which combinations of parameters these motions show, and which none ever shows.
     """
 
     prior_sd: np.ndarray
@@ -46,6 +48,7 @@ class Posterior:
     calibration: Mapping[str, Mapping[str, float | str]]
     marker_noise: tuple[MarkerNoise, ...]
     iterations: int
+    base: BaseParameters
 
     @property
     def information(self) -> np.ndarray:
@@ -104,6 +107,9 @@ def fit_simultaneous(
         _calibration(used, result),
         tuple(noise for _, noise in seen),
         result.iterations,
+        base_parameters(
+            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o, _ in seen]
+        ),
     )
     return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
 
