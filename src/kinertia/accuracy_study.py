@@ -143,7 +143,7 @@ def run_draw(seed: int, case: tuple[str, int]) -> Draw:
     trial = walk(replace(subject, bsp=prior.draw(of_person)), DURATION_S, trapezoid=False)
     skeleton, kinematics = measured(trial, scenario.faults, of_noise)
     if scenario.calibrated:
-        fitted = fit_simultaneous(skeleton, subject.literature, [kinematics], "gcv")
+        fitted = fit_simultaneous(skeleton, prior, [kinematics], "gcv")
         result, motion = fitted.result, fitted.motions[0]
     else:
         seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)
