@@ -93,9 +93,7 @@ def fit_simultaneous(
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
     seen = [observe(used, k, prior.mass_kg, cutoff) for k in trials]
-    centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
-    places = np.full(len(used.markers), MARKER_SD_M)
-    calibration = CalibrationPrior(dict.fromkeys(centres, JOINT_CENTRE_SD_M), places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    calibration = calibration_prior(used)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
     loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
@@ -111,6 +109,12 @@ def fit_simultaneous(
         ),
     )
     return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
+
+
+def calibration_prior(skeleton: Skeleton) -> CalibrationPrior:
+    """How far a calibrated skeleton with these markers, plates and clock may be off."""
+    centres = dict.fromkeys((*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS), JOINT_CENTRE_SD_M)
+    return CalibrationPrior(centres, np.full(len(skeleton.markers), MARKER_SD_M), PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
 
 
 def _calibration(skeleton: Skeleton, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
