@@ -154,7 +154,7 @@ def run_draw(seed: int, case: tuple[str, int]) -> Draw:
     seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
     if scenario.calibrated:
-        fitted = fit_simultaneous(skeleton, subject.literature, [kinematics], "gcv")
+        fitted = fit_simultaneous(skeleton, prior, [kinematics], "gcv")
         result, motion = fitted.result, fitted.motions[0]
     else:
         result = estimate_simultaneous(skeleton, prior, calibration, [seen], SPACING_S)
