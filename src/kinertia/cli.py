@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kinertia import __version__
+from kinertia.cli_plan import crossval, plan
 from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
@@ -32,6 +33,8 @@ app = typer.Typer(
     "inertias of all segments out.",
 )
 app.command()(demo)
+app.command()(plan)
+app.command()(crossval)
 app.add_typer(study, name="study")
 _MARKS = {"measured": "**", "informed": "*", "assumed": ""}
 _STAGES = ("literature", "corrected", "estimate")
