@@ -6,12 +6,12 @@ function of a function.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 
 HIGHEST_DERIVATIVE = 3
@@ -71,7 +71,7 @@ class Composed:
         return f[3] * g[1] ** 3 + 3.0 * f[2] * g[1] * g[2] + f[1] * g[3]
 
 
-def polynomial(coefficients: Sequence[float]) -> PiecewisePolynomial:
+def polynomial(coefficients: ArrayLike) -> PiecewisePolynomial:
     """Coefficients from the highest power to the constant, as OpenSim's PolynomialFunction has them."""
     return PiecewisePolynomial(np.array([0.0, 1.0]), np.array(coefficients, dtype=float)[:, None])
 
@@ -86,7 +86,7 @@ def linear(slope: float, intercept: float = 0.0) -> PiecewisePolynomial:
     return polynomial([slope, intercept])
 
 
-def piecewise_linear(x: Sequence[float], y: Sequence[float]) -> PiecewisePolynomial:
+def piecewise_linear(x: ArrayLike, y: ArrayLike) -> PiecewisePolynomial:
     """Straight lines between points; the outer ones go on beyond the ends, as in OpenSim's PiecewiseLinearFunction.
 
     Raises:
@@ -96,7 +96,7 @@ def piecewise_linear(x: Sequence[float], y: Sequence[float]) -> PiecewisePolynom
     return PiecewisePolynomial(knots, np.stack([np.diff(values) / np.diff(knots), values[:-1]]))
 
 
-def simm_spline(x: Sequence[float], y: Sequence[float]) -> PiecewisePolynomial:
+def simm_spline(x: ArrayLike, y: ArrayLike) -> PiecewisePolynomial:
     """OpenSim's SimmSpline: a cubic spline that goes on straight beyond its ends.
 
     Its third derivative at either end is that of the cubic through the four outer points (Forsythe, Malcolm and Moler
@@ -137,7 +137,7 @@ def _sixths_of_curvature(knots: np.ndarray, gap: np.ndarray, slope: np.ndarray) 
     return np.linalg.solve(matrix, right)
 
 
-def _points(x: Sequence[float], y: Sequence[float], fewest: int) -> tuple[np.ndarray, np.ndarray]:
+def _points(x: ArrayLike, y: ArrayLike, fewest: int) -> tuple[np.ndarray, np.ndarray]:
     knots, values = np.array(x, dtype=float), np.array(y, dtype=float)
     if len(knots) != len(values) or len(knots) < fewest:
         raise ValueError(f"{len(knots)} x and {len(values)} y; expected as many, at least {fewest}")
