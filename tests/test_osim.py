@@ -139,6 +139,8 @@ def test_degrees_where_opensim_has_degrees(opensim, shared_data, name):
 
 # --- one joint at a time
 
+PIN = joint("PinJoint", "between", "/bodyset/pelvis", "leg", "a")
+
 SPLINE = "<x>-2 -1 0 0.7 1.6 3</x><y>0.1 -0.3 0.05 0.2 0.6 0.4</y>"
 FUNCTIONS = {
     "Constant": '<Constant name="function"><value>0.3</value></Constant>',
@@ -256,6 +258,16 @@ def test_locked_coordinates_stand_at_their_defaults(opensim, written):
     assert_opensim_agrees(path, ours)
 
 
+@pytest.mark.parametrize("inertia", ["0 0 0 0 0 0", "0.01 0.02 0.02 0 0 0"])
+def test_a_massless_body(opensim, written, inertia):
+    """Between two others; with inertia all the same, as some have it."""
+    between = body("leg", 3.0, "-0.01 -0.2 0.02")
+    foot = joint("PinJoint", "below", "/bodyset/leg", "foot", "b")
+    text = model(custom_root() + PIN + foot)
+    text = text.replace(between, body("leg", 0.0, "-0.01 -0.2 0.02", inertia) + body("foot", 1.0))
+    assert_opensim_agrees(*written(text))
+
+
 def test_frames_on_frames_and_markers_on_frames(opensim, written):
     outer = frame("outer", "/bodyset/pelvis", "0.1 0.2 0.3", "0.3 -0.2 0.5")
     own = joint("PinJoint", "between", "../outer", "leg", "a").replace("<frames>", f"<frames>{outer}")
@@ -341,7 +353,6 @@ def test_format_3(opensim, written):
 
 # --- bad input
 
-PIN = joint("PinJoint", "between", "/bodyset/pelvis", "leg", "a")
 SOUND = model(custom_root() + PIN)
 WELDED_ROOT = joint("WeldJoint", "root", "/ground", "pelvis", ())
 TWO_ROOTS = custom_root() + joint("PinJoint", "between", "/ground", "leg", "a")

@@ -7,7 +7,7 @@ cannot be represented is an error that names it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from xml.parsers.expat import ExpatError
@@ -58,7 +58,7 @@ class OsimModel:
     """
 
     path: Path
-    content: bytes
+    content: bytes = field(repr=False)
     skeleton: Skeleton
     bsp: BodySegmentParameters
     joints: tuple[OsimJoint, ...]
@@ -168,13 +168,14 @@ def _bsp(values: Values, bodies: Sequence[Element]) -> BodySegmentParameters:
     for body in bodies:
         mass = values.numbers(body, "mass", 1)
         if mass[0] < 0:
-            values.fail(body, f"body '{body.name}' has mass {mass[0]:g} kg; expected none or a positive one")
+            values.fail(body, f"body '{body.name}' has mass {mass[0]:g} kg; expected zero or a positive one")
         centre = values.numbers(body, "mass_center", 3, [0.0] * 3)
         if values.property(body, "inertia") is not None:
             inertia = values.numbers(body, "inertia", 6)
         else:
             inertia = np.concatenate([values.numbers(body, tag, 1) for tag in INERTIA_TAGS])
-        rows.append(np.concatenate([mass, centre, inertia]))
+        # OpenSim's tensors are per kg: without mass there is none
+        rows.append(np.concatenate([mass, centre, inertia * (mass > 0)]))
     return BodySegmentParameters.from_table(tuple(body.name for body in bodies), np.array(rows))
 
 

@@ -7,6 +7,7 @@ later open it. There are no muscles and no geometry.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
@@ -100,7 +101,8 @@ def _joint(joint: Joint, skeleton: Skeleton) -> str:
 
 
 def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:
-    angles = Rotation.from_matrix(np.asarray(rotation)).as_euler("XYZ", suppress_warnings=True)
+    with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
+        angles = Rotation.from_matrix(np.asarray(rotation)).as_euler("XYZ")
     return (
         f"<PhysicalOffsetFrame name={quoteattr(name)}><socket_parent>{parent}</socket_parent>"
         f"<translation>{_numbers(translation)}</translation><orientation>{_numbers(angles)}</orientation>"

@@ -79,9 +79,9 @@ def _replacement(element: Element, tag: str, old: Element | None, new: str) -> t
 def _body_edits(document: Element, bsp: BodySegmentParameters) -> Iterator[_Edit]:
     rows = dict(zip(bsp.segments, bsp.table(), strict=True))
     for body in body_elements(document):
-        if body.name not in rows:
+        row = rows.get(body.name)
+        if row is None or row[0] == 0.0:  # massless bodies stay as they are
             continue
-        row = rows[body.name]
         yield _Edit(body, "mass", row[:1])
         yield _Edit(body, "mass_center", row[1:4])
         if any(body.child(tag) is not None for tag in INERTIA_TAGS):
