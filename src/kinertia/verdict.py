@@ -96,7 +96,7 @@ def _residuals(trial: TrialFit) -> list[Verdict]:
     force, moment = (np.linalg.norm(part, axis=1) for part in np.hsplit(trial.residuals["estimate"], 2))
     external = float(np.linalg.norm(trial.kinematics.foot_loads[:, :, :3].sum(axis=1), axis=1).max())
     share = float(force.max()) / external
-    small = "good" if share <= PEAK_FORCE_SHARE else "against"
+    small: Level = "good" if share <= PEAK_FORCE_SHARE else "against"
     return [
         _by_guideline(f"{trial.name}: residual force", "N", force, GOOD_FORCE_N, OKAY_FORCE_N),
         _by_guideline(f"{trial.name}: residual moment", "N m", moment, GOOD_MOMENT_NM, OKAY_MOMENT_NM),
