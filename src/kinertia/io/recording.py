@@ -33,10 +33,7 @@ def read_recording(
     """
     markers_path = Path(markers_path)
     _expect_kind(markers_path, (".trc", ".c3d"), "markers")
-    if markers_path.suffix.lower() == ".c3d":
-        recording = read_c3d(markers_path)
-    else:
-        recording = read_trc_recording(markers_path)
+    recording = (read_c3d if markers_path.suffix.lower() == ".c3d" else read_trc_recording)(markers_path)
     if forces_path is not None:
         _expect_kind(Path(forces_path), (".mot", ".sto"), "forces")
     if loads_path is not None:
