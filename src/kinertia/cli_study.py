@@ -8,9 +8,9 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.demo import Demo, run_demo
-from kinertia.io.folder import check_folder
 from kinertia.study import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress
@@ -23,9 +23,7 @@ def _study() -> None:
     """Keeps `table1` a sub-command while it is the only one."""
 
 
-def demo(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
-) -> None:
+def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
     """Show what Kinertia does; needs no files.
 
     A synthetic person walks through a synthetic laboratory; the files it leaves are estimated from, and the estimate is
@@ -35,6 +33,7 @@ def demo(
 
     kinertia demo -o out
     """
+    results_folder(output, force)
     with shown_progress() as progress:
         result = run_demo(output, progress=progress)
     _report_demo(result, output)
@@ -142,7 +141,9 @@ def table1(
         Path | None,
         typer.Option(help="Subject file of a measured trial to start from; the package's walk if left out."),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
 
@@ -152,7 +153,7 @@ def table1(
 
     kinertia study table1 --repeats 3 --trial subject.toml -o out
     """
-    check_folder(output)
+    results_folder(output, force)
     with shown_progress() as progress:
         if trial is None:
             source, name = study_trial(), "synthetic walk"

@@ -36,7 +36,7 @@ class Travel:
     """Where the person goes, in ground axes.
 
     Attributes:
-        kind: "stands", "moves on the spot" or "walks".
+        kind: "stands still", "moves on the spot" or "walks".
         distance_m: from the first to the last tenth of the trial.
         speed_m_s: mean of that.
         direction_deg: about the vertical from +X towards -Z, so that 90 is along -Z; NaN unless walking.
@@ -84,7 +84,7 @@ def travel(markers: Markers) -> Travel:
     ]
     frames = np.flatnonzero(shown.any(axis=1))
     if not frames.size or float(np.median(moved)) < STANDING_RANGE_M:
-        return Travel("stands", 0.0, 0.0, np.nan)
+        return Travel("stands still", 0.0, 0.0, np.nan)
     middle = np.nanmean(positions[frames], axis=1)
     tenth = max(1, len(frames) // 10)
     way = middle[-tenth:].mean(axis=0) - middle[:tenth].mean(axis=0)

@@ -17,6 +17,8 @@ from kinertia.trial import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLo
 
 _FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
 """Below this a centre of pressure is too noisy to be judged."""
+_FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}
+_LISTED = 4
 _LONG_WINDOW_S = 2.0
 """A window without any step may stand for whole strides from this length on."""
 
@@ -50,6 +52,19 @@ class PlateCheck:
     contacts: tuple[Contact, ...]
     outside_share: float | None
     outside_m: float
+
+    def stood_on(self) -> str:
+        """Which foot when, in words; of many contacts their number."""
+        if not self.contacts:
+            return "nobody"
+        told = []
+        for foot in dict.fromkeys(contact.foot for contact in self.contacts):
+            spans = [(contact.start_s, contact.end_s) for contact in self.contacts if contact.foot == foot]
+            listed = ", ".join(f"{start:.2f}-{end:.2f}" for start, end in spans)
+            if len(spans) > _LISTED:
+                listed = f"{len(spans)} contacts, {spans[0][0]:.2f}-{spans[-1][1]:.2f}"
+            told.append(f"{_FOOT_NAMES[foot]} {listed} s")
+        return "; ".join(told)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class MarkerSetMatch:
     Attributes:
         name: of the set.
         fits: whether it is the recording's set; if not, it is the nearest preset.
-        missing: labels of the set that the recording lacks, each with its labels that look most alike.
+        missing: labels of the set that the recording lacks, each with those of `others` that look most alike.
         n_labels: of the set.
         others: labels of the recording that are not in the set and stay unused.
     """
@@ -75,6 +75,39 @@ class RecordingCheck:
     verdicts: tuple[Verdict, ...]
     notes: tuple[str, ...]
 
+    def facts(self) -> list[tuple[str, str]]:
+        """What was measured and how, as pairs of a name and a sentence."""
+        markers, plates, match = self.recording.markers, self.recording.plates, self.marker_set
+        rate = "" if len(markers.time) < 2 else f" at {markers.rate_hz:g} Hz, {markers.time[0]:.3f} to "
+        axes = f"lengths in {self.recording.length_unit}, {self.recording.vertical} up; read as m, Y up"
+        had = match.n_labels - len(match.missing)
+        named = f"{match.name}{'' if match.fits else ' (the nearest preset)'}: {had} of its {match.n_labels} labels"
+        missing = [label + (f" ({' or '.join(near)}?)" if near else "") for label, near in match.missing.items()]
+        told = [
+            ("frames", f"{len(markers.time)}{rate}{markers.time[-1]:.3f} s" if rate else "1"),
+            ("in the file", axes),
+            ("the person", self.travel.sentence()),
+            ("labels", f"{len(markers.labels)}, {len(match.others)} of them not of the set"),
+            ("marker set", named if had else "none known"),
+        ]
+        if missing and had:
+            told.append(("missing labels", ", ".join(missing)))
+        if plates is None:
+            return [*told, ("forces", "none")]
+        rate_hz = (len(plates.time) - 1) / (plates.time[-1] - plates.time[0])
+        told.append(("forces", f"{len(plates.names)} plates at {rate_hz:.6g} Hz"))
+        spans = [f"{start:.3f} to {end:.3f} s" for start, end in self.windows]
+        told.append(("all contact measured", ", ".join(spans) or "nowhere, or unknown"))
+        if self.mass is not None:
+            mass = self.mass
+            told.append(
+                (
+                    "vertical force",
+                    f"{mass.mass_kg:.1f} kg, mean over {mass.over} ({mass.start_s:.2f} to {mass.end_s:.2f} s)",
+                )
+            )
+        return told
+
 
 def check_recording(
     recording: Recording,
@@ -95,7 +128,7 @@ def check_recording(
     if used is not None:
         own = own.select([label for label in used.labels if label in own.labels])
     moves, seen = travel(own), visibility(own)
-    standing = moves.kind == "stands"
+    standing = moves.kind == "stands still"
     found, feet = [*_axes(own), *_labels(match)], None
     if used is not None:
         feet, trouble = _feet(recording.markers.labels, used)
@@ -133,8 +166,8 @@ def _match(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerS
             check_marker_set(marker_set, labels)
     except MarkerSetError:
         used = None
-    missing = nearest_labels([label for label in wanted.labels if label not in labels], labels)
     others = tuple(label for label in labels if label not in wanted.labels)
+    missing = nearest_labels([label for label in wanted.labels if label not in labels], others)
     return MarkerSetMatch(wanted.name, used is not None, missing, len(wanted.labels), others), used
 
 
@@ -145,10 +178,10 @@ def _axes(markers: Markers) -> list[Verdict]:
 
 def _labels(match: MarkerSetMatch) -> list[Verdict]:
     had = match.n_labels - len(match.missing)
-    shared = f"has {had} of the {match.n_labels} labels of {match.name}"
     if match.fits:
-        return [Verdict("good", f"the file {shared}, its marker set")]
-    nearest = f"the nearest is {match.name}: the file {shared}" if had else "no preset shares a label with the file"
+        return [Verdict("good", f"{had} of the {match.n_labels} labels of the marker set {match.name} are there")]
+    nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are there"
+    nearest = nearest if had else "no preset shares a label with the file"
     return [
         Verdict(
             "against",

@@ -40,7 +40,7 @@ def init_subject(folder: str | Path) -> str:
     others = [file.name for file in c3d + trc if file not in (static, *trials)]
     forces = [file for file in files if _holds_forces(file)]
     loads = [file for file in files if file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)]
-    chosen = _matched([trial for trial in trials if trial not in c3d], forces)
+    chosen = matched_by_name([trial for trial in trials if trial not in c3d], forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
         text += [f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."]
@@ -53,7 +53,7 @@ def init_subject(folder: str | Path) -> str:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
         if trial in chosen:
             text += [_entry(TrialFiles, "forces", chosen[trial].name, note=" (matched by name)")]
-            for file in _matched([chosen[trial]], loads).values():
+            for file in matched_by_name([chosen[trial]], loads).values():
                 text += [_entry(TrialFiles, "loads", file.name, note=" (matched by name)")]
         elif trial not in c3d:
             text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
@@ -121,7 +121,7 @@ def _holds_forces(file: Path) -> bool:
     return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
 
 
-def _matched(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
+def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
     """Pairs of files by the longest common part of their names, the best pair first; each file once.
 
     At least four letters must agree, unless there is one file on each side.

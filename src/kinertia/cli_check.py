@@ -1,0 +1,178 @@
+"""`kinertia check`: what is in the files, and whether a fit can use them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from kinertia.check_page import save_check_page
+from kinertia.cli_options import Force, Quiet, Verbose, results_folder
+from kinertia.config import SubjectFile, read_subject
+from kinertia.errors import FileError, KinertiaError
+from kinertia.io.recording import read_recording
+from kinertia.marker_set import MarkerSet, read_marker_set
+from kinertia.recording_check import RecordingCheck, check_recording, common_marker_set
+from kinertia.subject_draft import matched_by_name
+from kinertia.terminal import out, plain_table, show_error, show_verdicts, shown_progress
+from kinertia.trial import Recording
+from kinertia.verdict import stands_against
+
+_MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")
+_LISTED = 8
+
+
+@dataclass(frozen=True)
+class _Files:
+    """The files of one recording, and the window that the user vouches for."""
+
+    markers: Path
+    forces: Path | None = None
+    loads: Path | None = None
+    window_s: tuple[float, float] | None = None
+
+    @property
+    def title(self) -> str:
+        return ", ".join(path.name for path in (self.markers, self.forces, self.loads) if path is not None)
+
+
+def check(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="Markers (.trc, .c3d), each with its forces (.mot, .sto; matched by name), or a subject file (.toml).",
+        ),
+    ],
+    loads: Annotated[
+        Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Body mass, kg, to compare the forces with.")] = None,
+    markers: Annotated[
+        str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for the same as a page, check.html.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Show what is in measured files, and whether a fit can use them.
+
+    Rates, units, axes; markers and gaps; force plates and which foot is on
+    them; the stretch in which all ground contact is measured; the vertical
+    force against body mass. Exit status 1 if something speaks against a fit.
+
+    [bold]Examples[/]
+
+    kinertia check walk.c3d static.c3d
+
+    kinertia check walk.trc walk_grf.mot --loads loads.xml --mass 72.6 -o out
+
+    kinertia check subject.toml
+    """
+    if output is not None:
+        results_folder(output, force)
+    wanted, marker_set, mass = _wanted(files, loads, None if markers is None else read_marker_set(markers), mass)
+    recordings, mistakes = _read(wanted)
+    if marker_set is None:
+        marker_set = common_marker_set([recording for _, recording in recordings])
+    if mass is None:
+        mass = next((recording.mass_kg for _, recording in recordings if recording.mass_kg is not None), None)
+    found = [(one.title, check_recording(recording, marker_set, mass, one.window_s)) for one, recording in recordings]
+    for title, one in found:
+        _show(title, one, verbose)
+    if output is not None:
+        out.print(f"page in {save_check_page(found, mistakes, output)}", soft_wrap=True)
+    for mistake in mistakes:
+        show_error(mistake)
+    if mistakes:
+        raise typer.Exit(2)
+    if any(stands_against(one.verdicts) for _, one in found):
+        raise typer.Exit(1)
+
+
+def _wanted(
+    files: Sequence[Path], loads: Path | None, marker_set: MarkerSet | None, mass_kg: float | None
+) -> tuple[list[_Files], MarkerSet | None, float | None]:
+    """Which files make one recording, the marker set and the body mass if given.
+
+    Raises:
+        FileError: a file of another kind, a subject file with other files or options, or forces without markers.
+    """
+    subjects = [path for path in files if path.suffix.lower() == ".toml"]
+    if subjects:
+        if len(files) > 1 or loads is not None or marker_set is not None or mass_kg is not None:
+            raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
+        return _of_subject(read_subject(subjects[0]))
+    for path in files:
+        if path.suffix.lower() not in (*_MARKER_FILES, *_FORCE_FILES):
+            known = ", ".join((*_MARKER_FILES, *_FORCE_FILES, ".toml"))
+            hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
+            raise FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
+    marked = [path for path in files if path.suffix.lower() in _MARKER_FILES]
+    forces = [path for path in files if path not in marked]
+    pairs = matched_by_name(marked, forces)
+    alone = [path for path in forces if path not in pairs.values()]
+    if alone:
+        raise FileError(
+            alone[0], "goes with none of the marker files by its name; check it together with its markers alone"
+        )
+    wanted = [_Files(path, pairs.get(path)) for path in marked]
+    if loads is not None:
+        having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
+        if len(having) > 1:
+            raise FileError(loads, "explains one trial's forces but several are given; check the trials one by one")
+        wanted[having[0]] = replace(wanted[having[0]], loads=loads)
+    return wanted, marker_set, mass_kg
+
+
+def _of_subject(subject: SubjectFile) -> tuple[list[_Files], MarkerSet | None, float | None]:
+    named = subject.model.markers
+    trials = [_Files(trial.markers, trial.forces, trial.loads, trial.window_s) for trial in subject.trials]
+    marker_set = None if named is None else read_marker_set(named)
+    return [_Files(subject.model.static), *trials], marker_set, subject.subject.mass_kg
+
+
+def _read(wanted: Sequence[_Files]) -> tuple[list[tuple[_Files, Recording]], list[str]]:
+    """The recordings, and a sentence for each that cannot be read."""
+    recordings, mistakes = [], []
+    with shown_progress() as progress:
+        for k, one in enumerate(wanted):
+            progress("reading", k / len(wanted))
+            try:
+                recordings.append((one, read_recording(one.markers, one.forces, one.loads)))
+            except KinertiaError as error:
+                mistakes.append(str(error))
+    return recordings, mistakes
+
+
+def _show(title: str, found: RecordingCheck, verbose: bool) -> None:
+    out.print(f"\n{title}")
+    facts = Table.grid(padding=(0, 2), expand=False)
+    for name, told in found.facts():
+        facts.add_row(name, told)
+    out.print(facts)
+    shown = [one for one in found.markers if verbose or one.share < 1.0]
+    if shown:
+        gaps = plain_table("marker", "seen\n(%)", "longest gap\n(s)")
+        for one in shown if verbose else shown[:_LISTED]:
+            gaps.add_row(one.label, f"{100 * one.share:.0f}", f"{one.longest_gap_s:.2f}")
+        out.print(gaps)
+        if not verbose and len(shown) > _LISTED:
+            out.print(f"and {len(shown) - _LISTED} more markers with gaps (--verbose lists them)")
+    if found.plates:
+        plates = plain_table("plate", "", "peak\n(N)", "off plate\n(% of load)")
+        plates.padding = (0, 1)
+        for plate in found.plates:
+            off = "-" if plate.outside_share is None else f"{100 * plate.outside_share:.0f}"
+            plates.add_row(plate.name, plate.stood_on(), f"{plate.peak_n:.0f}", off)
+        out.print(plates)
+    show_verdicts(found.verdicts)
+    for note in found.notes:
+        out.print(f"assumed: {note}")
