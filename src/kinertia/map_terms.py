@@ -14,7 +14,6 @@ import pinocchio as pin
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
-from kinertia.dynamics import ground_load_to_generalised, root_axes
 from kinertia.ik import ancestor_of, normal_equations
 from kinertia.log_cholesky import (
     dynamic_jacobian,
@@ -193,15 +192,17 @@ class MapProblem:
             total += 0.5 * float(np.square(part - start).sum()) / COEFFICIENT_SD**2
         skeleton, bsp = self.placed(static), self.bsp(static)
         for k, trial in enumerate(self.trials):
-            q, qd, qdd = self.full(self.bases[k].evaluate(coefficients[k]), static)
+            q, *rates = self.full(self.bases[k].evaluate(coefficients[k]), static)
             errors = trial.markers - skeleton.marker_positions(skeleton.pose(q))
             total += 0.5 * float(np.nansum(np.square(errors / trial.marker_sd[:, None])))
             frames = np.flatnonzero(trial.dynamic)
             model = skeleton.model_with(bsp)
             data = model.createData()
-            tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames]).reshape(-1, 6)
+            x, v, a = skeleton.map.motion(q, *rates)
+            tau = np.array([pin.rnea(model, data, x[i], v[i], a[i])[:6] for i in frames]).reshape(-1, 6)
             wrench, _ = self.wrench(k, static)
-            left = (tau - ground_load_to_generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
+            ground = skeleton.root.ground_load_to_generalised(q[frames], wrench[frames])
+            left = (tau - ground) / self.root_sd(trial)
             total += 0.5 * float(np.square(left).sum())
         return total
 
@@ -262,6 +263,7 @@ class MapProblem:
         )
         by_marker = pose.jacobian.transpose(0, 2, 1) @ twist.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
         by_marker *= np.repeat(skeleton.support[skeleton.marker_segments].T, 3, axis=1)
+        by_marker = skeleton.map.to_coordinates(by_marker.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
         across = np.concatenate([normal[:, moving[:, None], still], by_marker[:, moving]], axis=-1)
         k = len(still)
         static = np.zeros((k + 3 * m, k + 3 * m))
@@ -289,19 +291,22 @@ class MapProblem:
         bare, bare_data = smaller.model, smaller.model.createData()
         joints, place = smaller.placement_of_parameters(self.segments)
         columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
-        d, cf = len(frames), q.shape[1]
-        few = np.stack([part[:, self.moving] for part in (q, qd, qdd)])
-        dq, dv, da = np.empty((d, 6, cf)), np.empty((d, 6, cf)), np.empty((d, 6, cf))
+        x, v, a = skeleton.map.motion(q, qd, qdd)
+        few = np.stack(smaller.map.motion(*(part[:, self.moving] for part in (q, qd, qdd))))
+        d, axes = x.shape
+        dq, dv, da = np.empty((d, 6, axes)), np.empty((d, 6, axes)), np.empty((d, 6, axes))
         tau, regressor = np.empty((d, 6)), np.empty((d, 6, len(columns)))
         for i in range(d):
-            pin.computeRNEADerivatives(model, data, q[i], qd[i], qdd[i])
+            pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
             tau[i] = data.tau[:6]
             dq[i], dv[i], da[i] = data.dtau_dq[:6], data.dtau_dv[:6], data.M[:6]
             regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
         square = da[:, :, :6]
         da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
+        dq, dv, da = skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+        root = skeleton.root
         wrench, force = (part[frames] for part in self.wrench(k, static))
-        dq[:, :, :6] -= _generalised_derivative(q[:, :6], wrench)
+        dq[:, :, :6] -= root.ground_load_derivative(q, wrench)
         by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
         by_static = np.zeros((d, 6, layout.size))
         chain = dynamic_jacobian(static[layout.theta])
@@ -310,13 +315,11 @@ class MapProblem:
         for plate in range(trial.n_plates):
             for j, axis in enumerate(np.eye(3)[[0, 2]]):
                 moment = np.concatenate([np.zeros((d, 3)), np.cross(axis, force[:, plate])], axis=1)
-                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -ground_load_to_generalised(
-                    np.hstack([np.zeros((d, 3)), q[:, 3:6]]), moment
-                )
+                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -root.generalised(q, moment)
         rates = self.wrench(k, static, 1)[0][frames]
-        by_static[:, :, layout.clocks[k]] = -ground_load_to_generalised(q[:, :6], rates)
+        by_static[:, :, layout.clocks[k]] = -root.ground_load_to_generalised(q, rates)
         sd = self.root_sd(trial)[None, :, None]
-        left = (tau - ground_load_to_generalised(q[:, :6], wrench)) / sd[..., 0]
+        left = (tau - root.ground_load_to_generalised(q, wrench)) / sd[..., 0]
         return (
             frames,
             dq[..., self.moving] / sd,
@@ -333,17 +336,3 @@ def block_diagonal(blocks: np.ndarray) -> np.ndarray:
     result = np.zeros((s, k, s, k))
     result[np.arange(s), :, np.arange(s), :] = blocks
     return result.reshape(s * k, s * k)
-
-
-def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """(n, 6, 6) derivative of `ground_load_to_generalised` with respect to the root coordinates."""
-    axes = root_axes(root)
-    moment = wrench[:, 3:] - np.cross(root[:, :3], wrench[:, :3])
-    result = np.zeros((len(root), 6, 6))
-    for i, unit in enumerate(np.eye(3)):
-        result[:, 3:, i] = -np.einsum("nij,ni->nj", axes, np.cross(unit, wrench[:, :3]))
-    for later in range(3):
-        for earlier in range(later):
-            turned = np.cross(axes[:, :, earlier], axes[:, :, later])
-            result[:, 3 + later, 3 + earlier] = np.einsum("ni,ni->n", turned, moment)
-    return result
