@@ -175,6 +175,14 @@ class BodySegmentParameters:
         pseudo[:, 3, 3] = self.mass_kg
         return pseudo
 
+    def principal_second_moments(self) -> FloatArray:
+        """(s, 3) integrals of the squared distance from the CoM's principal planes, kg m2, ascending.
+
+        All positive exactly when the principal moments of inertia obey the triangle inequality; one is zero where all
+        mass lies in a plane.
+        """
+        return np.asarray(np.linalg.eigvalsh(_second_moments(self.inertia_kgm2)))
+
     def physically_consistent(self) -> npt.NDArray[np.bool_]:
         """(s,) whether mass > 0 and pseudo-inertia positive definite: a body of positive density exists."""
         return np.array([not self._problems(i) for i in range(len(self.segments))], dtype=bool)
@@ -192,7 +200,7 @@ class BodySegmentParameters:
             excess = moments[c] - moments[a] - moments[b]
             if not excess < 0:
                 bad.append(f"triangle inequality {a} + {b} > {c} violated by {excess:.4g} kg m2")
-        smallest = np.linalg.eigvalsh(_second_moments(self.inertia_kgm2[i]))[0]
+        smallest = self.principal_second_moments()[i, 0]
         if not bad and not smallest > 0:
             bad.append(
                 "ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by "

@@ -28,6 +28,8 @@ GOOD_MOMENT_NM, OKAY_MOMENT_NM = (30.0, 50.0), (50.0, 75.0)
 PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 
+_ROUNDING = 1e-6
+
 
 class Verdict(NamedTuple):
     """One judgement: "good", "okay" or "against" using the numbers, and why, in one sentence."""
@@ -55,16 +57,26 @@ def _convergence(fit: Fit) -> Verdict:
     return Verdict("against", "the estimate did not converge: its numbers are those of the best step so far")
 
 
+def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
+    """Segments that no distribution of mass can have.
+
+    Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
+    the triangle inequality, as rounded inertias have it) is let pass.
+    """
+    table, second = bsp.table(), bsp.principal_second_moments()
+    there = table[:, [0, *range(4, 10)]].any(axis=1)
+    wrong = (bsp.mass_kg <= 0) | (second[:, 0] < -_ROUNDING * np.abs(second).max(axis=1))
+    return [bsp.segments[i] for i in np.flatnonzero(there & wrong)]
+
+
 def _physics(bsp: BodySegmentParameters) -> Verdict:
-    """Bodies without any mass and inertia, as OpenSim models have them, are not judged."""
-    there = bsp.table()[:, [0, *range(4, 10)]].any(axis=1)
-    impossible = [bsp.segments[i] for i in np.flatnonzero(there & ~bsp.physically_consistent())]
+    impossible = impossible_segments(bsp)
     if not impossible:
         return Verdict("good", "every segment is physically possible")
     return Verdict(
         "against",
-        f"physically impossible segments: {len(impossible)} of {there.sum()} ({', '.join(impossible)}); no body has "
-        f"such mass and inertia",
+        f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({', '.join(impossible)}); no body "
+        f"has such mass and inertia",
     )
 
 
