@@ -9,18 +9,20 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from kinertia import __version__
 from kinertia.io.folder import complete_folder
+from kinertia.model_check import ModelCheck
 from kinertia.recording_check import RecordingCheck
 
 
 def save_check_page(
     recordings: Sequence[tuple[str, RecordingCheck]],
+    models: Sequence[tuple[str, ModelCheck]],
     mistakes: Sequence[str],
     folder: str | Path,
 ) -> Path:
     """Write `check.html` into a folder; returns the file.
 
     Args:
-        recordings: findings, each with its title.
+        recordings, models: findings, each with its title.
         mistakes: one sentence for each file that could not be read.
         folder: is made if need be.
 
@@ -35,7 +37,7 @@ def save_check_page(
         lstrip_blocks=True,
     )
     page = environment.get_template("check.html.j2").render(
-        recordings=recordings, mistakes=mistakes, version=__version__
+        recordings=recordings, models=models, mistakes=mistakes, version=__version__
     )
     with complete_folder(folder) as work:
         (work / "check.html").write_text(page, encoding="utf-8")

@@ -14,8 +14,10 @@ from kinertia.check_page import save_check_page
 from kinertia.cli_options import Force, Quiet, Verbose, results_folder
 from kinertia.config import SubjectFile, read_subject
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.osim import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import MarkerSet, read_marker_set
+from kinertia.model_check import ModelCheck, check_model
 from kinertia.recording_check import RecordingCheck, check_recording, common_marker_set
 from kinertia.subject_draft import matched_by_name
 from kinertia.terminal import out, plain_table, show_error, show_verdicts, shown_progress
@@ -45,13 +47,16 @@ def check(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Markers (.trc, .c3d), each with its forces (.mot, .sto; matched by name), or a subject file (.toml).",
+            help="Markers (.trc, .c3d), each with its forces (.mot, .sto; matched by name); or a subject file (.toml); "
+            "or models (.osim).",
         ),
     ],
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
     ] = None,
-    mass: Annotated[float | None, typer.Option(help="Body mass, kg, to compare the forces with.")] = None,
+    mass: Annotated[float | None, typer.Option(help="Body mass, kg, to compare forces and models with.")] = None,
+    height: Annotated[float | None, typer.Option(help="Stature, m, to compare models with the literature.")] = None,
+    sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
     markers: Annotated[
         str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
     ] = None,
@@ -62,11 +67,16 @@ def check(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Show what is in measured files, and whether a fit can use them.
+    """Show what is in measured files or in a model, and whether it can be used.
 
-    Rates, units, axes; markers and gaps; force plates and which foot is on
-    them; the stretch in which all ground contact is measured; the vertical
-    force against body mass. Exit status 1 if something speaks against a fit.
+    Measured: rates, units, axes; markers and gaps; force plates and which foot
+    is on them; the stretch in which all ground contact is measured; the
+    vertical force against body mass.
+
+    Model: total mass; each segment against the literature for this person;
+    impossible, rounded or placeholder inertias; left against right.
+
+    Exit status 1 if a verdict is against: no fit, or no simulation.
 
     [bold]Examples[/]
 
@@ -75,26 +85,59 @@ def check(
     kinertia check walk.trc walk_grf.mot --loads loads.xml --mass 72.6 -o out
 
     kinertia check subject.toml
+
+    kinertia check scaled.osim --mass 72.6 --height 1.80 --sex male
     """
     if output is not None:
         results_folder(output, force)
-    wanted, marker_set, mass = _wanted(files, loads, None if markers is None else read_marker_set(markers), mass)
-    recordings, mistakes = _read(wanted)
-    if marker_set is None:
-        marker_set = common_marker_set([recording for _, recording in recordings])
-    if mass is None:
-        mass = next((recording.mass_kg for _, recording in recordings if recording.mass_kg is not None), None)
-    found = [(one.title, check_recording(recording, marker_set, mass, one.window_s)) for one, recording in recordings]
-    for title, one in found:
-        _show(title, one, verbose)
+    models, mistakes = _check_models([path for path in files if path.suffix.lower() == ".osim"], mass, height, sex)
+    measured = [path for path in files if path.suffix.lower() != ".osim"]
+    recordings, more = _check_recordings(measured, loads, None if markers is None else read_marker_set(markers), mass)
+    mistakes += more
+    for title, recording in recordings:
+        _show_recording(title, recording, verbose)
+    for title, model in models:
+        _show_model(title, model)
     if output is not None:
-        out.print(f"page in {save_check_page(found, mistakes, output)}", soft_wrap=True)
+        out.print(f"page in {save_check_page(recordings, models, mistakes, output)}", soft_wrap=True)
     for mistake in mistakes:
         show_error(mistake)
     if mistakes:
         raise typer.Exit(2)
-    if any(stands_against(one.verdicts) for _, one in found):
+    judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
+    if any(map(stands_against, judged)):
         raise typer.Exit(1)
+
+
+def _check_models(
+    paths: Sequence[Path], mass_kg: float | None, height_m: float | None, sex: str | None
+) -> tuple[list[tuple[str, ModelCheck]], list[str]]:
+    """Findings by title, and a sentence for each model that cannot be read."""
+    found, mistakes = [], []
+    for path in paths:
+        try:
+            model = read_osim(path)
+        except KinertiaError as error:
+            mistakes.append(str(error))
+            continue
+        found.append((path.name, check_model(model.skeleton, model.bsp, mass_kg, height_m, sex)))
+    return found, mistakes
+
+
+def _check_recordings(
+    paths: Sequence[Path], loads: Path | None, marker_set: MarkerSet | None, mass_kg: float | None
+) -> tuple[list[tuple[str, RecordingCheck]], list[str]]:
+    """Findings by title, and a sentence for each recording that cannot be read."""
+    wanted, marker_set, mass_kg = _wanted(paths, loads, marker_set, mass_kg)
+    recordings, mistakes = _read(wanted)
+    if marker_set is None:
+        marker_set = common_marker_set([recording for _, recording in recordings])
+    if mass_kg is None:
+        mass_kg = next((recording.mass_kg for _, recording in recordings if recording.mass_kg is not None), None)
+    found = [
+        (one.title, check_recording(recording, marker_set, mass_kg, one.window_s)) for one, recording in recordings
+    ]
+    return found, mistakes
 
 
 def _wanted(
@@ -112,7 +155,7 @@ def _wanted(
         return _of_subject(read_subject(subjects[0]))
     for path in files:
         if path.suffix.lower() not in (*_MARKER_FILES, *_FORCE_FILES):
-            known = ", ".join((*_MARKER_FILES, *_FORCE_FILES, ".toml"))
+            known = ", ".join((*_MARKER_FILES, *_FORCE_FILES, ".toml", ".osim"))
             hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
             raise FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
     marked = [path for path in files if path.suffix.lower() in _MARKER_FILES]
@@ -152,12 +195,27 @@ def _read(wanted: Sequence[_Files]) -> tuple[list[tuple[_Files, Recording]], lis
     return recordings, mistakes
 
 
-def _show(title: str, found: RecordingCheck, verbose: bool) -> None:
+def _show_facts(title: str, facts: Sequence[tuple[str, str]]) -> None:
     out.print(f"\n{title}")
-    facts = Table.grid(padding=(0, 2), expand=False)
-    for name, told in found.facts():
-        facts.add_row(name, told)
-    out.print(facts)
+    table = Table.grid(padding=(0, 2), expand=False)
+    for name, told in facts:
+        table.add_row(name, told)
+    out.print(table)
+
+
+def _show_model(title: str, found: ModelCheck) -> None:
+    _show_facts(title, found.facts())
+    table = plain_table(*found.columns)
+    for row in found.rows():
+        table.add_row(*row)
+    out.print(table)
+    show_verdicts(found.verdicts)
+    for sentence in found.left_out:
+        out.print(f"left out: {sentence}")
+
+
+def _show_recording(title: str, found: RecordingCheck, verbose: bool) -> None:
+    _show_facts(title, found.facts())
     shown = [one for one in found.markers if verbose or one.share < 1.0]
     if shown:
         gaps = plain_table("marker", "seen\n(%)", "longest gap\n(s)")
