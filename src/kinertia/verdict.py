@@ -29,6 +29,7 @@ PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 
 _ROUNDING = 1e-6
+_NAMED = 4
 
 
 class Verdict(NamedTuple):
@@ -54,7 +55,7 @@ def stands_against(found: Iterable[Verdict]) -> bool:
 def _convergence(fit: Fit) -> Verdict:
     if fit.converged:
         return Verdict("good", "the estimate converged")
-    return Verdict("against", "the estimate did not converge: its numbers are those of the best step so far")
+    return Verdict("against", "the estimate did not converge: the best step is reported")
 
 
 def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
@@ -73,11 +74,8 @@ def _physics(bsp: BodySegmentParameters) -> Verdict:
     impossible = impossible_segments(bsp)
     if not impossible:
         return Verdict("good", "every segment is physically possible")
-    return Verdict(
-        "against",
-        f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({', '.join(impossible)}); no body "
-        f"has such mass and inertia",
-    )
+    named = ", ".join(impossible[:_NAMED]) + (f" and {len(impossible) - _NAMED} more" if impossible[_NAMED:] else "")
+    return Verdict("against", f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({named})")
 
 
 def _literature(fit: Fit) -> Verdict:
@@ -98,10 +96,7 @@ def _literature(fit: Fit) -> Verdict:
     said = f"{what} from the literature: {far or 'none'} (farthest, {told})"
     if not far:
         return Verdict("good", said)
-    return Verdict(
-        "against",
-        f"{said}: the data contradict the model; a wrong joint, plate or marker is likelier than an odd person",
-    )
+    return Verdict("against", f"{said}: the data contradict the model")
 
 
 def _residuals(trial: TrialFit) -> list[Verdict]:
