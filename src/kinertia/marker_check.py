@@ -11,7 +11,7 @@ from kinertia.trial import BoolArray, FloatArray, Markers, runs
 STANDING_RANGE_M = 0.03
 """In a standing trial the median marker stays within this (5th to 95th percentile)."""
 _LEAST_WALK_M = 0.5
-"""Less travel than this from the first to the last tenth of the trial is movement on the spot."""
+"""Less way than this is movement on the spot."""
 _UPRIGHT_SHARE = 0.7
 _PLAUSIBLE_EXTENT_M = (0.3, 2.8)
 
@@ -37,8 +37,8 @@ class Travel:
 
     Attributes:
         kind: "stands still", "moves on the spot" or "walks".
-        distance_m: from the first to the last tenth of the trial.
-        speed_m_s: mean of that.
+        distance_m: covered while markers are seen.
+        speed_m_s: mean, 0 unless walking.
         direction_deg: about the vertical from +X towards -Z, so that 90 is along -Z; NaN unless walking.
     """
 
@@ -73,26 +73,24 @@ def _longest(missing: BoolArray) -> int:
 
 
 def travel(markers: Markers) -> Travel:
-    """What the person does, by the middle of these markers and by how far each moves."""
-    seen = markers.positions[:, np.isfinite(markers.positions).all(axis=(0, 2))]
-    positions = seen if seen.shape[1] else markers.positions
-    shown = np.asarray(np.isfinite(positions).all(axis=2))
+    """What the person does: by how far the median marker comes from where it is first seen to where it is last."""
+    shown = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    spans = [(k, np.flatnonzero(on)) for k, on in enumerate(shown.T) if on.any()]
     moved = [
-        np.linalg.norm(np.ptp(np.percentile(positions[on, k], (5, 95), axis=0), axis=0))
-        for k, on in enumerate(shown.T)
-        if on.any()
+        np.linalg.norm(np.ptp(np.percentile(markers.positions[frames, k], (5, 95), axis=0), axis=0))
+        for k, frames in spans
     ]
-    frames = np.flatnonzero(shown.any(axis=1))
-    if not frames.size or float(np.median(moved)) < STANDING_RANGE_M:
+    if not moved or float(np.median(moved)) < STANDING_RANGE_M:
         return Travel("stands still", 0.0, 0.0, np.nan)
-    middle = np.nanmean(positions[frames], axis=1)
-    tenth = max(1, len(frames) // 10)
-    way = middle[-tenth:].mean(axis=0) - middle[:tenth].mean(axis=0)
-    took = markers.time[frames][-tenth:].mean() - markers.time[frames][:tenth].mean()
-    distance = float(np.hypot(way[0], way[2]))
+    took = np.array([np.ptp(markers.time[frames]) for _, frames in spans])
+    way = np.array([markers.positions[frames[-1], k] - markers.positions[frames[0], k] for k, frames in spans])
+    long = took >= 0.5 * took.max()
+    velocity = np.median(way[long] / took[long, None], axis=0)
+    speed = float(np.hypot(velocity[0], velocity[2]))
+    distance = float(speed * np.ptp(markers.time[shown.any(axis=1)]))
     if distance < _LEAST_WALK_M:
         return Travel("moves on the spot", distance, 0.0, np.nan)
-    return Travel("walks", distance, float(distance / took), float(np.degrees(np.arctan2(-way[2], way[0]))))
+    return Travel("walks", distance, speed, float(np.degrees(np.arctan2(-velocity[2], velocity[0]))))
 
 
 def extent_m(markers: Markers) -> FloatArray:

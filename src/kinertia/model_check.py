@@ -117,9 +117,7 @@ def check_model(
         literature, sd = _literature(segments, segments.geometry, person_kg, height_m, sex)
         outliers = _outliers(segments.bsp, literature, sd)
         if not _has_arms(segments):
-            left_out.append(
-                "the model has no arms: only the mass of its torso was compared, with torso and arms"
-            )
+            left_out.append("the model has no arms: only the mass of its torso was compared, with torso and arms")
     if mass_kg is None:
         left_out.append("the total mass was compared with nothing; give --mass")
     if segments.unknown:
