@@ -17,6 +17,7 @@ from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
 from kinertia.fit import Fit, estimate_bsp
+from kinertia.identifiability import evidence
 from kinertia.inputs import read_inputs
 from kinertia.io.sto import write_then_rename
 from kinertia.results import save_fit, summary
@@ -57,6 +58,7 @@ force plates (C3D, or TRC with MOT or STO), body mass, stature and sex.
 
 Results go to standard output, progress and errors to standard error.
 """
+_MARKS = {"measured": "**", "informed": "*", "assumed": ""}
 _STAGES = ("literature", "corrected", "estimate")
 
 app = typer.Typer(
@@ -110,7 +112,7 @@ def fit(
         str | None,
         typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
     ] = None,
-    method: Annotated[str | None, typer.Option(help="Estimator: two-level or simultaneous.")] = None,
+    method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -216,6 +218,8 @@ def _report(fit: Fit) -> None:
     for trial in told["trials"]:
         _report_trial(trial)
     out.print(_bsp_table(fit))
+    if fit.posterior is not None:
+        out.print("** measured by the data, * informed by them, no mark: assumed, the literature's; sd: error bar\n")
     out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
         out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
@@ -251,16 +255,26 @@ def _report_trial(trial: dict[str, Any]) -> None:
 
 
 def _bsp_table(fit: Fit) -> Table:
-    """Two rows per segment; where left mirrors right, the right side stands for both."""
+    """Two rows per segment, three with error bars; where left mirrors right, the right side stands for both."""
     table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
     for i, segment in enumerate(fit.literature.segments):
-        if fit.settings.symmetry and segment.endswith("_l"):
+        if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
             continue
         for source, bsp in (("literature", fit.literature), ("estimate", fit.estimate)):
             com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
-            table.add_row(segment, source, f"{bsp.mass_kg[i]:.2f}", *com, *inertia)
+            cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
+            if source == "estimate" and fit.posterior is not None:
+                cells = [
+                    cell + _MARKS[evidence(a)] for cell, a in zip(cells, fit.posterior.information[i], strict=False)
+                ]
+            table.add_row(segment, source, *cells)
             segment = ""
+        if fit.posterior is not None:
+            sd = fit.posterior.sd[i]
+            table.add_row(
+                "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
+            )
     return table
 
 

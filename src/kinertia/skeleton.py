@@ -253,7 +253,9 @@ class Skeleton:
         joints, place = self.placement_of_parameters(bsp.segments)
         moved = (place @ bsp.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
         for j in set(joints.tolist()):
-            model.inertias[j] = pin.Inertia.FromDynamicParameters(moved[joints == j].sum(axis=0))
+            total = moved[joints == j].sum(axis=0)
+            if total[0] != 0.0:  # Pinocchio would divide by it
+                model.inertias[j] = pin.Inertia.FromDynamicParameters(total)
         return model
 
     def placement_of_parameters(self, segments: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.bsp import PARAMETERS, BodySegmentParameters, second_moments
 from kinertia.checks import CONTRADICTING_COM_M
 from kinertia.simultaneous_fit import CONTRADICTION_SD
 
@@ -64,7 +64,7 @@ def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
     Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
     the triangle inequality, as rounded inertias have it) is let pass.
     """
-    table, second = bsp.table(), bsp.principal_second_moments()
+    table, second = bsp.table(), np.linalg.eigvalsh(second_moments(bsp.inertia_kgm2))
     there = table[:, [0, *range(4, 10)]].any(axis=1)
     wrong = (bsp.mass_kg <= 0) | (second[:, 0] < -_ROUNDING * np.abs(second).max(axis=1))
     return [bsp.segments[i] for i in np.flatnonzero(there & wrong)]

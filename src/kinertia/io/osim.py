@@ -7,7 +7,7 @@ cannot be represented is an error that names it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from xml.parsers.expat import ExpatError
@@ -54,14 +54,16 @@ class OsimModel:
         bsp: of all bodies, in the file's order; a body may be massless.
         joints: in the skeleton's order.
         couplings: dependent coordinates, which the skeleton does not have.
+        marker_frames: per label, (3, 3) orientation of the frame that its location is given in, in its body.
     """
 
     path: Path
-    content: bytes
+    content: bytes = field(repr=False)
     skeleton: Skeleton
     bsp: BodySegmentParameters
     joints: tuple[OsimJoint, ...]
     couplings: tuple[Coupling, ...]
+    marker_frames: Mapping[str, np.ndarray]
 
     @cached_property
     def coordinates(self) -> tuple[OsimCoordinate, ...]:
@@ -108,12 +110,14 @@ def read_osim(path: str | Path) -> OsimModel:
         joints = [read_joint(values, element, frames) for element in _objects(model, "JointSet")]
     joints = _ordered(values, joints, bodies)
     couplings = _couplings(values, model, joints)
-    markers = [_marker(values, element, frames, bsp.segments) for element in _objects(model, "MarkerSet")]
-    skeleton = _skeleton(values, model, joints, couplings, [m for m in markers if m.segment != "ground"])
+    placed = [_marker(values, element, frames, bsp.segments) for element in marker_elements(model)]
+    markers = [marker for marker, _ in placed if marker.segment != "ground"]
+    skeleton = _skeleton(values, model, joints, couplings, markers)
     if not bsp.mass_kg[bsp.segments.index(skeleton.segments[0])] > 0:
         root = next(body for body in bodies if body.name == skeleton.segments[0])
         values.fail(root, f"the root body '{root.name}' has no mass; expected a positive one (kg), as of a pelvis")
-    return OsimModel(path, content, skeleton, bsp, tuple(joints), couplings)
+    turned = {marker.label: rotation for marker, rotation in placed}
+    return OsimModel(path, content, skeleton, bsp, tuple(joints), couplings, turned)
 
 
 def _model(path: Path, content: bytes) -> tuple[Element, int]:
@@ -150,6 +154,11 @@ def body_elements(model: Element) -> list[Element]:
     return [body for body in _objects(model, "BodySet") if body.tag == "Body" and body.name != "ground"]
 
 
+def marker_elements(model: Element) -> list[Element]:
+    """The markers."""
+    return [marker for marker in _objects(model, "MarkerSet") if marker.tag == "Marker"]
+
+
 INERTIA_TAGS = tuple(f"inertia_{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
 """Format 3 has one element for each of what format 4 has in one, `inertia`."""
 
@@ -159,13 +168,14 @@ def _bsp(values: Values, bodies: Sequence[Element]) -> BodySegmentParameters:
     for body in bodies:
         mass = values.numbers(body, "mass", 1)
         if mass[0] < 0:
-            values.fail(body, f"body '{body.name}' has mass {mass[0]:g} kg; expected none or a positive one")
+            values.fail(body, f"body '{body.name}' has mass {mass[0]:g} kg; expected zero or a positive one")
         centre = values.numbers(body, "mass_center", 3, [0.0] * 3)
         if values.property(body, "inertia") is not None:
             inertia = values.numbers(body, "inertia", 6)
         else:
             inertia = np.concatenate([values.numbers(body, tag, 1) for tag in INERTIA_TAGS])
-        rows.append(np.concatenate([mass, centre, inertia]))
+        # OpenSim's tensors are per kg: without mass there is none
+        rows.append(np.concatenate([mass, centre, inertia * (mass > 0)]))
     return BodySegmentParameters.from_table(tuple(body.name for body in bodies), np.array(rows))
 
 
@@ -240,7 +250,10 @@ def _leaders_first(values: Values, found: Sequence[tuple[Element, Coupling]]) ->
     return tuple(ordered)
 
 
-def _marker(values: Values, element: Element, frames: Frames | None, bodies: Sequence[str]) -> Marker:
+def _marker(
+    values: Values, element: Element, frames: Frames | None, bodies: Sequence[str]
+) -> tuple[Marker, np.ndarray]:
+    """A marker in its body, and the orientation of its own frame there."""
     location = values.numbers(element, "location", 3, [0.0] * 3)
     if frames is None:
         body, rotation, origin = values.text(element, "body"), np.eye(3), np.zeros(3)
@@ -248,7 +261,7 @@ def _marker(values: Values, element: Element, frames: Frames | None, bodies: Seq
             values.fail(element, f"marker '{element.name}' is on '{body}', which is not among the bodies")
     else:
         body, (rotation, origin) = frames.place(element, element.name, values.text(element, "socket_parent_frame"))
-    return Marker(element.name, body, origin + rotation @ location)
+    return Marker(element.name, body, origin + rotation @ location), rotation
 
 
 def _skeleton(

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.axis_functions import AxisFunction, Composed, constant_value, unit_slope
+from kinertia.axis_functions import AxisFunction, Composed, constant, constant_value, unit_slope
 from kinertia.io.osim_values import Values
 from kinertia.io.osim_xml import Element
 from kinertia.skeleton import Axis
@@ -230,9 +230,9 @@ def _custom_axes(values: Values, joint: Element, names: list[str]) -> tuple[list
         if not length > 0:
             values.fail(element, f"axis of {element.name} of joint '{joint.name}' is zero; expected a direction")
         follows = values.text(element, "coordinates").replace('"', " ").split()
-        function = _axis_function(values, element, joint.name, follows)
+        function = _axis_function(values, element, joint.name)
         axis = Axis("", kind, tuple(map(float, direction / length)), function)  # type: ignore[arg-type]
-        fixed = 0.0 if function is None and not follows else constant_value(function) if function else None
+        fixed = constant_value(function)
         if fixed is not None:
             if fixed != 0.0:
                 name = f"{joint.name}/{element.name}"
@@ -249,12 +249,12 @@ def _custom_axes(values: Values, joint: Element, names: list[str]) -> tuple[list
     return axes, constants
 
 
-def _axis_function(values: Values, element: Element, joint: str, follows: list[str]) -> AxisFunction | None:
-    """The function of a TransformAxis; None where it has none (the coordinate itself, or nothing)."""
+def _axis_function(values: Values, element: Element, joint: str) -> AxisFunction:
+    """The function of a TransformAxis; without one OpenSim keeps the axis at zero."""
     inside = [c for c in element.children if c.tag not in ("coordinates", "axis", "coordinate")]
     if inside and inside[0].tag == "function":
         inside = inside[0].children
-    return values.function(inside[0], joint) if inside else None
+    return values.function(inside[0], joint) if inside else constant(0.0)
 
 
 def simplified(axis: Axis) -> Axis:
