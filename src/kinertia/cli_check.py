@@ -90,6 +90,9 @@ def check(
     """
     if output is not None:
         results_folder(output, force)
+    subjects = [path for path in files if path.suffix.lower() == ".toml"]
+    if subjects and (len(files) > 1 or any(given is not None for given in (loads, mass, height, sex, markers))):
+        raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
     models, mistakes = _check_models([path for path in files if path.suffix.lower() == ".osim"], mass, height, sex)
     measured = [path for path in files if path.suffix.lower() != ".osim"]
     recordings, more = _check_recordings(measured, loads, None if markers is None else read_marker_set(markers), mass)
@@ -146,14 +149,13 @@ def _wanted(
     """Which files make one recording, the marker set and the body mass if given.
 
     Raises:
-        FileError: a file of another kind, a subject file with other files or options, or forces without markers.
+        FileError: a file of another kind, forces without markers, or loads that explain no trial or several.
     """
-    subjects = [path for path in files if path.suffix.lower() == ".toml"]
-    if subjects:
-        if len(files) > 1 or loads is not None or marker_set is not None or mass_kg is not None:
-            raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
-        return _of_subject(read_subject(subjects[0]))
+    if [path.suffix.lower() for path in files] == [".toml"]:
+        return _of_subject(read_subject(files[0]))
     for path in files:
+        if path.is_dir():
+            raise FileError(path, "is a folder; give the files in it, or its subject file (kinertia init drafts one)")
         if path.suffix.lower() not in (*_MARKER_FILES, *_FORCE_FILES):
             known = ", ".join((*_MARKER_FILES, *_FORCE_FILES, ".toml", ".osim"))
             hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
@@ -169,8 +171,10 @@ def _wanted(
     wanted = [_Files(path, pairs.get(path)) for path in marked]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
-        if len(having) > 1:
-            raise FileError(loads, "explains one trial's forces but several are given; check the trials one by one")
+        if len(having) != 1:
+            raise FileError(
+                loads, f"explains one trial's forces, but {len(having)} are given; check one trial at a time"
+            )
         wanted[having[0]] = replace(wanted[having[0]], loads=loads)
     return wanted, marker_set, mass_kg
 
