@@ -53,9 +53,13 @@ def test_binary_file_of_that_name_is_somebody_elses(tmp_path):
 
 
 def test_an_error_leaves_nothing(tmp_path):
-    with pytest.raises(RuntimeError), complete_folder(tmp_path / "out") as work:
-        (work / "half.txt").write_text("half")
-        raise RuntimeError
+    def fail():
+        with complete_folder(tmp_path / "out") as work:
+            (work / "half.txt").write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
     assert list(tmp_path.iterdir()) == []
 
 
