@@ -50,6 +50,17 @@ def test_files_find_each_other_by_name(lab):
     assert run("check", lab / "walk.trc", "--mass", 72.6).status == 0  # a look at markers alone is fine
 
 
+def test_forces_of_the_walk_never_go_to_the_static_trial(lab):
+    """Though the names are as like: Rajagopal's files are called so."""
+    static = (lab / "static.trc").rename(lab / "static_walk_1.trc")
+    walked = (lab / "walk.trc").rename(lab / "motion_capture_walk.trc")
+    forces = (lab / "walk_grf.mot").rename(lab / "grf_walk.mot")
+    outcome = run("check", static, walked, forces)
+    assert outcome.status == 0
+    assert "motion_capture_walk.trc, grf_walk.mot" in outcome.out
+    assert "grf_walk.mot" in run("check", static, forces).out  # two files can only go together
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [(["--mass", "90"], "the scale says 90.0 kg"), (["--markers", "plug-in-gait"], "no marker set fits")],

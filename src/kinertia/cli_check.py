@@ -19,7 +19,7 @@ from kinertia.io.recording import read_recording
 from kinertia.marker_set import MarkerSet, read_marker_set
 from kinertia.model_check import ModelCheck, check_model
 from kinertia.recording_check import RecordingCheck, check_recording, common_marker_set
-from kinertia.subject_draft import matched_by_name
+from kinertia.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.terminal import out, plain_table, show_error, show_verdicts, shown_progress
 from kinertia.trial import Recording
 from kinertia.verdict import stands_against
@@ -162,7 +162,7 @@ def _wanted(
             raise FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
     marked = [path for path in files if path.suffix.lower() in _MARKER_FILES]
     forces = [path for path in files if path not in marked]
-    pairs = matched_by_name(marked, forces)
+    pairs = _matched(marked, forces)
     alone = [path for path in forces if path not in pairs.values()]
     if alone:
         raise FileError(
@@ -177,6 +177,17 @@ def _wanted(
             )
         wanted[having[0]] = replace(wanted[having[0]], loads=loads)
     return wanted, marker_set, mass_kg
+
+
+def _matched(marked: Sequence[Path], forces: Sequence[Path]) -> dict[Path, Path]:
+    """Marker files with their forces; those of static trials among themselves, unless there are just two files."""
+    if len(marked) == len(forces) == 1:
+        return matched_by_name(marked, forces)
+    pairs: dict[Path, Path] = {}
+    for static in (True, False):
+        groups = [[p for p in paths if bool(STATIC_NAME.search(p.stem)) == static] for paths in (marked, forces)]
+        pairs |= matched_by_name(*groups)
+    return pairs
 
 
 def _of_subject(subject: SubjectFile) -> tuple[list[_Files], MarkerSet | None, float | None]:

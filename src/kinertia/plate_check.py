@@ -146,7 +146,9 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     strides, steps = _periods(trial.loads)
     fitting = [period for period in strides if period <= end - start]
     stepping = [period for period in steps if period <= end - start]
-    if standing or (not strides and not steps and end - start >= _LONG_WINDOW_S):
+    if standing:
+        span, over = end - start, "the whole time"
+    elif not strides and not steps and end - start >= _LONG_WINDOW_S:
         span, over = end - start, "the whole window, in which nobody steps"
     elif fitting:
         span, over = max(fitting), "whole strides"

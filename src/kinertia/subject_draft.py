@@ -13,7 +13,8 @@ from kinertia.config import Model, Settings, Subject, Table, TrialFiles
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.recording import read_recording
 
-_STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
+STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
+"""What the names of static trials contain."""
 
 
 def init_subject(folder: str | Path) -> str:
@@ -45,7 +46,7 @@ def init_subject(folder: str | Path) -> str:
     if others:
         text += [f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
-    guessed = static is not None and not _STATIC_NAME.search(static.stem)
+    guessed = static is not None and not STATIC_NAME.search(static.stem)
     note = " (the shortest recording)" if guessed else ""
     text += ["", "[model]", _entry(Model, "static", static and static.name, "static.trc", note)]
     text += ["# " + _entry(Model, "markers", "plug-in-gait")]
@@ -82,7 +83,7 @@ def _subject_lines(c3d: Sequence[Path]) -> list[str]:
 
 def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:
     """The static trial and the dynamic trials that share most of the beginning of its name."""
-    statics = [file for file in captures if _STATIC_NAME.search(file.stem)]
+    statics = [file for file in captures if STATIC_NAME.search(file.stem)]
     if not statics and len(captures) > 1:
         statics = [min(captures, key=_duration_s)]
     dynamic = [file for file in captures if file not in statics]
@@ -117,7 +118,7 @@ def _head(file: Path) -> str:
 
 def _holds_forces(file: Path) -> bool:
     """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
-    motion = file.suffix.lower() in (".mot", ".sto") and not _STATIC_NAME.search(file.stem)
+    motion = file.suffix.lower() in (".mot", ".sto") and not STATIC_NAME.search(file.stem)
     return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
 
 
