@@ -26,7 +26,8 @@ GAIN_SD = 0.02
 """Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
 CLOCK_SD_S = 0.005
 _NOTABLE = 2.0
-_CONTRADICTION = 3.0
+CONTRADICTION_SD = 3.0
+"""A parameter this many prior deviations from the literature contradicts the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +158,7 @@ def _warnings(
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
-    for i, k in np.argwhere(np.abs(away) > _CONTRADICTION):
+    for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD):
         found.append(
             f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
             f"deviations from the literature; a wrong joint, plate or marker is likelier than an odd person"
