@@ -1,0 +1,172 @@
+"""Figures of body segment parameters: intervals before and after, and what the data told about each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kinertia.bsp import PARAMETERS, UNITS
+from kinertia.fit import Fit
+from kinertia.report import style
+from kinertia.report.panels import Panel, base_layout, compact, small_multiples
+
+DEPARTURE_SD = 2.0
+"""Estimates further from the literature than this many of its deviations are pointed out."""
+NAMES = (
+    "mass",
+    "CoM forward",
+    "CoM upward",
+    "CoM to the right",
+    "Ixx",
+    "Iyy",
+    "Izz",
+    "Ixy",
+    "Ixz",
+    "Iyz",
+)
+"""Of `PARAMETERS`, in words."""
+_INTERVAL_SD = 1.96
+_READ_IN = {"m": ("mm", 1e3)}
+
+
+def read_in(k: int) -> tuple[str, float]:
+    """Unit in which people read parameter k of `PARAMETERS` (kg, mm, kg m2), and the factor to it."""
+    return _READ_IN.get(UNITS[k], (UNITS[k], 1.0))
+
+
+def segment_name(segment: str) -> str:
+    """ "thigh_r" as "thigh, right"."""
+    name, _, side = segment.rpartition("_")
+    words = {"r": ", right", "l": ", left"}
+    return (name + words[side] if name and side in words else segment).replace("_", " ")
+
+
+def departures(fit: Fit) -> np.ndarray | None:
+    """(s, 10) estimate minus literature in the literature's deviations; None after two-level, which has none."""
+    if fit.posterior is None:
+        return None
+    return (fit.estimate.table() - fit.literature.table()) / fit.posterior.prior_sd
+
+
+def bsp_figure(fit: Fit) -> go.Figure:
+    """Estimate against literature: a panel per parameter, a row per segment.
+
+    With error bars everything is in deviations of the literature, so that feet can be read beside the trunk; without
+    (two-level), it is the difference in the parameter's unit.
+    """
+    away = departures(fit)
+    segments = [segment_name(name) for name in fit.estimate.segments]
+    rows = {"tickvals": list(range(len(segments))), "ticktext": segments, "range": [len(segments) - 0.4, -0.6]}
+    if away is None:
+        change = fit.estimate.table() - fit.literature.table()
+        panels = [_plain_panel(k, change[:, k], rows) for k in range(len(PARAMETERS))]
+        axis: dict[str, Any] = {"nticks": 5}
+        alt = "Differences between estimate and literature for every body segment parameter, without error bars."
+    else:
+        panels = [_panel(fit, away, k, rows) for k in range(len(PARAMETERS))]
+        reach = max(3.0, float(np.abs(away).max()) + 0.5)
+        title = {"text": "deviations of the literature", "font": {"size": 11}, "standoff": 2}
+        axis = {"range": [-reach, reach], "title": title, "nticks": 7}
+        far = int((np.abs(away) > DEPARTURE_SD).sum())
+        alt = (
+            f"95 % intervals of every body segment parameter before and after the estimate; {far} of {away.size} "
+            f"estimates lie more than {DEPARTURE_SD:g} deviations from the literature."
+        )
+    return small_multiples(panels, alt, axis, row_px=230, left_px=112, linked=away is not None)
+
+
+def _panel(fit: Fit, away: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
+    posterior = fit.posterior
+    assert posterior is not None
+    half = _INTERVAL_SD * posterior.sd[:, k] / posterior.prior_sd[:, k]
+    place = np.arange(len(away))
+    before, after = fit.literature.table()[:, k], fit.estimate.table()[:, k]
+    unit, factor = read_in(k)
+    columns = (before, posterior.prior_sd[:, k], after, posterior.sd[:, k])
+    told = [
+        f"{segment_name(segment)}: literature {b:.4g} ± {p:.2g}, estimate {a:.4g} ± {s:.2g} {unit}"
+        for segment, b, p, a, s in zip(fit.estimate.segments, *(factor * column for column in columns), strict=True)
+    ]
+    prior = {
+        "type": "scatter",
+        "mode": "markers",
+        "x": compact(np.zeros(len(away))),
+        "y": place,
+        "marker": {"symbol": "line-ns-open", "size": 9, "color": style.GREY},
+        "error_x": {"type": "constant", "value": _INTERVAL_SD, "thickness": 7, "width": 0, "color": style.PALE},
+        "name": "literature, 95 %",
+        "hoverinfo": "skip",
+    }
+    far = np.abs(away[:, k]) > DEPARTURE_SD
+    traces = [prior]
+    for chosen, name, colour, symbol in (
+        (~far, "estimate, 95 %", style.BLUE, "circle"),
+        (far, f"estimate beyond {DEPARTURE_SD:g} deviations", style.VERMILION, "diamond"),
+    ):
+        if chosen.any():
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "markers",
+                    "x": compact(away[chosen, k]),
+                    "y": place[chosen],
+                    "marker": {"symbol": symbol, "size": 8, "color": colour},
+                    "error_x": {"array": compact(half[chosen]), "thickness": 2.2, "width": 0, "color": colour},
+                    "name": name,
+                    "text": [line for line, yes in zip(told, chosen, strict=True) if yes],
+                    "hovertemplate": "%{text}<extra></extra>",
+                }
+            )
+    return Panel(NAMES[k], traces, (), rows)
+
+
+def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any]) -> Panel:
+    unit, factor = read_in(k)
+    trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "x": compact(factor * change),
+        "y": np.arange(len(change)),
+        "marker": {"size": 8, "color": style.BLUE},
+        "name": "estimate minus literature",
+        "hovertemplate": f"%{{y}}: %{{x:.3g}} {unit}<extra></extra>",
+    }
+    return Panel(f"{NAMES[k]} ({unit})", [trace], (), rows)
+
+
+def information_figure(fit: Fit) -> go.Figure | None:
+    """Information on every parameter (0 nothing learnt, 1 everything), segments by parameters; None after two-level."""
+    if fit.posterior is None:
+        return None
+    told = np.clip(fit.posterior.information, 0.0, 1.0)
+    segments = [segment_name(name) for name in fit.estimate.segments]
+    best = np.unravel_index(int(np.argmax(told)), told.shape)
+    alt = (
+        f"Map of what the data told about each parameter, from 0 to 1; most about {NAMES[best[1]]} of "
+        f"{segments[best[0]]}, {told[best]:.2f}; median {np.median(told):.2f}."
+    )
+    heat = {
+        "type": "heatmap",
+        "z": compact(told),
+        "x": list(NAMES),
+        "y": segments,
+        "zmin": 0,
+        "zmax": 1,
+        "colorscale": [[0, "#FFFFFF"], [1, style.BLUE]],
+        "xgap": 2,
+        "ygap": 2,
+        "texttemplate": "%{z:.2f}",
+        "textfont": {"size": 11},
+        "showscale": False,
+        "hovertemplate": "%{x} of %{y}: %{z:.2f}<extra></extra>",
+    }
+    layout = base_layout(alt)
+    layout |= {
+        "height": 90 + 30 * len(segments),
+        "margin": {"t": 70, "b": 10, "l": 112, "r": 10},
+        "xaxis": {"side": "top", "tickangle": -40, "fixedrange": True},
+        "yaxis": {"autorange": "reversed", "fixedrange": True},
+    }
+    return go.Figure([heat], layout)
