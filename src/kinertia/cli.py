@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -17,6 +18,7 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import check_folder
+from kinertia.provenance import provenance_of
 from kinertia.results import save_fit, summary
 from kinertia.subject_draft import init_subject
 from kinertia.terminal import err, out, plain_table, shown_progress
@@ -119,7 +121,7 @@ def fit(
         wanted = with_settings(wanted, method=method)
     check_folder(output)
     result = _run(wanted)
-    folder = save_fit(result, output)
+    folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
     _report(result, folder)
 
 
@@ -139,6 +141,13 @@ def init(
     text = init_subject(folder)
     path.write_text(text, encoding="utf-8")
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
+
+
+def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
+    """The command line that repeats this run."""
+    given = {**options, "--method": method, "-o": output}
+    words = [str(word) for name, value in given.items() if value is not None for word in (name, value)]
+    return shlex.join(["kinertia", "fit", str(trial), *words])
 
 
 def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:

@@ -6,6 +6,7 @@ reads the laboratory's files.
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import check_folder, complete_folder
 from kinertia.prepare import Progress
+from kinertia.provenance import provenance_of
 from kinertia.results import save_fit
 from kinertia.synthetic import unlike_literature, walk, walking_subject
 from kinertia.synthetic_lab import LabNoise, record, write_lab
@@ -93,10 +95,11 @@ def run_demo(
     wanted = read_subject(subject_file)
     static, inputs, marker_set = read_inputs(wanted, progress)
     fits = []
+    provenance = provenance_of(wanted, shlex.join(["kinertia", "demo", "-o", str(folder)]))
     for method, results in (("two-level", folder), ("simultaneous", folder / "simultaneous")):
         settings = with_settings(wanted, method=method).settings
         fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-        save_fit(fits[-1], results)
+        save_fit(fits[-1], results, provenance)
     demo = Demo(fits[0], fits[1], subject.bsp, subject_file)
     with complete_folder(folder) as work:
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")

@@ -11,6 +11,7 @@ from kinertia.bsp import PARAMETERS, UNITS
 from kinertia.fit import Fit
 from kinertia.report import style
 from kinertia.report.panels import Panel, base_layout, compact, small_multiples
+from kinertia.simultaneous_fit import Posterior
 
 DEPARTURE_SD = 2.0
 """Estimates further from the literature than this many of its deviations are pointed out."""
@@ -56,17 +57,18 @@ def bsp_figure(fit: Fit) -> go.Figure:
     With error bars everything is in deviations of the literature, so that feet can be read beside the trunk; without
     (two-level), it is the difference in the parameter's unit.
     """
-    away = departures(fit)
+    away, posterior = departures(fit), fit.posterior
     segments = [segment_name(name) for name in fit.estimate.segments]
     rows = {"tickvals": list(range(len(segments))), "ticktext": segments, "range": [len(segments) - 0.4, -0.6]}
-    if away is None:
+    if away is None or posterior is None:
         change = fit.estimate.table() - fit.literature.table()
         panels = [_plain_panel(k, change[:, k], rows) for k in range(len(PARAMETERS))]
         axis: dict[str, Any] = {"nticks": 5}
         alt = "Differences between estimate and literature for every body segment parameter, without error bars."
     else:
-        panels = [_panel(fit, away, k, rows) for k in range(len(PARAMETERS))]
-        reach = max(3.0, float(np.abs(away).max()) + 0.5)
+        panels = [_panel(fit, posterior, away, k, rows) for k in range(len(PARAMETERS))]
+        half = _INTERVAL_SD * posterior.sd / posterior.prior_sd
+        reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
         title = {"text": "deviations of the literature", "font": {"size": 11}, "standoff": 2}
         axis = {"range": [-reach, reach], "title": title, "nticks": 7}
         far = int((np.abs(away) > DEPARTURE_SD).sum())
@@ -77,9 +79,7 @@ def bsp_figure(fit: Fit) -> go.Figure:
     return small_multiples(panels, alt, axis, row_px=230, left_px=112, linked=away is not None)
 
 
-def _panel(fit: Fit, away: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
-    posterior = fit.posterior
-    assert posterior is not None
+def _panel(fit: Fit, posterior: Posterior, away: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
     half = _INTERVAL_SD * posterior.sd[:, k] / posterior.prior_sd[:, k]
     place = np.arange(len(away))
     before, after = fit.literature.table()[:, k], fit.estimate.table()[:, k]
@@ -164,8 +164,8 @@ def information_figure(fit: Fit) -> go.Figure | None:
     }
     layout = base_layout(alt)
     layout |= {
-        "height": 90 + 30 * len(segments),
-        "margin": {"t": 70, "b": 10, "l": 112, "r": 10},
+        "height": 110 + 30 * len(segments),
+        "margin": {"t": 100, "b": 10, "l": 112, "r": 34},
         "xaxis": {"side": "top", "tickangle": -40, "fixedrange": True},
         "yaxis": {"autorange": "reversed", "fixedrange": True},
     }

@@ -65,9 +65,9 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         fit=fit,
         words=words(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
-        bsp={"figure": written(bsp_figure(fit)), "rows": _bsp_rows(fit)},
+        bsp={"figure": written(bsp_figure(fit)), "rows": bsp_rows(fit)},
         information=None if information is None else written(information),
-        residuals=[_residual_row(trial) for trial in fit.trials],
+        residuals=residual_rows(fit),
         trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
@@ -114,16 +114,19 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
     }
 
 
-def _residual_row(trial: TrialFit) -> dict[str, Any]:
-    """RMS and peak of force and moment per stage."""
-    told: dict[str, Any] = {"name": trial.name, "stages": {}}
-    for stage, values in trial.residuals.items():
-        parts = values[:, :3], values[:, 3:]
-        told["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
-    return told
+def residual_rows(fit: Fit) -> list[dict[str, Any]]:
+    """Per trial and stage: RMS and peak of force and of moment."""
+    rows = []
+    for trial in fit.trials:
+        row: dict[str, Any] = {"name": trial.name, "stages": {}}
+        for stage, values in trial.residuals.items():
+            parts = values[:, :3], values[:, 3:]
+            row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
+        rows.append(row)
+    return rows
 
 
-def _bsp_rows(fit: Fit) -> list[dict[str, Any]]:
+def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
     """Table rows in the units people read: kg, mm, kg m2."""
     away, posterior = departures(fit), fit.posterior
     before, after = fit.literature.table(), fit.estimate.table()

@@ -18,7 +18,7 @@ import plotly.graph_objects as go
 from kinertia.report import style
 
 _BOTTOM_PX, _RIGHT_PX = 44, 14
-_LEGEND_ROW_PX, _LEGEND_PER_ROW = 20, {1: 1, 2: 2, 3: 4}
+_LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
 _TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
 MOST_COLUMNS = 3
 
