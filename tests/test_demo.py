@@ -5,23 +5,18 @@ import pandas as pd
 import pytest
 
 from command_line import run
+from conftest import given_back
 from kinertia import demo as demo_module
 from kinertia.cli_study import _verdict
 from kinertia.config import read_subject
 from kinertia.inputs import read_inputs
 from kinertia.prepare import prepare
 from kinertia.synthetic import unlike_literature, walking_subject
-from kinertia.two_level import TwoLevelResult, correct_pelvis
 
 
 @pytest.fixture
 def quick_estimator(monkeypatch):
     """The pipeline with an estimator that gives back its start: all but the seconds of iterating."""
-
-    def given_back(skeleton, start, windows, symmetric=True, progress=None):
-        motions = tuple(correct_pelvis(skeleton, start, window) for window in windows)
-        return TwoLevelResult(start, motions, (), (0.0, 0.0), 1, True)
-
     monkeypatch.setattr("kinertia.fit.estimate_two_level", given_back)
 
 
@@ -42,7 +37,9 @@ def check_outcome(outcome, folder):
     assert np.abs(mass["truth"] / mass["literature"] - 1).max() > 0.03
     assert json.loads((folder / "fit.json").read_text())["trials"][0]["n_dynamic_frames"] > 90
     for results in (folder, folder / "simultaneous"):
-        assert {"bsp.csv", "kinematics.mot", "residuals.sto"} <= {path.name for path in results.iterdir()}
+        assert {"report.html", "bsp.csv", "kinematics.mot", "residuals.sto"} <= {
+            path.name for path in results.iterdir()
+        }
     off = {name: np.sqrt(np.mean((mass[name] - mass["truth"]) ** 2)) for name in ("literature", "simultaneous")}
     assert off["simultaneous"] < off["literature"]
 

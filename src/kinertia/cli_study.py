@@ -161,7 +161,7 @@ def table1(
         table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     _report_table1(table, source.deviation)
     save_table1(table, output)
-    out.print(f"results in {output}: table1.json, table1.csv, table1.html, table1.png")
+    out.print(f"results in {output}: report.html, table1.json, table1.csv, table1.png")
 
 
 def _report_table1(table: Table1, deviation: np.ndarray) -> None:

@@ -29,6 +29,8 @@ NAMES = (
 )
 """Of `PARAMETERS`, in words."""
 _INTERVAL_SD = 1.96
+_ESTIMATED_BY_TWO_LEVEL = 7
+"""The study's, first in `PARAMETERS`; products of inertia stay the literature's."""
 _READ_IN = {"m": ("mm", 1e3)}
 
 
@@ -62,7 +64,7 @@ def bsp_figure(fit: Fit) -> go.Figure:
     rows = {"tickvals": list(range(len(segments))), "ticktext": segments, "range": [len(segments) - 0.4, -0.6]}
     if away is None or posterior is None:
         change = fit.estimate.table() - fit.literature.table()
-        panels = [_plain_panel(k, change[:, k], rows) for k in range(len(PARAMETERS))]
+        panels = [_plain_panel(k, change[:, k], rows) for k in range(_ESTIMATED_BY_TWO_LEVEL)]
         axis: dict[str, Any] = {"nticks": 5}
         alt = "Differences between estimate and literature for every body segment parameter, without error bars."
     else:
@@ -137,15 +139,15 @@ def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any]) -> Panel:
 
 
 def information_figure(fit: Fit) -> go.Figure | None:
-    """Information on every parameter (0 nothing learnt, 1 everything), segments by parameters; None after two-level."""
+    """Information on every parameter (100 % is everything), segments by parameters; None after two-level."""
     if fit.posterior is None:
         return None
-    told = np.clip(fit.posterior.information, 0.0, 1.0)
+    told = 100 * np.clip(fit.posterior.information, 0.0, 1.0)
     segments = [segment_name(name) for name in fit.estimate.segments]
     best = np.unravel_index(int(np.argmax(told)), told.shape)
     alt = (
-        f"Map of what the data told about each parameter, from 0 to 1; most about {NAMES[best[1]]} of "
-        f"{segments[best[0]]}, {told[best]:.2f}; median {np.median(told):.2f}."
+        f"Map of what the data told about each parameter, in percent; most about {NAMES[best[1]]} of "
+        f"{segments[best[0]]}, {told[best]:.0f} %; median {np.median(told):.0f} %."
     )
     heat = {
         "type": "heatmap",
@@ -153,14 +155,14 @@ def information_figure(fit: Fit) -> go.Figure | None:
         "x": list(NAMES),
         "y": segments,
         "zmin": 0,
-        "zmax": 1,
+        "zmax": 100,
         "colorscale": [[0, "#FFFFFF"], [1, style.BLUE]],
         "xgap": 2,
         "ygap": 2,
-        "texttemplate": "%{z:.2f}",
+        "texttemplate": "%{z:.0f}",
         "textfont": {"size": 11},
         "showscale": False,
-        "hovertemplate": "%{x} of %{y}: %{z:.2f}<extra></extra>",
+        "hovertemplate": "%{x} of %{y}: %{z:.0f} %<extra></extra>",
     }
     layout = base_layout(alt)
     layout |= {

@@ -138,7 +138,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
             row |= {"literature": before[i, k] * factor, "estimate": after[i, k] * factor}
             if posterior is not None and away is not None:
                 row |= {"prior_sd": posterior.prior_sd[i, k] * factor, "sd": posterior.sd[i, k] * factor}
-                row |= {"away": away[i, k], "information": max(float(posterior.information[i, k]), 0.0)}
+                row |= {"away": away[i, k], "information": max(100 * float(posterior.information[i, k]), 0.0)}
             rows.append(row)
     return rows
 

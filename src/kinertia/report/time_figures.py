@@ -82,7 +82,7 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
             traces += _sides(one, name, time, np.degrees(values) if one.rotational else values, thin, line)
         unit = "degrees" if one.rotational else "m"
         panels.append(Panel(f"{one.title} ({unit})", traces, _background(trial.kinematics, axis, one)))
-    change = np.degrees(angle_changes(trial, skeleton))
+    change = np.degrees(motion_change(trial)[:, skeleton.rotational])
     alt = (
         f"Coordinates of {trial.name} over time, inverse kinematics against estimate; the joint angles differ by "
         f"{rms(change):.1f} degrees RMS."
@@ -90,10 +90,9 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
     return small_multiples(panels, alt, axis)
 
 
-def angle_changes(trial: TrialFit, skeleton: Skeleton) -> np.ndarray:
-    """(w, a) rad: estimated minus smoothed measured angles, root included, over the window."""
-    angles = np.asarray(skeleton.rotational)
-    return trial.motion.q[:, angles] - trial.kinematics.motion.q[:, angles]
+def motion_change(trial: TrialFit) -> np.ndarray:
+    """(w, c) rad and m: estimated coordinates minus those of inverse kinematics; NaN where the markers told none."""
+    return trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
 
 
 def moment_figure(trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES) -> go.Figure:

@@ -14,7 +14,7 @@ from kinertia.fit import Fit, TrialFit
 from kinertia.ik import rms
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, read_in, segment_name
 from kinertia.report.coordinate_titles import title_of
-from kinertia.report.time_figures import angle_changes
+from kinertia.report.time_figures import motion_change
 from kinertia.verdict import Level, Verdict, verdicts
 
 INFORMED, MEASURED = 0.25, 0.75
@@ -60,17 +60,18 @@ def words(fit: Fit) -> Words:
 
 def _motion(fit: Fit, trial: TrialFit) -> list[str]:
     before, after = (1e3 * rms(trial.marker_errors_m[stage]) for stage in ("ik", "final"))
-    change = np.degrees(angle_changes(trial, fit.skeleton))
-    each = np.sqrt(np.mean(np.square(change), axis=0))
-    worst = int(np.argmax(each))
-    name = title_of(fit.skeleton, int(np.flatnonzero(fit.skeleton.rotational)[worst]))
-    moved = 1e3 * np.linalg.norm(trial.motion.q[:, :3] - trial.kinematics.motion.q[:, :3], axis=1)
+    change = motion_change(trial)
+    angles = np.flatnonzero(fit.skeleton.rotational)
+    each = np.degrees([rms(change[:, k]) for k in angles])
+    worst = int(np.nanargmax(each))
+    name = title_of(fit.skeleton, int(angles[worst]))
+    moved = 1e3 * np.linalg.norm(change[:, :3], axis=1)
+    overall = float(np.degrees(rms(change[:, angles])))
     return [
         f"{trial.name}: the model's markers are {before:.1f} mm (RMS) from the measured ones after inverse kinematics "
         f"and {after:.1f} mm after the estimate",
-        f"{trial.name}: joint angles were changed by {rms(change):.1f} degrees (RMS), most of all {name} by "
-        f"{each[worst]:.1f}; the pelvis was moved by {np.sqrt(np.mean(moved**2)):.0f} mm (RMS), {moved.max():.0f} mm "
-        f"at most",
+        f"{trial.name}: joint angles were changed by {overall:.1f} degrees (RMS), most of all {name} by "
+        f"{each[worst]:.1f}; the pelvis was moved by {rms(moved):.0f} mm (RMS), {np.nanmax(moved):.0f} mm at most",
     ]
 
 
@@ -82,10 +83,10 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
         )
     told = fit.posterior.information
     masses = told[:, 0]
+    measured, assumed = int((told > MEASURED).sum()), int((told < INFORMED).sum())
     found = [
-        f"of {told.size} parameters the data measured {int((told > MEASURED).sum())} (information above {MEASURED:g}), "
-        f"informed {int(((told >= INFORMED) & (told <= MEASURED)).sum())}; "
-        f"{int((told < INFORMED).sum())} are assumed from the literature"
+        f"of {told.size} parameters the data measured {measured} (information above {100 * MEASURED:g} %) and informed "
+        f"{told.size - measured - assumed}; {assumed} are assumed from the literature (below {100 * INFORMED:g} %)"
     ]
     for level, chosen in (
         ("measured", masses > MEASURED),
