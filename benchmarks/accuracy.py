@@ -32,7 +32,7 @@ from kinertia.noise import camera_noise, soft_tissue_artefact, study_noise
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.prepare import TrialInput
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
-from kinertia.simultaneous_fit import fit_simultaneous
+from kinertia.simultaneous_fit import GAIN_SD, fit_simultaneous
 from kinertia.skeleton import Skeleton
 from kinertia.splines import smooth
 from kinertia.study import MARGIN_S, START_SHARE, symmetric_truth
@@ -67,7 +67,7 @@ def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | N
 
 def held(skeleton: Skeleton) -> CalibrationPrior:
     """Calibration that is known: the study's skeleton and instruments are exact."""
-    return CalibrationPrior({}, np.full(len(skeleton.markers), 1e-4), 1e-4, 1e-4)
+    return CalibrationPrior({}, np.full(len(skeleton.markers), 1e-4), 1e-4, 1e-4, 1e-4)
 
 
 def start_prior(start: BodySegmentParameters, mass_kg: float) -> BspPrior:
@@ -204,12 +204,12 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
         return estimate_simultaneous(off.skeleton, prior, calibration, [seen], SPACING_S)
 
     marker_sd = np.full(len(off.skeleton.markers), 0.005)
-    free = CalibrationPrior(dict.fromkeys(HIP_OFFSETS, PRIOR.hips_m), marker_sd, PRIOR.plate_m, PRIOR.clock_s)
+    free = CalibrationPrior(dict.fromkeys(HIP_OFFSETS, PRIOR.hips_m), marker_sd, PRIOR.plate_m, GAIN_SD, PRIOR.clock_s)
     result = estimate(free)
-    offsets, sds = result.plate_offsets_m[0]
-    clock, clock_sd = result.clock_s[0]
+    offsets, sds = result.plates["right foot"]
+    clock, clock_sd = result.clock_s
     deviations = {
-        "right plate, x": (float(offsets[0, 0] + disturbance.plate_m), float(sds[0, 0])),
+        "right plate, x": (float(offsets[0] + disturbance.plate_m), float(sds[0])),
         "clock": (clock - disturbance.clock_s, clock_sd),
         "right hip, x": result.coordinates["hip_x_r"],
         "left hip, x": result.coordinates["hip_x_l"],

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from kinertia.bsp_prior import literature_prior
 from kinertia.gait27 import HIP_OFFSETS
+from kinertia.instruments import FootPlates
 from kinertia.map_terms import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
@@ -24,7 +26,7 @@ def small_trial() -> SyntheticTrial:
 
 
 def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
-    """Noisy markers with gaps, two plates, first and last frames not dynamic."""
+    """Noisy markers with gaps, three plates, first and last frames not dynamic."""
     rng = np.random.default_rng(seed)
     markers = trial.markers.positions + rng.normal(0.0, 0.01, trial.markers.positions.shape)
     markers[2, 1] = markers[5:7, 3] = np.nan
@@ -36,7 +38,12 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
         marker_sd=np.linspace(0.01, 0.03, len(KEPT)),
         q=trial.motion.q,
         dynamic=dynamic,
-        plates=smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0),
+        ground=FootPlates(
+            smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0),
+            ("first", "second", "third"),
+            np.stack([np.where(trial.time < 0.1, 0, 2), np.full(len(trial.time), 1)], axis=1),
+            Rotation.from_euler("y", 90, degrees=True).as_matrix(),
+        ),
         force_sd=6.0,
         moment_sd=2.0,
     )
@@ -44,7 +51,7 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
 
 def small_problem(n_trials: int = 1) -> MapProblem:
     trial = small_trial()
-    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), 0.02, 0.01)
+    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), 0.02, 0.02, 0.01)
     observations = [small_observation(trial, seed) for seed in range(n_trials)]
     return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations, 0.1)
 
@@ -67,9 +74,12 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     q, qd, qdd = problem.bases[k].evaluate(coefficients)
     pose = skeleton.pose(q)
     errors = ((trial.markers - skeleton.marker_positions(pose)) / trial.marker_sd[:, None]).ravel()
-    loads = trial.plates(trial.time + static[layout.clocks[k]]).reshape(len(trial.time), -1, 6)
-    for plate, (x, z) in enumerate(static[layout.plates[k]].reshape(-1, 2)):
-        loads[:, plate, 3:] += np.cross([x, 0.0, z], loads[:, plate, :3])
+    loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
+    values = dict(zip(problem.plates, static[layout.plates].reshape(-1, 3), strict=True))
+    for i, foot in np.ndindex(len(loads), 2):
+        x, z, gain = values[trial.ground.plates[trial.ground.carrier[i, foot]]]
+        loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])
+        loads[i, foot] *= 1.0 + gain
     reaction = np.einsum("nij,ni->nj", pose.jacobian[:, :, :6], loads.sum(axis=1))
     model = skeleton.model_with(problem.bsp(static))
     data = model.createData()

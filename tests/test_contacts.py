@@ -61,6 +61,32 @@ def expect_window(trial, start_s, end_s):
     assert end == pytest.approx(end_s, abs=0.02)
 
 
+def test_which_plate_a_foot_stands_on():
+    """Between two steps it is the plate nearest in time; a step of the right foot is on plates 1, 3, 5, 7."""
+    loads = build_trial(walk(ALL_STEPS), FEET).loads
+    assert loads.plates[2] == "plate 3"
+    for plate, (side, number) in enumerate(ALL_STEPS[2:6], start=2):
+        begin = (0.2 if side == "r" else 0.7) + number
+        near = (loads.time > begin - 0.15) & (loads.time < begin + 0.75)
+        assert (loads.carrier[near, "rl".index(side)] == plate).all()
+
+
+def test_a_foot_on_two_plates_counts_for_the_one_that_carries_more():
+    recording = walk([("r", 0), ("l", 0)])
+    share = np.array([0.7, 0.3])[:, None]
+    double = replace(
+        recording.plates,
+        names=("a", "b", "c"),
+        force=np.concatenate([recording.plates.force[:, :1] * share, recording.plates.force[:, 1:]], axis=1),
+        moment=np.concatenate([recording.plates.moment[:, :1] * share, recording.plates.moment[:, 1:]], axis=1),
+        declared_feet=(None,) * 3,
+    )
+    loads, _ = assign_plates(replace(recording, plates=double), FEET)
+    assert (loads.carrier[:, 0] == 0).all()
+    assert (loads.carrier[:, 1] == 2).all()
+    np.testing.assert_allclose(loads.force[:, 0], recording.plates.force[:, 0])
+
+
 def test_every_step_on_a_plate():
     trial = build_trial(walk(ALL_STEPS), FEET)
     assert trial.measured.all()

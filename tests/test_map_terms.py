@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ def here(problem):
 
 
 def cost(problem: MapProblem, coefficients: np.ndarray, static: np.ndarray) -> float:
-    return problem.cost([coefficients], static)
+    return problem.at([coefficients], static).cost
 
 
 def sloped(function, size: float) -> float:
@@ -26,11 +28,11 @@ def sloped(function, size: float) -> float:
     return (function(size) - function(-size)) / (2 * size)
 
 
-@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "plates", "clocks"])
+@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "plates", "clock"])
 def test_gradient_of_static_unknowns(problem, here, kind):
     coefficients, static = here
     part = getattr(problem.layout, kind)
-    part = part[0] if isinstance(part, tuple) else part
+    part = slice(part, part + 1) if isinstance(part, int) else part
     step = np.zeros_like(static)
     step[part] = np.random.default_rng(0).normal(size=step[part].shape)
     right = problem.normal(0, coefficients, static).static_right + problem.prior_terms(static)[1]
@@ -112,7 +114,8 @@ def test_prior_cost_counts_deviations(problem):
     layout = problem.layout
     prior = problem.calibration
     cases = [(layout.coordinates.start, 0.01), (layout.locals.start + 4, float(prior.marker_sd_m[1]))]
-    cases += [(layout.plates[0].start, prior.plate_sd_m), (layout.clocks[0], prior.clock_sd_s)]
+    plate = layout.plates.start
+    cases += [(plate, prior.plate_sd_m), (plate + 2, prior.gain_sd), (layout.clock, prior.clock_sd_s)]
     for at, deviation in cases:
         static = problem.start_static.copy()
         static[at] += deviation
@@ -134,20 +137,22 @@ def test_start_is_the_prior_s_mean(problem):
     np.testing.assert_allclose(start.table(), nearest_consistent(problem.prior.mean).table(), rtol=1e-9, atol=1e-12)
     positions = problem.start_static[problem.layout.locals].reshape(-1, 3)
     np.testing.assert_array_equal(positions, problem.skeleton.marker_locals)
-    assert not problem.start_static[problem.layout.plates[0]].any()
-    assert problem.start_static[problem.layout.clocks[0]] == 0.0
+    assert not problem.start_static[problem.layout.plates].any()
+    assert problem.start_static[problem.layout.clock] == 0.0
 
 
-def test_each_trial_has_its_own_plates_and_clock():
+def test_trials_share_plates_by_name_and_the_clock():
     pair = small_problem(2)
+    other = replace(pair.trials[1], ground=replace(pair.trials[1].ground, plates=("second", "fourth", "third")))
+    pair = MapProblem(pair.skeleton, pair.prior, pair.calibration, [pair.trials[0], other], 0.1)
+    assert pair.plates == ("first", "second", "third", "fourth")
     coefficients, static = point(pair)
-    for k, other in ((0, 1), (1, 0)):
-        normal = pair.normal(k, coefficients[k], static)
-        foreign = np.r_[np.arange(*pair.layout.plates[other].indices(len(static))), pair.layout.clocks[other]]
-        own = np.r_[np.arange(*pair.layout.plates[k].indices(len(static))), pair.layout.clocks[k]]
-        assert not normal.static[foreign].any()
-        assert not normal.border[..., foreign].any()
-        assert np.abs(normal.static[own]).max(axis=1).min() > 0
+    for k, foreign in ((0, "fourth"), (1, "first")):
+        static_terms = pair.normal(k, coefficients[k], static).static
+        for i, name in enumerate(pair.plates):
+            own = np.abs(static_terms[pair.layout.plates][3 * i : 3 * i + 3]).max(axis=1)
+            assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
+        assert static_terms[pair.layout.clock, pair.layout.clock] > 0
 
 
 def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):

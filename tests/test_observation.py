@@ -85,7 +85,7 @@ def test_only_the_window_is_dynamic_and_its_surroundings_are_markers(trial):
     seen, _ = observe(trial.skeleton, kinematics, MASS_KG, 10.0)
     assert seen.time[seen.dynamic][[0, -1]] == pytest.approx([0.4, 0.6])
     assert seen.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
-    assert seen.plates.time[[0, -1]] == pytest.approx([0.4, 0.6])
+    assert seen.ground.loads.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
 
 
 def test_deviation_of_forces_grows_with_weight_and_with_repeated_frames(trial, white):

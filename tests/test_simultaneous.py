@@ -8,6 +8,7 @@ import kinertia.simultaneous as simultaneous
 from accuracy import DISTURBANCES, calibrated
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import literature_prior, with_symmetry
+from kinertia.instruments import FootPlates
 from kinertia.map_terms import CalibrationPrior, Observation
 from kinertia.motion_basis import MotionBasis
 from kinertia.simultaneous import estimate_simultaneous
@@ -41,7 +42,7 @@ def trial(person):
 
 @pytest.fixture(scope="module")
 def calibration(trial):
-    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), 0.005, 0.005)
+    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), 0.005, 0.02, 0.005)
 
 
 def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: float = 0.0, seed: int = 0) -> Observation:
@@ -56,7 +57,7 @@ def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: flo
         marker_sd=np.full(markers.shape[1], max(noise_m, 0.001)),
         q=trial.motion.q[frames],
         dynamic=np.ones(len(time[frames]), dtype=bool),
-        plates=smooth(time, loads, 25.0),
+        ground=FootPlates.one_per_foot(smooth(time, loads, 25.0), len(time[frames])),
         force_sd=3.0,
         moment_sd=1.0,
     )
@@ -141,8 +142,10 @@ def test_without_forces_only_markers_count(trial, prior, calibration):
     seen = replace(observation(trial, noise_m=0.003), dynamic=dynamic)
     result = estimate_simultaneous(trial.skeleton, prior, calibration, [seen], SPACING_S)
     np.testing.assert_allclose(result.bsp.table(), prior.mean.table(), rtol=0, atol=1e-6)
-    assert result.clock_s[0] == (pytest.approx(0.0, abs=1e-9), pytest.approx(0.005))
-    np.testing.assert_allclose(result.plate_offsets_m[0][0], 0.0, atol=1e-9)
+    assert result.clock_s == (pytest.approx(0.0, abs=1e-9), pytest.approx(0.005))
+    for values, sds in result.plates.values():
+        np.testing.assert_allclose(values, 0.0, atol=1e-9)
+        np.testing.assert_allclose(sds, [0.005, 0.005, 0.02])
     np.testing.assert_allclose(result.motions[0].q[6:-6], trial.motion.q[6:-6], atol=0.08)
 
 
@@ -152,8 +155,10 @@ def test_wrong_forces_in_unmeasured_frames_do_not_matter(trial, prior, calibrati
     loads = trial.foot_loads.reshape(len(trial.time), 12).copy()
     cut = smooth(trial.time[:28], loads[:28], 25.0)
     results = [
-        estimate_simultaneous(trial.skeleton, prior, calibration, [replace(seen, plates=plates)], SPACING_S)
-        for plates in (cut, smooth(trial.time, np.where(np.arange(len(loads))[:, None] < 28, loads, 0.0), 1e6))
+        estimate_simultaneous(
+            trial.skeleton, prior, calibration, [replace(seen, ground=replace(seen.ground, loads=part))], SPACING_S
+        )
+        for part in (cut, smooth(trial.time, np.where(np.arange(len(loads))[:, None] < 28, loads, 0.0), 1e6))
     ]
     away = (results[0].bsp.table() - results[1].bsp.table()) / prior.sd
     assert np.abs(away).max() < 0.1

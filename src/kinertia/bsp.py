@@ -176,7 +176,7 @@ class BodySegmentParameters:
         """
         first_moment = self.mass_kg[:, None] * self.com_m
         pseudo = np.empty((len(self.segments), 4, 4))
-        pseudo[:, :3, :3] = _second_moments(self.inertia_kgm2) + first_moment[:, :, None] * self.com_m[:, None, :]
+        pseudo[:, :3, :3] = second_moments(self.inertia_kgm2) + first_moment[:, :, None] * self.com_m[:, None, :]
         pseudo[:, :3, 3] = pseudo[:, 3, :3] = first_moment
         pseudo[:, 3, 3] = self.mass_kg
         return pseudo
@@ -198,7 +198,7 @@ class BodySegmentParameters:
             excess = moments[c] - moments[a] - moments[b]
             if not excess < 0:
                 bad.append(f"triangle inequality {a} + {b} > {c} violated by {excess:.4g} kg m2")
-        smallest = np.linalg.eigvalsh(_second_moments(self.inertia_kgm2[i]))[0]
+        smallest = np.linalg.eigvalsh(second_moments(self.inertia_kgm2[i]))[0]
         if not bad and not smallest > 0:
             bad.append(
                 "ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by "
@@ -288,7 +288,7 @@ class ParameterVector:
     def jacobian(self, theta: npt.ArrayLike) -> FloatArray:
         """(10 s, len(names)) derivative of `bsp(theta).dynamic_parameters()` with respect to theta."""
         values = self._grouped(theta) * self._signs
-        blocks = _dynamic_parameter_derivatives(values[:, 0], values[:, 1:4]) * self._signs[:, None, :]
+        blocks = dynamic_by_table(values[:, 0], values[:, 1:4])[..., :_STUDY] * self._signs[:, None, :]
         jacobian = np.zeros((len(blocks), 10, len(self.names) // _STUDY, _STUDY))
         jacobian[np.arange(len(blocks)), :, self._group, :] = blocks
         return jacobian.reshape(10 * len(blocks), len(self.names))
@@ -340,6 +340,34 @@ def combine(
     return total, centre, (inertia + _point_mass_inertia(mass, com - centre)).sum(axis=0)
 
 
+def second_moments(inertia: FloatArray) -> FloatArray:
+    """(..., 3, 3) integrals of x x^T dm from inertia tensors about the same point."""
+    return 0.5 * np.trace(inertia, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - inertia
+
+
+def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
+    """(s, 10, 10) derivative of each segment's dynamic parameters by its row of `BodySegmentParameters.table`."""
+    derivative = np.zeros((len(mass), 10, 10))
+    derivative[:, 0, 0] = 1.0
+    derivative[:, 1:4, 0] = com
+    derivative[:, 4:, 0] = _point_mass_inertia(np.ones_like(mass), com)[:, _PIN_ROWS, _PIN_COLUMNS]
+    for k, unit in enumerate(np.eye(3)):
+        derivative[:, 1 + k, 1 + k] = mass
+        outer = com[:, :, None] * unit
+        tensor = 2.0 * com[:, k, None, None] * np.eye(3) - outer - outer.transpose(0, 2, 1)
+        derivative[:, 4:, 1 + k] = (mass[:, None, None] * tensor)[:, _PIN_ROWS, _PIN_COLUMNS]
+    derivative[:, [4, 6, 9, 5, 7, 8], range(4, 10)] = 1.0
+    return derivative
+
+
+def block_diagonal(blocks: FloatArray) -> FloatArray:
+    """(s k, s k) matrix of the blocks (s, k, k)."""
+    s, k, _ = blocks.shape
+    result = np.zeros((s, k, s, k))
+    result[np.arange(s), :, np.arange(s), :] = blocks
+    return result.reshape(s * k, s * k)
+
+
 def _partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:
     """(s,) index of each segment's `_l`/`_r` partner, or its own."""
     index = {name: i for i, name in enumerate(segments)}
@@ -364,23 +392,3 @@ def _point_mass_inertia(mass: FloatArray, position: FloatArray) -> FloatArray:
     """(n, 3, 3) inertia about the origin of point masses (n,) at positions (n, 3)."""
     squares = np.einsum("ni,ni->n", position, position)
     return mass[:, None, None] * (squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :])
-
-
-def _second_moments(inertia: FloatArray) -> FloatArray:
-    """(..., 3, 3) integrals of x x^T dm from inertia tensors about the same point."""
-    return 0.5 * np.trace(inertia, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - inertia
-
-
-def _dynamic_parameter_derivatives(mass: FloatArray, com: FloatArray) -> FloatArray:
-    """(s, 10, 7) derivative of a segment's dynamic parameters by its mass, CoM and three moments."""
-    derivative = np.zeros((len(mass), 10, _STUDY))
-    derivative[:, 0, 0] = 1.0
-    derivative[:, 1:4, 0] = com
-    derivative[:, 4:, 0] = _point_mass_inertia(np.ones_like(mass), com)[:, _PIN_ROWS, _PIN_COLUMNS]
-    for k, unit in enumerate(np.eye(3)):
-        derivative[:, 1 + k, 1 + k] = mass
-        outer = com[:, :, None] * unit
-        tensor = 2.0 * com[:, k, None, None] * np.eye(3) - outer - outer.transpose(0, 2, 1)
-        derivative[:, 4:, 1 + k] = (mass[:, None, None] * tensor)[:, _PIN_ROWS, _PIN_COLUMNS]
-    derivative[:, [4, 6, 9], [4, 5, 6]] = 1.0
-    return derivative

@@ -7,9 +7,11 @@ the spread between published methods; collected in the project's `reference/anth
   %, upper arm 9 %, forearm 9 %, trunk parts 10-12 %) and the spread between methods (4c: thigh 14 %, upper arm 16 %,
   foot 15 %);
 - CoM: 3.5 % of the segment's length along it (4a: 1.2-5.6 % of length), and 5 % of the length across it, or 8 mm (no
-  source gives the transverse deviation; tables differ by that much from one another);
-- moments of inertia: 20 % (4b: 12-24 % for the large ones); products of inertia: 8 % of the mean moment (no source; it
-  covers principal axes some 5 degrees off).
+  source gives the transverse deviation; tables differ by that much from one another); 10 mm to the side for pelvis and
+  torso, which are nearly symmetric (no source; organs are not);
+- inertia: 20 % on the second moment of the mass in every direction, half of the variance common to all directions;
+  moments of inertia come out at 16-20 % (4b: 12-24 %, much the same in all directions). They cannot vary independently:
+  with 20 % on each, hardly a person in a thousand would be physically possible.
 
 Correlations: mass cut from the thigh goes to the trunk (the hip's cut plane is a matter of definition, 4c), and left
 and right differ less than either from the literature: a person is nearly symmetric, but not bound to be.
@@ -21,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.bsp import MIRROR_SIGNS, BodySegmentParameters
+from kinertia.bsp import MIRROR_SIGNS, BodySegmentParameters, block_diagonal, second_moments
 
 MASS_SD = {
     "pelvis": 0.14,
@@ -33,8 +35,9 @@ MASS_SD = {
     "forearm": 0.10,
 }
 """Relative deviation of the mass, by segment."""
-COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M = 0.035, 0.05, 0.008
-MOMENT_SD, PRODUCT_SD = 0.20, 0.08
+COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M, MIDLINE_SD_M = 0.035, 0.05, 0.008, 0.010
+SECOND_MOMENT_SD, COMMON_SHARE = 0.20, 0.5
+"""Relative deviation of second moments, and the share of its variance that all directions have in common (size)."""
 SIDES_CORRELATION = 0.9
 THIGH_TRUNK_CORRELATION = -0.35
 SCALE_SD = 0.005
@@ -74,6 +77,22 @@ class BspPrior:
         """(s, 10) prior deviations, in the table's order and units."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 10)
 
+    def draw(self, rng: np.random.Generator) -> BodySegmentParameters:
+        """A person of this prior whose scale said `mass_kg`; drawn again until every segment is physically possible."""
+        scale = np.zeros(self.covariance.shape[0])
+        scale[::10] = 1.0
+        with_total = self.covariance @ scale
+        variance = scale @ with_total + self.mass_sd_kg**2
+        mean = self.mean.table().ravel() + with_total * (self.mass_kg - self.mean.total_mass_kg) / variance
+        covariance = self.covariance - np.outer(with_total, with_total) / variance
+        sd = np.sqrt(np.diag(covariance))
+        root = sd[:, None] * np.linalg.cholesky(covariance / np.outer(sd, sd))
+        while True:
+            table = mean + root @ rng.standard_normal(len(sd))
+            person = BodySegmentParameters.from_table(self.mean.segments, table)
+            if person.physically_consistent().all():
+                return person
+
 
 def literature_prior(literature: BodySegmentParameters) -> BspPrior:
     """The prior around literature values of the 27-DOF model's segments, whose total mass is the scale's."""
@@ -86,9 +105,12 @@ def literature_prior(literature: BodySegmentParameters) -> BspPrior:
         length = 2.0 * abs(table[row, 1 + along])
         sd[row, 1:4] = np.maximum(COM_ACROSS_SD * length, SMALLEST_COM_SD_M)
         sd[row, 1 + along] = max(COM_ALONG_SD * length, SMALLEST_COM_SD_M)
-    sd[:, 4:7] = MOMENT_SD * table[:, 4:7]
-    sd[:, 7:] = PRODUCT_SD * table[:, 4:7].mean(axis=1, keepdims=True)
-    covariance = with_symmetry(np.diag(np.square(sd.ravel())), literature.segments, SIDES_CORRELATION)
+        if not literature.segments[row].endswith(("_r", "_l")):
+            sd[row, 3] = MIDLINE_SD_M
+    blocks = np.zeros((len(names), 10, 10))
+    blocks[:, range(4), range(4)] = np.square(sd[:, :4])
+    blocks[:, 4:, 4:] = _inertia_covariance(literature)
+    covariance = with_symmetry(block_diagonal(blocks), literature.segments, SIDES_CORRELATION)
     mass = {name: 10 * i for i, name in enumerate(literature.segments)}
     for side in "rl":
         for trunk in ("pelvis", "torso"):
@@ -99,13 +121,38 @@ def literature_prior(literature: BodySegmentParameters) -> BspPrior:
     return BspPrior(literature, covariance, total, SCALE_SD * total)
 
 
+def _inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
+    """(s, 6, 6) covariance of ixx, iyy, izz, ixy, ixz, iyz: second moments L (1 + E) L^T with E isotropic.
+
+    E is a common number on the diagonal plus a symmetric matrix whose elements beside the diagonal vary 1 / sqrt(2) as
+    much as those on it: no choice of axes is special. To first order, deviations are measured by the affine-invariant
+    distance of Lee, Wensing and Park (2020, IEEE T-RO 36:182).
+    """
+    root = np.linalg.cholesky(second_moments(bsp.inertia_kgm2))
+    own = SECOND_MOMENT_SD * np.sqrt(1.0 - COMMON_SHARE)
+    changes = [SECOND_MOMENT_SD * np.sqrt(COMMON_SHARE) * np.eye(3)]
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
+        change = np.zeros((3, 3))
+        change[i, j] = change[j, i] = own if i == j else own * np.sqrt(0.5)
+        changes.append(change)
+    columns = []
+    for change in changes:
+        second = root @ change @ root.transpose(0, 2, 1)
+        inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+        columns.append(inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    factor = np.stack(columns, axis=-1)
+    return factor @ factor.transpose(0, 2, 1)
+
+
 def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation: float) -> np.ndarray:
     """The covariance with this correlation between each right segment and the mirror image of its left one."""
     result = covariance.copy()
-    sd = np.sqrt(np.diag(covariance))
     for i, segment in enumerate(segments):
         if segment.endswith("_r") and f"{segment[:-2]}_l" in segments:
-            right = 10 * i + np.arange(10)
-            left = 10 * segments.index(f"{segment[:-2]}_l") + np.arange(10)
-            result[right, left] = result[left, right] = correlation * sd[right] * sd[left] * MIRROR_SIGNS
+            j = segments.index(f"{segment[:-2]}_l")
+            right, left = slice(10 * i, 10 * i + 10), slice(10 * j, 10 * j + 10)
+            mirror = np.diag(MIRROR_SIGNS)
+            one, other = np.linalg.cholesky([covariance[right, right], mirror @ covariance[left, left] @ mirror])
+            result[right, left] = correlation * one @ other.T @ mirror
+            result[left, right] = result[right, left].T
     return result

@@ -16,6 +16,7 @@ from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
 from kinertia.fit import Fit, estimate_bsp
+from kinertia.identifiability import evidence
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import check_folder
 from kinertia.provenance import provenance_of
@@ -34,6 +35,7 @@ app = typer.Typer(
 )
 app.command()(demo)
 app.add_typer(study, name="study")
+_MARKS = {"measured": "**", "informed": "*", "assumed": ""}
 _STAGES = ("literature", "corrected", "estimate")
 
 
@@ -189,6 +191,8 @@ def _report(fit: Fit, folder: Path) -> None:
     for trial in told["trials"]:
         _report_trial(trial)
     out.print(_bsp_table(fit))
+    if fit.posterior is not None:
+        out.print("** measured by the data, * informed by them, no mark: assumed, the literature's; sd: error bar\n")
     out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
         out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
@@ -211,7 +215,7 @@ def _report_trial(trial: dict[str, Any]) -> None:
 
 
 def _bsp_table(fit: Fit) -> Table:
-    """Two rows per segment; where left mirrors right, the right side stands for both."""
+    """Two rows per segment, three with error bars; where left mirrors right, the right side stands for both."""
     table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
     for i, segment in enumerate(fit.literature.segments):
         if fit.settings.symmetry and segment.endswith("_l"):
@@ -219,6 +223,16 @@ def _bsp_table(fit: Fit) -> Table:
         for source, bsp in (("literature", fit.literature), ("estimate", fit.estimate)):
             com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
-            table.add_row(segment, source, f"{bsp.mass_kg[i]:.2f}", *com, *inertia)
+            cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
+            if source == "estimate" and fit.posterior is not None:
+                cells = [
+                    cell + _MARKS[evidence(a)] for cell, a in zip(cells, fit.posterior.information[i], strict=False)
+                ]
+            table.add_row(segment, source, *cells)
             segment = ""
+        if fit.posterior is not None:
+            sd = fit.posterior.sd[i]
+            table.add_row(
+                "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
+            )
     return table

@@ -23,7 +23,18 @@ from kinertia.ground_contact import (
     ground_contact,
     measured_frames,
 )
-from kinertia.trial import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial, runs, windows
+from kinertia.trial import (
+    FEET,
+    BoolArray,
+    FloatArray,
+    FootLoads,
+    Markers,
+    Recording,
+    Trial,
+    nearest_samples,
+    runs,
+    windows,
+)
 
 __all__ = ["BRIDGED_GAP_S", "FootMarkers", "assign_plates", "build_trial", "measured_frames"]
 
@@ -93,6 +104,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     covered = (plates.time >= recording.markers.time[0]) & (plates.time <= recording.markers.time[-1])
     force = np.zeros((len(plates.time), 2, 3))
     moment = np.zeros_like(force)
+    most, on_plate = np.zeros((len(plates.time), 2)), np.full((len(plates.time), 2), -1)
     notes: list[str] = []
     for p, name in enumerate(plates.names):
         where = f"{recording.name}: {name}"
@@ -114,7 +126,20 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
             for foot in range(2):
                 force[piece, foot] += np.where((nearer == foot)[:, None], plates.force[piece, p], 0.0)
                 moment[piece, foot] += np.where((nearer == foot)[:, None], plates.moment[piece, p], 0.0)
-    return FootLoads(plates.time, force, moment), tuple(notes)
+                vertical = np.where(nearer == foot, plates.force[piece, p, 1], 0.0)
+                on_plate[piece, foot] = np.where(vertical > most[piece, foot], p, on_plate[piece, foot])
+                most[piece, foot] = np.maximum(most[piece, foot], vertical)
+    return FootLoads(plates.time, force, moment, plates.names, _held(plates.time, on_plate)), tuple(notes)
+
+
+def _held(time: FloatArray, on_plate: npt.NDArray[np.int_]) -> npt.NDArray[np.int_]:
+    """Plates of the nearest loaded sample where a foot (k, 2) is on none; the first plate for a foot never loaded."""
+    result = np.zeros_like(on_plate)
+    for foot in range(2):
+        loaded = np.flatnonzero(on_plate[:, foot] >= 0)
+        if len(loaded) > 1:
+            result[:, foot] = on_plate[loaded[nearest_samples(time[loaded], time)], foot]
+    return result
 
 
 def _centre(markers: Markers, time: FloatArray) -> FloatArray:

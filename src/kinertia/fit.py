@@ -16,6 +16,7 @@ from kinertia.bsp import BodySegmentParameters
 from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
+from kinertia.identifiability import evidence
 from kinertia.kinematics import Kinematics
 from kinertia.marker_set import MarkerSet
 from kinertia.prepare import Prepared, Progress, TrialInput, prepare
@@ -97,14 +98,15 @@ class Fit:
     def bsp(self) -> pd.DataFrame:
         """One row per segment and parameter: segment, parameter, unit, literature, estimate.
 
-        The simultaneous estimate adds prior_sd, sd (deviations before and after) and information.
+        The simultaneous estimate adds prior_sd, sd (deviations before and after), information, and evidence:
+        "measured" (information above 0.75), "informed" (0.25 to 0.75) or "assumed" (the literature's, hardly changed).
         """
         table = self.literature.to_frame().rename(columns={"value": "literature"})
         table = table.assign(estimate=self.estimate.to_frame()["value"])
         if self.posterior is None:
             return table
         told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
-        return table.assign(**told)
+        return table.assign(**told, evidence=[evidence(value) for value in told["information"]])
 
     @property
     def covariance(self) -> pd.DataFrame | None:

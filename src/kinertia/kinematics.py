@@ -22,6 +22,8 @@ from kinertia.trial import Markers, Trial, runs
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
+AROUND_WINDOW_S = 0.25
+"""Samples this near the measured window help to know what happens at its ends."""
 _END_PERIODS = 0.5
 """The window keeps off the ends of the record by this share of the cutoff's period: accelerations are poor there.
 
@@ -70,14 +72,19 @@ class Kinematics:
 
     @cached_property
     def foot_loads(self) -> np.ndarray:
-        """(w, 2, 6) ground reactions on the right and left foot inside the window: force, moment about ground origin.
+        """(w, 2, 6) ground reactions on right and left foot in the window: force, moment about the ground origin."""
+        return self.smoothed_loads(self.cutoff_hz)(self.time).reshape(-1, 2, 6)
 
-        Smoothed from the window's own samples only: what a plate saw outside it may not be all of the ground contact.
+    def smoothed_loads(self, cutoff_hz: float) -> SmoothedSpline:
+        """Ground reactions (12: right force and moment, left force and moment) as functions of time.
+
+        Samples up to AROUND_WINDOW_S outside the window count: what a plate saw there may not be all of the ground
+        contact, but is how the load on that plate went on.
         """
-        loads = self.trial.loads
-        inside = (loads.time >= self.window_s[0] - 1e-9) & (loads.time <= self.window_s[1] + 1e-9)
-        columns = np.concatenate([loads.force, loads.moment], axis=-1)[inside].reshape(-1, 12)
-        return smooth(loads.time[inside], columns, self.cutoff_hz)(self.time).reshape(-1, 2, 6)
+        loads, (start, end) = self.trial.loads, self.window_s
+        near = (loads.time >= start - AROUND_WINDOW_S - 1e-9) & (loads.time <= end + AROUND_WINDOW_S + 1e-9)
+        columns = np.concatenate([loads.force, loads.moment], axis=-1)[near].reshape(-1, 12)
+        return smooth(loads.time[near], columns, cutoff_hz)
 
 
 def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:

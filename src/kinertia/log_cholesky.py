@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp import BodySegmentParameters, dynamic_by_table, second_moments
 
 _ROWS, _COLUMNS = np.array([0, 1, 2, 1, 2, 2]), np.array([0, 1, 2, 0, 0, 1])
 _ROUNDING = 1e-9
@@ -24,7 +24,7 @@ def to_log_cholesky(bsp: BodySegmentParameters) -> np.ndarray:
     Raises:
         numpy.linalg.LinAlgError: a segment is not physically consistent.
     """
-    lower = np.linalg.cholesky(_second_moments(bsp.inertia_kgm2))
+    lower = np.linalg.cholesky(second_moments(bsp.inertia_kgm2))
     entries = lower[:, _ROWS, _COLUMNS]
     entries[:, :3] = np.log(entries[:, :3])
     return np.hstack([np.log(bsp.mass_kg)[:, None], bsp.com_m, entries]).ravel()
@@ -54,25 +54,9 @@ def table_jacobian(theta: np.ndarray) -> np.ndarray:
 
 
 def dynamic_jacobian(theta: np.ndarray) -> np.ndarray:
-    """(s, 10, 10): derivative of each segment's dynamic parameters (Pinocchio's order) by its own ten.
-
-    m; m c; inertia about the origin = inertia about the CoM + m (c.c 1 - c c^T).
-    """
+    """(s, 10, 10): derivative of each segment's dynamic parameters (Pinocchio's order) by its own ten."""
     rows = theta.reshape(-1, 10)
-    mass, com = np.exp(rows[:, 0]), rows[:, 1:4]
-    table = table_jacobian(theta)
-    jacobian = np.zeros_like(table)
-    jacobian[:, 0] = table[:, 0]
-    jacobian[:, 1:4] = mass[:, None, None] * table[:, 1:4] + com[:, :, None] * table[:, :1]
-    square = np.square(com).sum(axis=1)
-    # table rows of the six moments, and where each stands in Pinocchio's order
-    for row, (i, j, at) in enumerate([(0, 0, 4), (1, 1, 6), (2, 2, 9), (0, 1, 5), (0, 2, 7), (1, 2, 8)], start=4):
-        same = float(i == j)
-        jacobian[:, at] = table[:, row] + (same * square - com[:, i] * com[:, j])[:, None] * table[:, 0]
-        for k in range(3):
-            through = 2 * same * com[:, k] - (k == i) * com[:, j] - (k == j) * com[:, i]
-            jacobian[:, at] += (mass * through)[:, None] * table[:, 1 + k]
-    return jacobian
+    return dynamic_by_table(np.exp(rows[:, 0]), rows[:, 1:4]) @ table_jacobian(theta)
 
 
 def nearest_consistent(bsp: BodySegmentParameters, floor: float = 0.05) -> BodySegmentParameters:
@@ -80,7 +64,7 @@ def nearest_consistent(bsp: BodySegmentParameters, floor: float = 0.05) -> BodyS
 
     Those of an inconsistent segment are raised to at least this share of its largest; consistent segments stay.
     """
-    values, vectors = np.linalg.eigh(_second_moments(bsp.inertia_kgm2))
+    values, vectors = np.linalg.eigh(second_moments(bsp.inertia_kgm2))
     largest = values[:, -1:]
     values = np.where(values[:, :1] > _ROUNDING * largest, values, np.maximum(values, floor * largest))
     raised = (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
@@ -91,10 +75,6 @@ def _lower(rows: np.ndarray) -> np.ndarray:
     lower = np.zeros((len(rows), 3, 3))
     lower[:, _ROWS, _COLUMNS] = np.hstack([np.exp(rows[:, 4:7]), rows[:, 7:]])
     return lower
-
-
-def _second_moments(inertia: np.ndarray) -> np.ndarray:
-    return 0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
 
 
 def _inertia(second: np.ndarray) -> np.ndarray:

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import ground_load_to_generalised, root_axes
 from kinertia.ik import ancestor_of, normal_equations
+from kinertia.instruments import PLATE_UNKNOWNS, FootPlates
 from kinertia.log_cholesky import (
     dynamic_jacobian,
     from_log_cholesky,
@@ -26,7 +27,6 @@ from kinertia.log_cholesky import (
 from kinertia.motion_basis import MotionBasis
 from kinertia.normal_equations import NormalEquations, assemble
 from kinertia.skeleton import Marker, Skeleton
-from kinertia.splines import SmoothedSpline
 
 COEFFICIENT_SD = 1.0
 """Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
@@ -42,7 +42,7 @@ class Observation:
         marker_sd: (m,) effective white deviation, m (inflated by the square root of the noise's correlation length).
         q: (n, c) start.
         dynamic: (n,) frames whose ground contacts are all measured.
-        plates: time -> (6 p) smoothed force and moment about the ground origin of every plate.
+        ground: the loads on the feet, and the plates that measured them.
         force_sd, moment_sd: effective deviations of the root residual, N and N m.
     """
 
@@ -51,14 +51,9 @@ class Observation:
     marker_sd: np.ndarray
     q: np.ndarray
     dynamic: np.ndarray
-    plates: SmoothedSpline
+    ground: FootPlates
     force_sd: float
     moment_sd: float
-
-    @property
-    def n_plates(self) -> int:
-        """Number of force plates."""
-        return len(self.plates.p) // 6
 
 
 @dataclass(frozen=True)
@@ -69,12 +64,14 @@ class CalibrationPrior:
         coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
         plate_sd_m: of each plate's in-plane offset.
+        gain_sd: of each plate's relative error of gain.
         clock_sd_s: of the time between forces and markers.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
     plate_sd_m: float
+    gain_sd: float
     clock_sd_s: float
 
 
@@ -83,29 +80,47 @@ class Layout:
     """Where each kind of static unknown stands in the vector."""
 
     theta: slice
+    plates: slice
+    clock: int
     coordinates: slice
     locals: slice
-    plates: tuple[slice, ...]
-    clocks: tuple[int, ...]
-    size: int
 
     @classmethod
-    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: Sequence[int]) -> Layout:
-        """The layout for these numbers of unknowns; plates per trial."""
-        at = n_bsp + n_coordinates + 3 * n_markers
-        plates, clocks = [], []
-        for count in n_plates:
-            plates.append(slice(at, at + 2 * count))
-            clocks.append(at + 2 * count)
-            at += 2 * count + 1
-        return cls(
-            slice(0, n_bsp),
-            slice(n_bsp, n_bsp + n_coordinates),
-            slice(n_bsp + n_coordinates, n_bsp + n_coordinates + 3 * n_markers),
-            tuple(plates),
-            tuple(clocks),
-            at,
+    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int) -> Layout:
+        """The layout for these numbers of unknowns."""
+        counts = [n_bsp, len(PLATE_UNKNOWNS) * n_plates, 1, n_coordinates, 3 * n_markers]
+        ends = np.cumsum(counts).tolist()
+        theta, plates, clock, coordinates, places = (
+            slice(end - count, end) for end, count in zip(ends, counts, strict=True)
         )
+        return cls(theta, plates, clock.start, coordinates, places)
+
+    @property
+    def in_root(self) -> slice:
+        """What the root equations depend on: all but the marker positions."""
+        return slice(0, self.coordinates.stop)
+
+    @property
+    def in_markers(self) -> slice:
+        """What the markers depend on: static coordinates and marker positions."""
+        return slice(self.coordinates.start, self.locals.stop)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.locals.stop
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
+    squares of everything.
+    """
+
+    normals: tuple[NormalEquations, ...]
+    information: np.ndarray
+    right: np.ndarray
+    cost: float
 
 
 class MapProblem:
@@ -127,9 +142,9 @@ class MapProblem:
         self.segments = prior.mean.segments
         self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
         self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
-        self.layout = Layout.of(
-            10 * len(self.segments), len(self.still), len(skeleton.markers), [trial.n_plates for trial in trials]
-        )
+        self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
+        self.carriers = [trial.ground.columns(self.plates) for trial in trials]
+        self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
         self.above = ancestor_of(self.free)
         self.information = np.linalg.inv(prior.covariance)
         self.start_static = np.zeros(self.layout.size)
@@ -139,8 +154,9 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        for plates, clock in zip(self.layout.plates, self.layout.clocks, strict=True):
-            deviation[plates], deviation[clock] = calibration.plate_sd_m, calibration.clock_sd_s
+        each = (calibration.plate_sd_m, calibration.plate_sd_m, calibration.gain_sd)
+        deviation[self.layout.plates] = each * len(self.plates)
+        deviation[self.layout.clock] = calibration.clock_sd_s
         self.weight = 1.0 / np.square(deviation)
 
     def bsp(self, static: np.ndarray) -> BodySegmentParameters:
@@ -186,41 +202,25 @@ class MapProblem:
         right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
         return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
 
-    def cost(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> float:
-        """Half the sum of squares."""
-        total = self.prior_terms(static)[2]
-        for part, start in zip(coefficients, self.start, strict=True):
-            total += 0.5 * float(np.square(part - start).sum()) / COEFFICIENT_SD**2
-        skeleton, bsp = self.placed(static), self.bsp(static)
-        for k, trial in enumerate(self.trials):
-            q, qd, qdd = self.full(self.bases[k].evaluate(coefficients[k]), static)
-            errors = trial.markers - skeleton.marker_positions(skeleton.pose(q))
-            total += 0.5 * float(np.nansum(np.square(errors / trial.marker_sd[:, None])))
-            frames = np.flatnonzero(trial.dynamic)
-            model = skeleton.model_with(bsp)
-            data = model.createData()
-            tau = np.array([pin.rnea(model, data, q[i], qd[i], qdd[i])[:6] for i in frames]).reshape(-1, 6)
-            wrench, _ = self.wrench(k, static)
-            left = (tau - ground_load_to_generalised(q[frames, :6], wrench[frames])) / self.root_sd(trial)
-            total += 0.5 * float(np.square(left).sum())
-        return total
+    def at(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> Linearised:
+        """Cost and normal equations at a point."""
+        normals = tuple(self.normal(k, part, static) for k, part in enumerate(coefficients))
+        information, right, cost = self.prior_terms(static)
+        return Linearised(normals, information, right, cost + sum(normal.cost for normal in normals))
 
     def root_sd(self, trial: Observation) -> np.ndarray:
         """(6,) deviations of the root residual: N, N m."""
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
-    def wrench(self, k: int, static: np.ndarray, derivative: int = 0) -> tuple[np.ndarray, np.ndarray]:
-        """Sum of plates (n, 6) about the ground origin at the corrected place and time, and each plate's force
-        (n, p, 3); or their time derivatives.
-        """
+    def plate_values(self, static: np.ndarray) -> np.ndarray:
+        """(p, 3) offsets and gain error of every plate."""
+        return static[self.layout.plates].reshape(-1, len(PLATE_UNKNOWNS))
+
+    def foot_loads(self, k: int, static: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
         trial = self.trials[k]
-        at = trial.time + static[self.layout.clocks[k]]
-        loads = trial.plates(at, derivative).reshape(len(trial.time), -1, 6)
-        force = loads[:, :, :3]
-        offset = np.zeros((trial.n_plates, 3))
-        offset[:, [0, 2]] = static[self.layout.plates[k]].reshape(-1, 2)
-        moment = loads[:, :, 3:] + np.cross(offset, force)
-        return np.concatenate([force.sum(axis=1), moment.sum(axis=1)], axis=1), force
+        at = trial.time + static[self.layout.clock]
+        return trial.ground.corrected(at, self.carriers[k], self.plate_values(static), derivative)
 
     def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
         """Normal equations of trial k."""
@@ -234,17 +234,19 @@ class MapProblem:
             np.zeros((layout.size, layout.size)),
             np.zeros((basis.size, c)),
             np.zeros(layout.size),
+            0.0,
         )
         marker = self._marker_terms(trial, skeleton, parts[0])
         root = self._root_terms(k, skeleton, parts, static)
-        shared = slice(layout.coordinates.start, layout.locals.stop)
-        assemble(normal, basis, marker, root, shared)
+        assemble(normal, basis, marker, root, layout.in_markers, layout.in_root)
+        moved = coefficients - self.start[k]
         normal.band[:, 0] += np.eye(c) / COEFFICIENT_SD**2
-        normal.right -= (coefficients - self.start[k]) / COEFFICIENT_SD**2
+        normal.right -= moved / COEFFICIENT_SD**2
+        normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
         return normal
 
     def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,).
+        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,), r^T r.
 
         S holds the static coordinates and the marker positions, which stand side by side in the layout.
         """
@@ -252,7 +254,7 @@ class MapProblem:
         still, moving = self.still, self.moving
         pose = skeleton.pose(q)
         weight = 1.0 / np.square(trial.marker_sd)
-        normal, gradient, _ = normal_equations(skeleton, self.above, trial.markers, pose, weight)
+        normal, gradient, square = normal_equations(skeleton, self.above, trial.markers, pose, weight)
         positions = skeleton.marker_positions(pose)
         error = trial.markers - positions
         weights = np.isfinite(error).all(axis=-1) * weight
@@ -271,12 +273,12 @@ class MapProblem:
         static[range(k, k + 3 * m), range(k, k + 3 * m)] = np.repeat(weights.sum(axis=0), 3)
         pulled = np.nan_to_num(error) * weights[..., None]
         right = np.concatenate([gradient[:, still].sum(axis=0), np.einsum("nmij,nmi->mj", turned, pulled).ravel()])
-        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right
+        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right, square.sum()
 
     def _root_terms(
         self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, S), residual."""
+        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, s), residual."""
         trial, layout = self.trials[k], self.layout
         frames = np.flatnonzero(trial.dynamic)
         q, qd, qdd = (part[frames] for part in parts)
@@ -300,21 +302,19 @@ class MapProblem:
             regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
         square = da[:, :, :6]
         da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
-        wrench, force = (part[frames] for part in self.wrench(k, static))
+        loads = self.foot_loads(k, static)[frames]
+        wrench = loads.sum(axis=1)
         dq[:, :, :6] -= _generalised_derivative(q[:, :6], wrench)
         by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
-        by_static = np.zeros((d, 6, layout.size))
+        by_static = np.zeros((d, 6, layout.in_root.stop))
         chain = dynamic_jacobian(static[layout.theta])
         by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, 10 * len(joints))
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
-        for plate in range(trial.n_plates):
-            for j, axis in enumerate(np.eye(3)[[0, 2]]):
-                moment = np.concatenate([np.zeros((d, 3)), np.cross(axis, force[:, plate])], axis=1)
-                by_static[:, :, layout.plates[k].start + 2 * plate + j] = -ground_load_to_generalised(
-                    np.hstack([np.zeros((d, 3)), q[:, 3:6]]), moment
-                )
-        rates = self.wrench(k, static, 1)[0][frames]
-        by_static[:, :, layout.clocks[k]] = -ground_load_to_generalised(q[:, :6], rates)
+        by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
+        for column in range(by_plate.shape[2]):
+            by_static[:, :, layout.plates.start + column] = -ground_load_to_generalised(q[:, :6], by_plate[..., column])
+        rates = self.foot_loads(k, static, 1)[frames].sum(axis=1)
+        by_static[:, :, layout.clock] = -ground_load_to_generalised(q[:, :6], rates)
         sd = self.root_sd(trial)[None, :, None]
         left = (tau - ground_load_to_generalised(q[:, :6], wrench)) / sd[..., 0]
         return (
@@ -325,14 +325,6 @@ class MapProblem:
             by_static / sd,
             left,
         )
-
-
-def block_diagonal(blocks: np.ndarray) -> np.ndarray:
-    """(s k, s k) matrix of the blocks (s, k, k)."""
-    s, k, _ = blocks.shape
-    result = np.zeros((s, k, s, k))
-    result[np.arange(s), :, np.arange(s), :] = blocks
-    return result.reshape(s * k, s * k)
 
 
 def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:

@@ -11,13 +11,16 @@ from kinertia.motion_basis import MotionBasis
 
 @dataclass
 class NormalEquations:
-    """Normal equations of a trial: band (size, 6, c, c), border (size, c, S), static (S, S), right-hand sides."""
+    """Normal equations of a trial: band (size, 6, c, c), border (size, c, S), static (S, S), right-hand sides, and half
+    the sum of squares.
+    """
 
     band: np.ndarray
     border: np.ndarray
     static: np.ndarray
     right: np.ndarray
     static_right: np.ndarray
+    cost: float
 
 
 def assemble(
@@ -25,17 +28,22 @@ def assemble(
     basis: MotionBasis,
     marker: tuple[np.ndarray, ...],
     root: tuple[np.ndarray, ...],
-    still: slice,
+    in_markers: slice,
+    in_root: slice,
 ) -> None:
-    """Sum the terms of all frames into the normal equations, one knot interval at a time."""
-    per_frame, across, gradient, static, right = marker
+    """Sum the terms of all frames into the normal equations, one knot interval at a time.
+
+    `in_markers` and `in_root` are the static unknowns that markers and root equations depend on.
+    """
+    per_frame, across, gradient, static, right, square = marker
     frames, dq, dv, da, by_static, left = root
-    c, size = per_frame.shape[1], normal.static.shape[0]
-    flat = by_static.reshape(-1, size)
-    normal.static += flat.T @ flat
-    normal.static[still, still] += static
-    normal.static_right -= flat.T @ left.ravel()
-    normal.static_right[still] += right
+    c, size, wide = per_frame.shape[1], normal.static.shape[0], by_static.shape[2]
+    flat = by_static.reshape(-1, wide)
+    normal.static[in_root, in_root] += flat.T @ flat
+    normal.static[in_markers, in_markers] += static
+    normal.static_right[in_root] -= flat.T @ left.ravel()
+    normal.static_right[in_markers] += right
+    normal.cost += 0.5 * float(square + np.square(left).sum())
     values = basis.values
     for first in np.unique(basis.first):
         here = np.flatnonzero(basis.first == first)
@@ -43,7 +51,7 @@ def assemble(
         pairs = (weight[:, :, None] * weight[:, None]).reshape(len(here), 36)
         block = (pairs.T @ per_frame[here].reshape(len(here), -1)).reshape(6, 6, c, c)
         border = np.zeros((6, c, size))
-        border[:, :, still] = (weight.T @ across[here].reshape(len(here), -1)).reshape(6, c, -1)
+        border[:, :, in_markers] = (weight.T @ across[here].reshape(len(here), -1)).reshape(6, c, -1)
         up = weight.T @ gradient[here]
         rows = np.flatnonzero(np.isin(frames, here, assume_unique=True))
         if rows.size:
@@ -53,7 +61,7 @@ def assemble(
             ]
             x = np.sum(parts, axis=0).reshape(len(rows) * 6, 6 * c)
             block += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
-            border += (x.T @ by_static[rows].reshape(-1, size)).reshape(6, c, size)
+            border[:, :, in_root] += (x.T @ by_static[rows].reshape(-1, wide)).reshape(6, c, wide)
             up -= (x.T @ left[rows].ravel()).reshape(6, c)
         normal.border[first : first + 6] += border
         normal.right[first : first + 6] += up

@@ -13,16 +13,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from kinertia.kinematics import Kinematics
+from kinertia.instruments import FootPlates
+from kinertia.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.map_terms import Observation
 from kinertia.skeleton import GRAVITY_M_S2, Skeleton
-from kinertia.splines import smooth
+from kinertia.trial import nearest_samples
 
 CUTOFF_HZ = 10.0
 """Bandwidth where the user leaves the cutoff to cross-validation, which correlated noise deceives."""
-AROUND_WINDOW_S = 0.25
-"""Frames this near the measured window contribute their markers."""
 FORCE_SD_OF_WEIGHT = 0.005
 """Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
 MOMENT_ARM_M = 0.3
@@ -66,9 +66,6 @@ def observe(
     known = np.where(np.isfinite(q), q, kinematics.spline(time[frames]))
     errors = measured - skeleton.marker_positions(skeleton.pose(known))
     noise, effective = _noise(skeleton, errors, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
-    loads = kinematics.trial.loads
-    inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
-    columns = np.concatenate([loads.force, loads.moment], axis=-1)[inside].reshape(-1, 12)
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
@@ -79,12 +76,21 @@ def observe(
             marker_sd=effective,
             q=q,
             dynamic=(time[frames] >= start - 1e-9) & (time[frames] <= end + 1e-9),
-            plates=smooth(loads.time[inside], columns, cutoff_hz),
+            ground=_ground(kinematics, time[frames], cutoff_hz),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
         noise,
     )
+
+
+def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float) -> FootPlates:
+    loads = kinematics.trial.loads
+    nearest = nearest_samples(loads.time, time)
+    turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
+    used, carrier = np.unique(loads.carrier[nearest], return_inverse=True)
+    names = tuple(loads.plates[i] for i in used)
+    return FootPlates(kinematics.smoothed_loads(cutoff_hz), names, carrier.reshape(-1, 2), turn)
 
 
 def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float) -> tuple[MarkerNoise, np.ndarray]:

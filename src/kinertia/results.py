@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import pandas as pd
 from kinertia import __version__
 from kinertia.checks import mass_from_force_kg
 from kinertia.fit import Fit, TrialFit
+from kinertia.identifiability import BaseParameters
 from kinertia.io.folder import complete_folder
 from kinertia.io.sto import write_sto
 from kinertia.provenance import Provenance
@@ -93,6 +95,22 @@ def _posterior_summary(fit: Fit) -> dict[str, Any]:
         "iterations": fit.posterior.iterations,
         "calibration": {name: dict(told) for name, told in fit.posterior.calibration.items()},
         "marker_noise": noise,
+        "identifiability": _identifiability(fit.bsp, fit.posterior.base),
+    }
+
+
+def _identifiability(bsp: pd.DataFrame, base: BaseParameters) -> dict[str, Any]:
+    """Parameters by evidence, and the combinations that the motion shows or no motion shows."""
+    names = bsp["segment"] + "." + bsp["parameter"]
+    return {
+        **{word: names[bsp["evidence"] == word].tolist() for word in ("measured", "informed", "assumed")},
+        "base_parameters": {
+            "count": base.count,
+            "shown": base.shown,
+            "condition": base.condition if math.isfinite(base.condition) else None,
+            "best_shown": [asdict(combination) for combination in base.best],
+            "never_shown": list(base.never),
+        },
     }
 
 

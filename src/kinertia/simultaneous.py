@@ -2,10 +2,10 @@
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
-segments, each plate's in-plane offset and each trial's time offset. Minimised is the sum of squares, each over its
-deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg damping, all
-derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`);
-its Schur complement is the information on them, and its inverse their covariance.
+segments, each plate's in-plane offset and gain, and the time offset of the forces. Minimised is the sum of squares,
+each over its deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg
+damping, all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns
+(`block_band`); its Schur complement is the information on them, and its inverse their covariance.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.block_band import BlockBand
-from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
 from kinertia.log_cholesky import table_jacobian
-from kinertia.map_terms import CalibrationPrior, MapProblem, Observation, block_diagonal
+from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation
 from kinertia.normal_equations import NormalEquations
 from kinertia.skeleton import Skeleton
 
@@ -34,12 +34,11 @@ class SimultaneousResult:
         bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
         skeleton: with the estimated marker positions and static coordinates.
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        plate_offsets_m: per trial (p, 2) x and z, and their posterior deviations (p, 2).
-        clock_s: per trial the time offset and its posterior deviation, s.
+        plates: per plate its offsets x and z (m) and gain error, (3,), and their posterior deviations (3,).
+        clock_s: the time offset and its posterior deviation, s.
+        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
-        residuals: per trial (n, 6) root residual at the dynamic frames' rows, NaN elsewhere; force N, moment N m in
-        ground axes.
-        converged: the last step lowered the cost by less than CONVERGED.
+        converged: the last step promised to lower the cost by less than CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
     """
@@ -48,8 +47,9 @@ class SimultaneousResult:
     bsp_covariance: np.ndarray
     skeleton: Skeleton
     coordinates: dict[str, tuple[float, float]]
-    plate_offsets_m: tuple[tuple[np.ndarray, np.ndarray], ...]
-    clock_s: tuple[tuple[float, float], ...]
+    plates: dict[str, tuple[np.ndarray, np.ndarray]]
+    clock_s: tuple[float, float]
+    foot_loads: tuple[np.ndarray, ...]
     motions: tuple[Motion, ...]
     converged: bool
     iterations: int
@@ -57,7 +57,10 @@ class SimultaneousResult:
 
 
 CONVERGED = 0.05
-"""Stop when a step lowers half the sum of squares by less: a third of one standard deviation, over all unknowns."""
+"""Stop after a step that promises to lower half the sum of squares by less: a third of one standard deviation, over
+all unknowns."""
+_STUCK = 1e6
+"""Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 40
 _SINGULAR = 1e-13
 """Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
@@ -70,31 +73,30 @@ def estimate_simultaneous(
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
     coefficients = [start.copy() for start in problem.start]
     values = problem.start_static.copy()
-    begin = current = problem.cost(coefficients, values)
-    damping, iterations, converged = 1e-3, 0, False
+    here = problem.at(coefficients, values)
+    begin, damping, iterations, converged = here.cost, 1e-3, 0, False
     scale = np.zeros(len(values))
-    while iterations < _MAX_ITERATIONS and not converged:
-        normals = [problem.normal(k, part, values) for k, part in enumerate(coefficients)]
-        prior_terms = problem.prior_terms(values)
+    while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
         iterations += 1
-        scale = np.maximum(scale, np.diag(prior_terms[0]) + sum(np.diag(normal.static) for normal in normals))
-        for _ in range(12):
-            step, moves = _step(normals, prior_terms, damping, scale)
-            step = problem.shortened(step)
-            trial_values = values + step
-            trial_coefficients = [old + move for old, move in zip(coefficients, moves, strict=True)]
-            new = problem.cost(trial_coefficients, trial_values)
-            if new < current:
-                break
-            damping *= 10.0
-        else:
-            break
-        converged = current - new < CONVERGED and damping <= 1e-3
-        values, coefficients, current = trial_values, trial_coefficients, new
-        damping = max(damping * 0.1, 1e-9)
-    normals = [problem.normal(k, part, values) for k, part in enumerate(coefficients)]
-    information = problem.prior_terms(values)[0] + sum(_reduced(normal, 0.0)[0] for normal in normals)
-    return _result(problem, coefficients, values, _inverse(information), converged, iterations, (begin, current))
+        scale = np.maximum(scale, np.diag(here.information) + sum(np.diag(normal.static) for normal in here.normals))
+        step, moves, promised = _step(here, damping, scale)
+        new_values = values + problem.shortened(step)
+        new_coefficients = [old + move for old, move in zip(coefficients, moves, strict=True)]
+        there = problem.at(new_coefficients, new_values)
+        kept = (here.cost - there.cost) / promised
+        converged = promised < CONVERGED and damping <= 1e-3
+        if kept > 0.0:
+            values, coefficients, here = new_values, new_coefficients, there
+        damping = max(damping * _change_of_damping(kept), 1e-9)
+    information = here.information + sum(_reduced(normal, 0.0)[0] for normal in here.normals)
+    return _result(problem, coefficients, values, _inverse(information), converged, iterations, (begin, here.cost))
+
+
+def _change_of_damping(kept: float) -> float:
+    """Factor on the damping after a step that lowered the cost by this share of what it promised."""
+    if kept > 0.75:
+        return 0.1
+    return 1.0 if kept > 0.25 else 10.0
 
 
 def _inverse(information: np.ndarray) -> np.ndarray:
@@ -108,22 +110,23 @@ def _inverse(information: np.ndarray) -> np.ndarray:
     return half @ half.T
 
 
-def _step(
-    normals: Sequence[NormalEquations], prior: tuple[np.ndarray, np.ndarray, float], damping: float, scale: np.ndarray
-) -> tuple[np.ndarray, list[np.ndarray]]:
-    information, right = prior[0].copy(), prior[1].copy()
-    reduced = [_reduced(normal, damping) for normal in normals]
+def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], float]:
+    """Step of the static unknowns (S,) and of each trial's coefficients, and by how much it would lower the cost."""
+    information, right = here.information.copy(), here.right.copy()
+    reduced = [_reduced(normal, damping) for normal in here.normals]
     for schur, reduced_right, *_ in reduced:
         information += schur
         right += reduced_right
     information[np.diag_indices_from(information)] += damping * scale
     step = np.linalg.solve(information, right)
     moves = []
-    for (_, _, band, border, motion), normal in zip(reduced, normals, strict=True):
+    promised = 0.5 * float(here.right @ step)
+    for (_, _, band, border, motion), normal in zip(reduced, here.normals, strict=True):
         size, c = normal.right.shape
-        move = band.backward(motion - border @ step[:, None])
-        moves.append(move.reshape(-1, c)[:size])
-    return step, moves
+        move = band.backward(motion - border @ step[:, None]).reshape(-1, c)[:size]
+        moves.append(move)
+        promised += 0.5 * float(normal.static_right @ step + (normal.right * move).sum())
+    return step, moves, promised
 
 
 def _reduced(
@@ -187,13 +190,15 @@ def _result(
     }
     markers = problem.placed(values).markers
     skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in found.items()})
+    plates = zip(problem.plate_values(values), problem.plate_values(sd), strict=True)
     return SimultaneousResult(
         bsp,
         chain @ covariance[layout.theta, layout.theta] @ chain.T,
         skeleton,
         found,
-        tuple((values[p].reshape(-1, 2), sd[p].reshape(-1, 2)) for p in layout.plates),
-        tuple((float(values[i]), float(sd[i])) for i in layout.clocks),
+        dict(zip(problem.plates, plates, strict=True)),
+        (float(values[layout.clock]), float(sd[layout.clock])),
+        tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, coefficients, strict=True)),
         converged,
         iterations,

@@ -11,17 +11,19 @@ from kinertia.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.dynamics import Motion
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.identifiability import BaseParameters, base_parameters
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
-from kinertia.splines import SmoothedSpline
 
 JOINT_CENTRE_SD_M = 0.010
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
-PLATE_SD_M = 0.005
+PLATE_SD_M = 0.010
+GAIN_SD = 0.02
+"""Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
 CLOCK_SD_S = 0.005
 _NOTABLE = 2.0
 CONTRADICTION_SD = 3.0
@@ -38,6 +40,7 @@ class Posterior:
         calibration: per quantity its value, prior and posterior deviation, and unit.
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
+        base: which combinations of parameters these motions show, and which none ever shows.
     """
 
     prior_sd: np.ndarray
@@ -46,6 +49,7 @@ class Posterior:
     calibration: Mapping[str, Mapping[str, float | str]]
     marker_noise: tuple[MarkerNoise, ...]
     iterations: int
+    base: BaseParameters
 
     @property
     def information(self) -> np.ndarray:
@@ -92,49 +96,43 @@ def fit_simultaneous(
     prior = literature_prior(literature)
     seen = [observe(used, k, literature.total_mass_kg, cutoff) for k in trials]
     centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
-    calibration = CalibrationPrior(
-        dict.fromkeys(centres, JOINT_CENTRE_SD_M), np.full(len(used.markers), MARKER_SD_M), PLATE_SD_M, CLOCK_SD_S
-    )
+    places = np.full(len(used.markers), MARKER_SD_M)
+    calibration = CalibrationPrior(dict.fromkeys(centres, JOINT_CENTRE_SD_M), places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
-    loads = tuple(
-        _corrected(o.plates, k.time, result.plate_offsets_m[i][0], result.clock_s[i][0])
-        for i, (k, (o, _)) in enumerate(zip(trials, seen, strict=True))
-    )
+    loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
     posterior = Posterior(
         prior.sd,
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         result.bsp_covariance,
-        _calibration(used, result, [k.trial.name for k in trials]),
+        _calibration(used, result),
         tuple(noise for _, noise in seen),
         result.iterations,
+        base_parameters(
+            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o, _ in seen]
+        ),
     )
     return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
 
 
-def _corrected(plates: SmoothedSpline, time: np.ndarray, offsets: np.ndarray, clock_s: float) -> np.ndarray:
-    """(w, p, 6) loads at the corrected place and time."""
-    loads = plates(time + clock_s).reshape(len(time), -1, 6)
-    shift = np.zeros((loads.shape[1], 3))
-    shift[:, [0, 2]] = offsets
-    loads[:, :, 3:] += np.cross(shift, loads[:, :, :3])
-    return loads
-
-
-def _calibration(
-    skeleton: Skeleton, result: SimultaneousResult, names: Sequence[str]
-) -> dict[str, dict[str, float | str]]:
+def _calibration(skeleton: Skeleton, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
         found[name] = {"value": change, "prior_sd": JOINT_CENTRE_SD_M, "sd": sd, "unit": "m"}
-    for trial, (offsets, sds), (clock, clock_sd) in zip(names, result.plate_offsets_m, result.clock_s, strict=True):
-        for foot, offset, sd in zip(("right", "left"), offsets, sds, strict=True):
-            for axis, value, deviation in zip("xz", offset, sd, strict=True):
-                key = f"{trial}: loads under the {foot} foot, {axis}"
-                found[key] = {"value": float(value), "prior_sd": PLATE_SD_M, "sd": float(deviation), "unit": "m"}
-        found[f"{trial}: forces late by"] = {"value": clock, "prior_sd": CLOCK_SD_S, "sd": clock_sd, "unit": "s"}
+    for plate, (values, sds) in result.plates.items():
+        name = f"plate {plate.removeprefix('plate ')}"
+        for axis, value, deviation in zip("xz", values, sds, strict=False):
+            told = {"value": float(value), "prior_sd": PLATE_SD_M, "sd": float(deviation)}
+            found[f"{name}: {axis}"] = {**told, "unit": "m"}
+        told = {"value": float(values[2]), "prior_sd": GAIN_SD, "sd": float(sds[2])}
+        found[f"{name}: gain"] = {**told, "unit": "1"}
+    clock, clock_sd = result.clock_s
+    found["clock: forces late by"] = {"value": clock, "prior_sd": CLOCK_SD_S, "sd": clock_sd, "unit": "s"}
     return found
+
+
+_SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
 
 
 def _warnings(
@@ -148,9 +146,9 @@ def _warnings(
     for name, told in posterior.calibration.items():
         value, sd = float(told["value"]), float(told["prior_sd"])
         if ":" in name and abs(value) > _NOTABLE * sd:
-            unit = "mm" if told["unit"] == "m" else "ms"
+            scale, unit = _SHOWN_UNIT[str(told["unit"])]
             found.append(
-                f"{name}: {value * 1e3:+.1f} {unit} (expected within {sd * 1e3:.0f} {unit}); check the instruments"
+                f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.0f} {unit}); check the instruments"
             )
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:

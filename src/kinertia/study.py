@@ -7,11 +7,9 @@ two-level estimator never sees the truth.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import get_context
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -22,6 +20,7 @@ from kinertia.dynamics import Motion
 from kinertia.ik import solve_ik
 from kinertia.inputs import read_inputs
 from kinertia.noise import study_noise
+from kinertia.parallel import in_parallel
 from kinertia.prepare import Progress, prepare
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
@@ -184,24 +183,8 @@ def run_table1(
         progress: called with the share that is done.
     """
     vector = ParameterVector(trial.bsp, symmetric=True)
-    workers = min(workers or os.cpu_count() or 1, repeats)
-    draws: list[Draw] = []
-    progress(0.0)
-    # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
-    try:
-        for done in as_completed([pool.submit(run_draw, trial, seed, number) for number in range(repeats)]):
-            draws.append(done.result())
-            progress(len(draws) / repeats)
-    finally:
-        pool.shutdown(cancel_futures=True)
-    draws.sort(key=lambda draw: draw.number)
+    draws = in_parallel(partial(run_draw, trial, seed), range(repeats), workers, progress)
     return Table1(vector.names, vector.values(trial.bsp), tuple(draws), seed, name)
-
-
-def _one_thread() -> None:
-    """Matrices here are small: threads of the linear algebra library would only get into each other's way."""
-    threadpool_limits(1)
 
 
 def run_draw(trial: SyntheticTrial, seed: int, number: int) -> Draw:

@@ -159,16 +159,28 @@ class FootLoads:
         time: (k,) s, on the same clock as the markers.
         force: (k, 2, 3) N on the person in ground axes; index 0 right foot, 1 left foot.
         moment: (k, 2, 3) N m about the ground origin, in ground axes.
+        plates: names of the plates.
+        on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
+            where each foot has a plate of its own.
     """
 
     time: FloatArray
     force: FloatArray
     moment: FloatArray
+    plates: tuple[str, ...] = ("right foot", "left foot")
+    on_plate: npt.NDArray[np.int_] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), 2, 3)
         _expect_shape("force", self.force, shape)
         _expect_shape("moment", self.moment, shape)
+        if self.on_plate is not None:
+            _expect_shape("on_plate", self.on_plate, shape[:2])
+
+    @property
+    def carrier(self) -> npt.NDArray[np.int_]:
+        """(k, 2) index of the plate that each foot stands on."""
+        return np.tile([0, 1], (len(self.time), 1)) if self.on_plate is None else self.on_plate
 
     def rotated(self, rotation: FloatArray) -> FootLoads:
         """The same loads in axes turned by `rotation` (3, 3): new = rotation @ old."""
@@ -218,6 +230,12 @@ class Trial:
         if not (proper and np.allclose(rotation[1], [0, 1, 0], atol=1e-9)):
             raise ValueError(f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}")
         return replace(self, markers=self.markers.rotated(rotation), loads=self.loads.rotated(rotation))
+
+
+def nearest_samples(time: FloatArray, at: FloatArray) -> npt.NDArray[np.int_]:
+    """Indices into `time` (ascending) of the samples nearest to the times `at`."""
+    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+    return after - (at - time[after - 1] < time[after] - at)
 
 
 def runs(mask: BoolArray) -> list[tuple[int, int]]:

@@ -1,0 +1,200 @@
+"""Do the error bars hold? Many people drawn from the literature prior walk, are measured and estimated.
+
+`run_accuracy` draws persons and noise, estimates from what a laboratory would have (`disturbed.measured`), and compares
+errors with error bars: how often the truth lies within 95 % intervals (cover), RMS error over posterior deviation
+(ratio), and errors against those of the literature. A draw depends on seed, scenario and its number only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from kinertia.bsp_prior import literature_prior
+from kinertia.disturbed import Faults, measured
+from kinertia.map_terms import CalibrationPrior
+from kinertia.observation import CUTOFF_HZ, observe
+from kinertia.parallel import in_parallel
+from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
+from kinertia.simultaneous_fit import fit_simultaneous
+from kinertia.skeleton import Skeleton
+from kinertia.synthetic import walk, walking_subject
+
+DURATION_S = 2.5
+CLASSES = {
+    "mass": slice(0, 1),
+    "CoM": slice(1, 4),
+    "moments of inertia": slice(4, 7),
+    "products of inertia": slice(7, 10),
+}
+"""Columns of `BodySegmentParameters.table`."""
+WITHIN = 1.959964
+"""Half width of a 95 % interval in deviations."""
+_HELD_SD_M = 1e-4
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One kind of laboratory: its faults, and whether the estimator calibrates."""
+
+    title: str
+    faults: Faults
+    calibrated: bool = True
+
+
+PROOF = {
+    "study": Scenario("the study's noise", Faults("study")),
+    "artefact": Scenario("skin motion linear in joint angles", Faults("artefact")),
+    "study_calibration": Scenario("the study's noise, calibration errors", Faults("study", calibration=True)),
+    "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
+}
+"""What error bars are made for."""
+BREAKS = {
+    "axes": Scenario("axes of knees, ankles and elbows 5 degrees off", Faults("artefact", axes_rad=np.radians(5.0))),
+    "hips": Scenario(
+        "hip centres 15 mm off, calibration switched off", Faults("artefact", hips_m=0.015), calibrated=False
+    ),
+    "wobbling": Scenario("40 % of the thighs' mass wobbles", Faults("artefact", wobbling=0.4)),
+    "gain": Scenario("right plate's gain 2 % off", Faults("artefact", gain=0.02)),
+}
+"""What error bars are not made for: how far they fall."""
+SCENARIOS = PROOF | BREAKS
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """One person, measured once.
+
+    Attributes:
+        errors, literature_errors: (s, 10) estimate and literature minus truth, in the table's order and units.
+        sd: (s, 10) posterior deviations.
+        angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
+        angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
+        converged: of the estimate.
+    """
+
+    errors: np.ndarray
+    literature_errors: np.ndarray
+    sd: np.ndarray
+    angles_rad: tuple[float, float]
+    angle_changes_rad: tuple[float, float]
+    converged: bool
+
+
+@dataclass(frozen=True)
+class ClassAccuracy:
+    """One class of parameters over all draws of a scenario.
+
+    Attributes:
+        cover: share of parameters within their 95 % interval.
+        cover_sd: its standard error over draws.
+        ratio: RMS of error over posterior deviation.
+        rms, rms_literature: RMS errors of the estimate and the literature, SI.
+        better: share of draws in which the RMS error is below the literature's.
+    """
+
+    cover: float
+    cover_sd: float
+    ratio: float
+    rms: float
+    rms_literature: float
+    better: float
+
+
+@dataclass(frozen=True)
+class ScenarioAccuracy:
+    """All classes of one scenario, RMS errors of joint angles (rad) by inverse kinematics and by the estimate, with
+    and without each angle's mean error, and the share of draws that converged.
+    """
+
+    title: str
+    draws: int
+    classes: Mapping[str, ClassAccuracy]
+    angles_rad: tuple[float, float]
+    angle_changes_rad: tuple[float, float]
+    converged: float
+
+
+def run_accuracy(
+    scenarios: Sequence[str],
+    draws: int = 100,
+    seed: int = 1,
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> dict[str, ScenarioAccuracy]:
+    """Accuracy in these scenarios (keys of `SCENARIOS`), `draws` people each."""
+    cases = [(key, number) for key in scenarios for number in range(draws)]
+    found = in_parallel(partial(run_draw, seed), cases, workers, progress)
+    return {
+        key: summarised(SCENARIOS[key].title, found[i * draws : (i + 1) * draws]) for i, key in enumerate(scenarios)
+    }
+
+
+def run_draw(seed: int, case: tuple[str, int]) -> Draw:
+    """One draw; people of one number are the same in every scenario."""
+    key, number = case
+    scenario = SCENARIOS[key]
+    of_person, of_noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2))
+    subject = walking_subject()
+    prior = literature_prior(subject.literature)
+    trial = walk(replace(subject, bsp=prior.draw(of_person)), DURATION_S, trapezoid=False)
+    skeleton, kinematics = measured(trial, scenario.faults, of_noise)
+    if scenario.calibrated:
+        fitted = fit_simultaneous(skeleton, subject.literature, [kinematics], "gcv")
+        result, motion = fitted.result, fitted.motions[0]
+    else:
+        seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)
+        result = estimate_simultaneous(skeleton, prior, held(skeleton), [seen], 1.0 / (2.0 * CUTOFF_HZ))
+        motion = result.motions[0].cut(np.flatnonzero(seen.dynamic))
+    angles = np.flatnonzero(trial.skeleton.rotational)[3:]
+    inside = np.searchsorted(trial.time, kinematics.time - 1e-9)
+    off = [q[:, angles] - trial.motion.q[inside][:, angles] for q in (kinematics.ik.q[kinematics.frames], motion.q)]
+    return Draw(
+        result.bsp.table() - trial.bsp.table(),
+        prior.mean.table() - trial.bsp.table(),
+        _sd(result),
+        (_rms(off[0]), _rms(off[1])),
+        (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
+        result.converged,
+    )
+
+
+def held(skeleton: Skeleton) -> CalibrationPrior:
+    """Calibration switched off: skeleton and instruments count as exact."""
+    places = np.full(len(skeleton.markers), _HELD_SD_M)
+    return CalibrationPrior({}, places, _HELD_SD_M, _HELD_SD_M, _HELD_SD_M)
+
+
+def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
+    """Cover, ratio and errors by class."""
+    errors, before, sd = (np.array([getattr(d, name) for d in draws]) for name in ("errors", "literature_errors", "sd"))
+    classes = {}
+    for name, columns in CLASSES.items():
+        away = errors[..., columns] / sd[..., columns]
+        within = np.mean(np.abs(away) < WITHIN, axis=(1, 2))
+        each, each_before = (np.mean(np.square(e[..., columns]), axis=(1, 2)) for e in (errors, before))
+        classes[name] = ClassAccuracy(
+            float(within.mean()),
+            float(within.std() / np.sqrt(len(draws))),
+            _rms(away),
+            float(np.sqrt(each.mean())),
+            float(np.sqrt(each_before.mean())),
+            float(np.mean(each < each_before)),
+        )
+    angles = [_rms(np.array([getattr(d, kind)[i] for d in draws])) for kind in _ANGLES for i in range(2)]
+    converged = float(np.mean([d.converged for d in draws]))
+    return ScenarioAccuracy(title, len(draws), classes, (angles[0], angles[1]), (angles[2], angles[3]), converged)
+
+
+_ANGLES = ("angles_rad", "angle_changes_rad")
+
+
+def _sd(result: SimultaneousResult) -> np.ndarray:
+    return np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

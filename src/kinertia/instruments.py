@@ -1,0 +1,72 @@
+"""What force plates and clock may have wrong, and the ground reactions once that is put right.
+
+Each plate may stand off its recorded place in the floor's plane and have a wrong gain; forces may be recorded late. The
+plates are the laboratory's: their offsets are in its axes and are shared by all trials, as is the clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.splines import SmoothedSpline
+
+PLATE_UNKNOWNS = ("x", "z", "gain")
+"""Of each plate: offsets in the floor's plane (m), and relative error of the gain."""
+
+
+@dataclass(frozen=True)
+class FootPlates:
+    """Ground reactions of one trial over time, and which plate measured them.
+
+    Attributes:
+        loads: time -> (12) smoothed force and moment about the ground origin under the right foot, then the left.
+        plates: names.
+        carrier: (n, 2) index into `plates` of the plate that each foot stands on, at the frames of the trial.
+        turn: (3, 3) from the laboratory's axes to the trial's.
+    """
+
+    loads: SmoothedSpline
+    plates: tuple[str, ...]
+    carrier: np.ndarray
+    turn: np.ndarray
+
+    @classmethod
+    def one_per_foot(cls, loads: SmoothedSpline, n_frames: int) -> FootPlates:
+        """A plate of its own under each foot, recorded in the trial's axes."""
+        return cls(loads, ("right foot", "left foot"), np.tile([0, 1], (n_frames, 1)), np.eye(3))
+
+    def columns(self, plates: Sequence[str]) -> np.ndarray:
+        """(n, 2) index into these plates (a session's) of the plate that each foot stands on."""
+        return np.array([plates.index(name) for name in self.plates])[self.carrier]
+
+    def corrected(self, time: np.ndarray, carrier: np.ndarray, plates: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """(n, 2, 6) loads on the feet at these times, of plates put right, or their time derivatives.
+
+        Args:
+            time: (n,) by the plates' clock.
+            carrier: (n, 2) row of `plates` under each foot.
+            plates: (p, 3) offsets and gain error of the plates.
+        """
+        loads = self.loads(time, derivative).reshape(len(time), 2, 6)
+        here = plates[carrier]
+        loads[..., 3:] += np.cross(self._ground_offset(here), loads[..., :3])
+        return (1.0 + here[..., 2:]) * loads
+
+    def by_plate(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """(n, 6, 3 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 3)."""
+        result = np.zeros((len(loads), 6, len(plates), 3))
+        raw = loads / (1.0 + plates[carrier][..., 2:])
+        for foot in range(2):
+            under = carrier[:, foot, None] == np.arange(len(plates))
+            for j, axis in enumerate((0, 2)):
+                moment = np.cross(self.turn[:, axis], loads[:, foot, :3])
+                result[:, 3:, :, j] += moment[:, :, None] * under[:, None, :]
+            result[..., 2] += raw[:, foot, :, None] * under[:, None, :]
+        return result.reshape(len(loads), 6, 3 * len(plates))
+
+    def _ground_offset(self, plates: np.ndarray) -> np.ndarray:
+        """(..., 3) m: offsets of plates (..., 3) in the trial's axes."""
+        return plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]

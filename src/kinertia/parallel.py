@@ -1,0 +1,47 @@
+"""Independent pieces of work in parallel processes, with results that do not depend on how many there are."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+Case = TypeVar("Case")
+Result = TypeVar("Result")
+
+
+def in_parallel(
+    task: Callable[[Case], Result],
+    cases: Sequence[Case],
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> list[Result]:
+    """`task` of every case, in the order of the cases.
+
+    Args:
+        task: a function of a module, so that another process can import it.
+        cases: each with all that its result depends on, seeds included.
+        workers: processes; as many as there are cores if None.
+        progress: called with the share that is done.
+    """
+    workers = max(1, min(workers or os.cpu_count() or 1, len(cases)))
+    progress(0.0)
+    # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
+    try:
+        futures = [pool.submit(task, case) for case in cases]
+        for done, future in enumerate(as_completed(futures), start=1):
+            future.result()
+            progress(done / len(cases))
+        return [future.result() for future in futures]
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _one_thread() -> None:
+    """Matrices here are small: threads of the linear algebra library would only get into each other's way."""
+    threadpool_limits(1)
