@@ -19,12 +19,14 @@ from plotly.offline import get_plotlyjs
 from kinertia import __version__
 from kinertia.bsp import PARAMETERS
 from kinertia.fit import Fit, TrialFit
+from kinertia.identifiability import evidence
 from kinertia.provenance import Provenance, versions
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, read_in, segment_name
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
 from kinertia.report.time_figures import MOST_FRAMES, coordinate_figure, moment_figure, residual_figure, rms_length
 from kinertia.report.verdict import words
+from kinertia.simultaneous_fit import SHOWN_UNIT
 from kinertia.trial import runs
 
 MOST_TRIALS = 8
@@ -73,6 +75,7 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         subject=fit.subject.model_dump(),
         provenance=provenance,
         versions=versions(),
+        shown_unit=SHOWN_UNIT,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
 
@@ -138,7 +141,8 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
             row |= {"literature": before[i, k] * factor, "estimate": after[i, k] * factor}
             if posterior is not None and away is not None:
                 row |= {"prior_sd": posterior.prior_sd[i, k] * factor, "sd": posterior.sd[i, k] * factor}
-                row |= {"away": away[i, k], "information": max(100 * float(posterior.information[i, k]), 0.0)}
+                told = float(posterior.information[i, k])
+                row |= {"away": away[i, k], "information": max(100 * told, 0.0), "evidence": evidence(told)}
             rows.append(row)
     return rows
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.fit import Fit, TrialFit
+from kinertia.identifiability import INFORMED, MEASURED, evidence
 from kinertia.ik import rms
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, read_in, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
 from kinertia.verdict import Level, Verdict, verdicts
 
-INFORMED, MEASURED = 0.25, 0.75
-"""Information from which a parameter counts as informed by the data, and as measured."""
 _LISTED_FAR = 12
+_EVIDENCE = {"measured": "", "informed": " by the data", "assumed": ", not to be read as this person's"}
 
 
 @dataclass(frozen=True)
@@ -81,21 +81,21 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
             "the two-level method has no error bars: it cannot tell which parameters the data show and which they do "
             "not. Small residuals alone prove nothing about single parameters; the simultaneous method tells",
         )
-    told = fit.posterior.information
-    masses = told[:, 0]
-    measured, assumed = int((told > MEASURED).sum()), int((told < INFORMED).sum())
+    told = [[evidence(value) for value in row] for row in fit.posterior.information]
+    counts = {word: sum(row.count(word) for row in told) for word in _EVIDENCE}
     found = [
-        f"of {told.size} parameters the data measured {measured} (information above {100 * MEASURED:g} %) and informed "
-        f"{told.size - measured - assumed}; {assumed} are assumed from the literature (below {100 * INFORMED:g} %)"
+        f"of {sum(counts.values())} parameters the data measured {counts['measured']} (information above "
+        f"{100 * MEASURED:g} %) and informed {counts['informed']}; {counts['assumed']} are assumed from the literature "
+        f"(below {100 * INFORMED:g} %)"
     ]
-    for level, chosen in (
-        ("measured", masses > MEASURED),
-        ("informed by the data", (masses >= INFORMED) & (masses <= MEASURED)),
-        ("assumed, not to be read as this person's", masses < INFORMED),
-    ):
-        names = _segments([name for name, yes in zip(fit.estimate.segments, chosen, strict=True) if yes])
+    for word, meaning in _EVIDENCE.items():
+        names = [name for name, row in zip(fit.estimate.segments, told, strict=True) if row[0] == word]
         if names:
-            found.append(f"masses {level}: {names}")
+            found.append(f"masses {word}{meaning}: {_segments(names)}")
+    base = fit.posterior.base
+    found.append("what these motions show best are combinations: " + "; ".join(one.words for one in base.best))
+    if base.never:
+        found.append("what no motion of this model ever shows: " + "; ".join(base.never))
     return tuple(found)
 
 
