@@ -54,6 +54,8 @@ def words(fit: Fit) -> Words:
         "okay": "Usable with care: every check is passed, but not all of them well.",
         "against": f"Do not use these numbers as they are: {against} of {len(levels)} checks speak against them.",
     }[level]
+    if fit.warnings:
+        headline += f" Read the warning{'s' if len(fit.warnings) > 1 else ''}."
     motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
     return Words(level, headline, judgements, motion, _knowledge(fit), _departures(fit))
 
@@ -92,10 +94,8 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
         names = [name for name, row in zip(fit.estimate.segments, told, strict=True) if row[0] == word]
         if names:
             found.append(f"masses {word}{meaning}: {_segments(names)}")
-    base = fit.posterior.base
-    found.append("what these motions show best are combinations: " + "; ".join(one.words for one in base.best))
-    if base.never:
-        found.append("what no motion of this model ever shows: " + "; ".join(base.never))
+    if never := fit.posterior.base.never:
+        found.append(f"{len(never)} combinations no motion ever shows, such as {never[0]}: they stand with the table")
     return tuple(found)
 
 
