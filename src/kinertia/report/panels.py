@@ -1,7 +1,7 @@
 """Small multiples: many panels in one plotly figure, in as many columns as there is room for.
 
-The page lays the panels out anew for its width: `layout.meta.arrangements` holds, per number of columns, what plotly's
-`relayout` needs for it.
+The page lays the panels out anew for its width: `layout.meta.arrangements` holds, per number of columns and for
+"print", what plotly's `relayout` needs for it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ _BOTTOM_PX, _RIGHT_PX = 44, 14
 _LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
 _TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
 MOST_COLUMNS = 3
+_PAPER_PX = 1250
+"""Rows of panels on a sheet of paper, beside headings, at the scale of the page's print style."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,12 @@ def small_multiples(
         place = {"xref": f"x{suffix} domain", "yref": f"y{suffix} domain", "x": 0, "y": 1}
         anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 13}}
         titles.append({"text": f"<b>{plain(panel.title)}</b>", **place, **anchors})
-    ways = {str(c): _arrangement(len(panels), c, row_px, left_px, len(shown)) for c in range(1, MOST_COLUMNS + 1)}
+    ways: dict[str, Any] = {
+        str(c): _arrangement(len(panels), c, row_px, left_px, len(shown)) for c in range(1, MOST_COLUMNS + 1)
+    }
+    rows = math.ceil(len(panels) / MOST_COLUMNS)
+    on_paper_px = min(row_px, _PAPER_PX // rows - _TITLE_PX - _TICKS_PX)
+    ways["print"] = _arrangement(len(panels), MOST_COLUMNS, max(on_paper_px, 80), left_px, len(shown))
     layout = {**base_layout(alt), **axes, "shapes": shapes, "annotations": titles}
     layout["meta"] = {**layout["meta"], "arrangements": ways}
     figure = go.Figure(data, layout)

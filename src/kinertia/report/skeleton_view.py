@@ -161,12 +161,12 @@ def skeleton_figure(fit: Fit, trial: TrialFit) -> go.Figure:
         name: {"range": [float(low[k]) - 0.1, float(high[k]) + 0.1], "title": {"text": title}}
         for name, k, title in (("xaxis", 0, "forward (m)"), ("yaxis", 2, "right (m)"), ("zaxis", 1, "up (m)"))
     }
-    axes["yaxis"]["autorange"] = "reversed"
+    axes["yaxis"]["range"] = axes["yaxis"]["range"][::-1]
     layout |= {
         "height": 560,
-        "margin": {"t": 30, "b": 10, "l": 0, "r": 0},
-        "scene": {**axes, "aspectmode": "data", "camera": {"eye": {"x": 0.6, "y": -1.9, "z": 0.3}}},
-        "sliders": [{"steps": steps, "currentvalue": {"prefix": "time (s): "}}],
+        "margin": {"t": 30, "b": 60, "l": 0, "r": 0},
+        "scene": {**axes, "aspectmode": "data", "camera": {"eye": {"x": 0.5, "y": -2.7, "z": 0.3}}},
+        "sliders": [{"steps": steps, "currentvalue": {"prefix": "time (s): "}, "pad": {"b": 40}}],
         "updatemenus": [{"type": "buttons", "buttons": [play, pause], "direction": "left", "y": 0, "yanchor": "top"}],
     }
     frames = [go.Frame(name=str(k), data=_traces(shown, k)) for k in range(len(shown.time))]
@@ -181,14 +181,18 @@ def _traces(shown: Scene, k: int) -> list[dict[str, Any]]:
     """Plotly's z is our up, its y our right."""
     lines = np.full((len(shown.bones), 3, 3), np.nan)
     lines[:, :2] = shown.points[k][shown.bones]
+    sides = np.array(shown.sides)
     arrows = np.full((shown.arrows.shape[1], 3, 3), np.nan)
     arrows[:, :2] = shown.arrows[k]
     balls = {"size": (300 * shown.com_radius_m).tolist(), "color": style.ORANGE, "opacity": 0.75, "line": {"width": 0}}
     return [
-        _trace(lines, "skeleton", mode="lines", line={"color": style.BLACK, "width": 5}),
+        *(
+            _trace(lines[sides == side], word or "trunk", mode="lines", line={"color": colour, "width": 5})
+            for side, (word, colour) in style.SIDES.items()
+        ),
         _trace(arrows, "ground reaction", mode="lines", line={"color": style.GREEN, "width": 6}),
-        _trace(shown.modelled[k], "markers, model", mode="markers", marker={"size": 3, "color": style.BLUE}),
-        _trace(shown.measured[k], "markers, measured", mode="markers", marker={"size": 3, "color": style.VERMILION}),
+        _trace(shown.modelled[k], "markers, model", mode="markers", marker={"size": 3, "color": style.SKY}),
+        _trace(shown.measured[k], "markers, measured", mode="markers", marker={"size": 3, "color": style.BLACK}),
         _trace(shown.com[k], "centres of mass", mode="markers", marker=balls, text=list(shown.com_names)),
     ]
 

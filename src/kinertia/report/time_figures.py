@@ -53,7 +53,7 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES) -> go.Figur
     return small_multiples(panels, alt, axis)
 
 
-_MOMENT_AXES = ("the forward axis", "the vertical", "the axis to the right")
+_MOMENT_AXES = ("forward axis", "vertical", "right axis")
 _STAGE_NAMES = {
     "literature": "literature values",
     "corrected": "literature values, pelvis corrected",

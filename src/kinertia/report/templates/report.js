@@ -1,14 +1,15 @@
 "use strict";
 // Draws every figure of the page, one after the other so that reading is not held up, and again for another width.
 (() => {
-  const PRINT_PX = 680;
+  const PRINT_PX = 960; // report.css scales it to the paper
   const config = { displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  let printing = false;
   const columns = (px) => (px < 560 ? 1 : px < 860 ? 2 : 3);
 
   // relayout's flat form: {"xaxis2.domain": [0, 1], height: 300, ...}
   function arrangement(layout, width) {
     const ways = layout.meta && layout.meta.arrangements;
-    return { width, ...(ways ? ways[columns(width)] : {}) };
+    return { width, ...(ways ? ways[printing ? "print" : columns(width)] : {}) };
   }
 
   function applied(layout, flat) {
@@ -51,7 +52,6 @@
   drawNext();
 
   let waiting = 0;
-  let printing = false;
   window.addEventListener("resize", () => {
     clearTimeout(waiting);
     waiting = setTimeout(() => printing || plots.filter((plot) => plot.spec).forEach((plot) => draw(plot, room(plot))), 150);
