@@ -7,7 +7,7 @@ from unittest import mock
 import pytest
 
 from command_line import fitted
-from kinertia.config import Subject
+from kinertia.config import Settings, Subject
 from kinertia.demo import Demo, run_demo
 from kinertia.fit import estimate_bsp
 from kinertia.io.recording import read_recording
@@ -71,11 +71,11 @@ def few_evaluations(monkeypatch):
 
 @pytest.fixture(scope="session")
 def short_fit(shared_data):
-    """A `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
+    """A two-level `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
     walk, static = (read_recording(shared_data / "pig_c3d" / f"subject_a_{kind}.c3d") for kind in ("walk", "static"))
     inputs = [
         TrialInput(replace(walk, name=name), window, 0.25)
         for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
     ]
     with mock.patch("kinertia.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
-        return estimate_bsp(Subject(name="A", sex="male"), static, inputs)
+        return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))

@@ -79,7 +79,7 @@ def test_reads_everything(folder):
     assert first.window_s == (0.4, 2.0)
     assert (second.name, second.forces, second.loads, second.window_s) == ("second", None, None, None)
     assert result.settings.model_dump() == {
-        "method": "two-level",
+        "method": "simultaneous",
         "bsp": "deleva",
         "symmetry": False,
         "cutoff_hz": 6.0,
@@ -95,7 +95,7 @@ def test_least_file_gets_defaults(folder):
     assert (result.subject.mass_kg, result.subject.height_m, result.model.markers) == (None, None, None)
     assert result.settings == Settings()
     assert Settings().model_dump() == {
-        "method": "two-level",
+        "method": "simultaneous",
         "bsp": "dumas",
         "symmetry": True,
         "cutoff_hz": "gcv",

@@ -125,7 +125,7 @@ def test_settings_and_subject_reach_the_result(shared_data, short_fit):
         Subject(name="A", sex="male", mass_kg=44.0),
         static,
         [TrialInput(walk, (2.8, 3.05))],
-        Settings(bsp="deleva", symmetry=False, cutoff_hz=6.0, hip_centre="harrington"),
+        Settings(method="two-level", bsp="deleva", symmetry=False, cutoff_hz=6.0, hip_centre="harrington"),
         progress=lambda stage, share: shares.append((stage, share)),
     )
     assert fit.literature.total_mass_kg == pytest.approx(44.0)

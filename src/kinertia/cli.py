@@ -88,7 +88,7 @@ def fit(
         str | None,
         typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
     ] = None,
-    method: Annotated[str | None, typer.Option(help="Estimator: two-level.")] = None,
+    method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
 ) -> None:
     """Estimate body segment parameters from gait.
 
@@ -218,7 +218,7 @@ def _bsp_table(fit: Fit) -> Table:
     """Two rows per segment, three with error bars; where left mirrors right, the right side stands for both."""
     table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
     for i, segment in enumerate(fit.literature.segments):
-        if fit.settings.symmetry and segment.endswith("_l"):
+        if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
             continue
         for source, bsp in (("literature", fit.literature), ("estimate", fit.estimate)):
             com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])

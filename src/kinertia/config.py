@@ -151,11 +151,13 @@ class TrialFiles(Table):
 class Settings(Table):
     """How to estimate."""
 
-    method: Literal["two-level", "simultaneous"] = Field(
-        default="two-level", description='estimator: "two-level" (the study\'s) or "simultaneous"'
+    method: Literal["simultaneous", "two-level"] = Field(
+        default="simultaneous", description='estimator: "simultaneous" or "two-level" (the study\'s)'
     )
     bsp: Literal["dumas", "deleva"] = Field(default="dumas", description='first guess: "dumas" or "deleva"')
-    symmetry: bool = Field(default=True, description="true: left mirrors right, 49 parameters; false: 84")
+    symmetry: bool = Field(
+        default=True, description="two-level only; true: left mirrors right, 49 parameters; false: 84"
+    )
     cutoff_hz: Cutoff = Field(default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz')
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
