@@ -50,7 +50,12 @@ def departures(fit: Fit) -> np.ndarray | None:
     """(s, 10) estimate minus literature in the literature's deviations; None after two-level, which has none."""
     if fit.posterior is None:
         return None
-    return (fit.estimate.table() - fit.literature.table()) / fit.posterior.prior_sd
+    return (fit.estimate.table() - fit.literature.table()) / _scale(fit.posterior)
+
+
+def _scale(posterior: Posterior) -> np.ndarray:
+    """(s, 10) the literature's deviations; infinite where a parameter is fixed."""
+    return np.where(posterior.prior_sd > 0, posterior.prior_sd, np.inf)
 
 
 def bsp_figure(fit: Fit) -> go.Figure:
@@ -69,7 +74,7 @@ def bsp_figure(fit: Fit) -> go.Figure:
         alt = "Differences between estimate and literature for every body segment parameter, without error bars."
     else:
         panels = [_panel(fit, posterior, away, k, rows) for k in range(len(PARAMETERS))]
-        half = _INTERVAL_SD * posterior.sd / posterior.prior_sd
+        half = _INTERVAL_SD * posterior.sd / _scale(posterior)
         reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
         title = {"text": "deviations of the literature", "font": {"size": 11}, "standoff": 2}
         axis = {"range": [-reach, reach], "title": title, "nticks": 7}
@@ -82,7 +87,7 @@ def bsp_figure(fit: Fit) -> go.Figure:
 
 
 def _panel(fit: Fit, posterior: Posterior, away: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
-    half = _INTERVAL_SD * posterior.sd[:, k] / posterior.prior_sd[:, k]
+    half = _INTERVAL_SD * (posterior.sd / _scale(posterior))[:, k]
     place = np.arange(len(away))
     before, after = fit.literature.table()[:, k], fit.estimate.table()[:, k]
     unit, factor = read_in(k)
