@@ -11,9 +11,11 @@ import pytest
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject
+from kinertia.dynamics import Motion
 from kinertia.provenance import provenance_of
 from kinertia.report.page import MOST_TRIALS, render
 from kinertia.report.verdict import words
+from kinertia.trial import FootLoads
 from kinertia.verdict import verdicts
 from report_page import Elements, figures_of
 
@@ -185,13 +187,48 @@ def test_two_level_report_says_that_it_has_no_error_bars(two_level):
     assert {attrs["id"] for attrs in told.named("section")} == set(PARTS)
 
 
-def test_many_trials_stay_below_the_limit(fit):
+def prolonged(trial, times):
+    """The same trial many times over, with every frame in the window."""
+    kinematics = trial.kinematics
+    shown = kinematics.frames
+
+    def again(array, frames=slice(None)):
+        return np.concatenate([array[frames]] * times)
+
+    markers, loads, ik = kinematics.trial.markers, kinematics.trial.loads, kinematics.ik
+    time = np.arange(times * len(shown)) / markers.rate_hz
+    inside = (loads.time >= kinematics.window_s[0]) & (loads.time < kinematics.window_s[1] + 1 / markers.rate_hz)
+    walked = replace(
+        kinematics.trial,
+        markers=replace(markers, time=time, positions=again(markers.positions, shown)),
+        loads=FootLoads(
+            np.arange(times * inside.sum()) * len(time) / markers.rate_hz / (times * inside.sum()),
+            again(loads.force, inside),
+            again(loads.moment, inside),
+        ),
+        measured=np.ones(len(time), dtype=bool),
+    )
+    solved = replace(ik, time=time, q=again(ik.q, shown), errors_m=again(ik.errors_m, shown))
+    return replace(
+        trial,
+        kinematics=replace(kinematics, trial=walked, ik=solved, window_s=(0.0, float(time[-1]))),
+        motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
+        residuals={stage: again(values) for stage, values in trial.residuals.items()},
+        moments={stage: again(values) for stage, values in trial.moments.items()},
+        marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
+    )
+
+
+def test_many_long_trials_stay_below_the_limit(fit):
+    long = prolonged(fit.trials[0], 20)
+    assert len(long.time) > 1500
     posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 30)
-    made = render(replace(fit, trials=fit.trials * 30, posterior=posterior))
+    made = render(replace(fit, trials=(long,) * 30, posterior=posterior))
     assert len(made.encode()) <= MOST_BYTES
     told = Elements(made)
     assert len(told.named("canvas")) == MOST_TRIALS
     assert f"first {MOST_TRIALS} of 30 trials" in told.text
+    assert len(render(replace(fit, trials=(long,))).encode()) <= MOST_BYTES
 
 
 def test_command_and_hashes_are_in_the_report(demo_run):

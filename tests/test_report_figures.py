@@ -68,8 +68,9 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
     assert not any("band" in (t.name or "") for t in plain.data)
     object.__setattr__(trial, "moment_sd", np.full_like(trial.moments["estimate"], 2.0))
     banded = moment_figure(trial, fit.skeleton, mass)
-    band = next(t for t in banded.data if t.name == "right 95 % band")
-    width = band.y[: len(trial.time)] - band.y[len(trial.time) :][::-1]
+    upper = next(k for k, t in enumerate(banded.data) if t.name == "right 95 % band")
+    width = banded.data[upper].y - banded.data[upper - 1].y
+    assert banded.data[upper].xaxis == banded.data[upper - 1].xaxis
     np.testing.assert_allclose(width, 2 * 1.96 * 2.0 / mass, rtol=1e-4)
 
 

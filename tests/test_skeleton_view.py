@@ -15,7 +15,7 @@ def fit(demo_run):
 
 def test_scene_has_everything_where_it_is(fit):
     trial = fit.trials[0]
-    shown = scene(fit, trial)
+    shown = scene(fit, trial, 1000)
     pose = fit.skeleton.pose(trial.motion.q)
     torso = fit.skeleton.segments.index("torso")
     com = fit.estimate.com_m[fit.estimate.segments.index("torso")]
@@ -38,7 +38,7 @@ def test_scene_has_everything_where_it_is(fit):
 
 def test_arrows_stand_in_the_centre_of_pressure_and_show_the_force(fit):
     trial = fit.trials[0]
-    arrows, loads = scene(fit, trial).arrows, trial.kinematics.foot_loads
+    arrows, loads = scene(fit, trial, 1000).arrows, trial.kinematics.foot_loads
     loaded = loads[:, :, 1] > 20
     assert (np.isfinite(arrows).all(axis=(2, 3)) == loaded).all()
     at, force = arrows[:, :, 0][loaded], loads[..., :3][loaded]
@@ -47,7 +47,7 @@ def test_arrows_stand_in_the_centre_of_pressure_and_show_the_force(fit):
 
 
 def test_the_page_carries_the_scene_to_half_a_millimetre(fit):
-    shown = scene(fit, fit.trials[0])
+    shown = scene(fit, fit.trials[0], 1000)
     hidden = shown.measured.copy()
     hidden[3, 1] = np.nan
     told = packed(replace(shown, measured=hidden))

@@ -24,15 +24,22 @@ from kinertia.provenance import Provenance, versions
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, read_in, segment_name
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
-from kinertia.report.time_figures import MOST_FRAMES, coordinate_figure, moment_figure, residual_figure, rms_length
+from kinertia.report.time_figures import (
+    MOST_EVENTS,
+    MOST_FRAMES,
+    coordinate_figure,
+    moment_figure,
+    residual_figure,
+    rms_length,
+)
 from kinertia.report.verdict import words
 from kinertia.simultaneous_fit import SHOWN_UNIT
 from kinertia.trial import runs
 
-MOST_TRIALS = 8
+MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
-_CURVE_FRAMES, _VIEW_FRAMES = 1600, 800
-"""Frames drawn per figure and in the 3-D view, shared by the trials, so that the page stays below 8 MB."""
+_VIEW_FRAMES = 800
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 8 MB."""
 
 
 @cache
@@ -76,6 +83,7 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         provenance=provenance,
         versions=versions(),
         shown_unit=SHOWN_UNIT,
+        most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
 
@@ -93,7 +101,7 @@ def written(figure: go.Figure) -> dict[str, Any]:
 
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
     """Everything that the templates show of one trial."""
-    frames = min(MOST_FRAMES, _CURVE_FRAMES // count)
+    frames = MOST_FRAMES // count
     mass_kg = fit.literature.total_mass_kg
     noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
     gaps = gap_figure(trial)
@@ -102,6 +110,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "name": trial.name,
         "window_s": trial.kinematics.window_s,
         "frames": len(trial.time),
+        "every": -(-len(trial.time) // frames),
         "all_frames": len(trial.kinematics.trial.markers.time),
         "residuals": written(residual_figure(trial, frames)),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
@@ -113,7 +122,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         ),
         "noise": noise,
         "gaps": None if gaps is None else written(gaps),
-        "scene": Markup(json.dumps(packed(scene(fit, trial, min(600, _VIEW_FRAMES // count))))),
+        "scene": Markup(json.dumps(packed(scene(fit, trial, _VIEW_FRAMES // count)))),
     }
 
 

@@ -21,7 +21,6 @@ from kinertia.report.panels import base_layout
 from kinertia.skeleton import Skeleton
 from kinertia.trial import LOAD_THRESHOLD_N
 
-MOST_FRAMES = 600
 _PLOTLY_FRAMES = 60
 """Plotly redraws the whole scene for every frame."""
 _ARROW_M_PER_N = 0.001
@@ -58,7 +57,7 @@ class Scene:
     arrows: np.ndarray
 
 
-def scene(fit: Fit, trial: TrialFit, most_frames: int = MOST_FRAMES) -> Scene:
+def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
     """What the view of a trial shows: the window, at most `most_frames` frames of it."""
     chosen = slice(None, None, -(-len(trial.time) // most_frames))
     labels = trial.kinematics.ik.labels

@@ -20,8 +20,10 @@ from kinertia.report.gait_events import GaitEvent, gait_events
 from kinertia.report.panels import Panel, compact, small_multiples
 from kinertia.skeleton import Skeleton
 
-MOST_FRAMES = 400
-"""Drawn per curve; more would not be seen."""
+MOST_FRAMES = 1600
+"""Drawn per curve."""
+MOST_EVENTS = 40
+"""Gait events in the frames shown up to which they are drawn; more would hide the curves."""
 _AROUND = 0.2
 """Share of the window that is shown before and after it."""
 _AXES = ("forward", "upward", "to the right")
@@ -116,26 +118,15 @@ def moment_figure(trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_fram
 
 
 def _bands(one: Coordinate, trial: TrialFit, sd: np.ndarray, mass_kg: float, thin: slice) -> list[dict[str, Any]]:
-    """A 95 % band around the estimate for each side: down along the lower edge of a closed outline."""
+    """A 95 % band around the estimate for each side: an unseen lower edge, and an upper one filled down to it."""
     traces = []
     for side, column in one.columns.items():
-        middle = trial.moments["estimate"][thin, column] / mass_kg
-        half = _BAND_SD * sd[thin, column]
-        time = trial.time[thin]
         word, colour = style.SIDES[side]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": compact(np.concatenate([time, time[::-1]])),
-                "y": compact(np.concatenate([middle + half, (middle - half)[::-1]])),
-                "fill": "toself",
-                "fillcolor": style.faded(colour, 0.18),
-                "line": {"width": 0},
-                "hoverinfo": "skip",
-                "name": f"{word} 95 % band".strip(),
-            }
-        )
+        middle, half = trial.moments["estimate"][:, column] / mass_kg, _BAND_SD * sd[:, column]
+        edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
+        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
+        traces.append({**_curve(trial.time, middle - half, thin), **edge, "showlegend": False})
+        traces.append({**_curve(trial.time, middle + half, thin), **edge, **fill})
     return traces
 
 
@@ -206,7 +197,11 @@ def _background(kinematics: Kinematics, axis: dict[str, Any], one: Coordinate) -
 
 def _events(kinematics: Kinematics, sides: Sequence[str] = ()) -> list[dict[str, Any]]:
     """Lines at the gait events of these sides; of both where there is none."""
-    return [_upright(event) for event in gait_events(kinematics.trial) if not sides or event.side in sides]
+    first, last = _time_axis(kinematics)["range"]
+    shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
+    if len(shown) > MOST_EVENTS:
+        return []
+    return [_upright(event) for event in shown if not sides or event.side in sides]
 
 
 def _upright(event: GaitEvent) -> dict[str, Any]:
