@@ -287,6 +287,6 @@ def _bsp_table(fit: Fit) -> Table:
     return table
 
 
-for _command in (demo, init, check, fit):
-    app.command()(_command)
+for _entry in (demo, init, check, fit):
+    app.command()(_entry)
 app.add_typer(study, name="study")
