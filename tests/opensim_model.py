@@ -1,88 +1,27 @@
-"""The same skeleton as an OpenSim model: an oracle for kinematics and dynamics."""
+"""The 27-DOF skeleton as an OpenSim model, by way of the file we write: an oracle for kinematics and dynamics."""
 
 from __future__ import annotations
 
-import warnings
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import opensim as osim
-from scipy.spatial.transform import Rotation
 
 from kinertia.bsp import BodySegmentParameters
-from kinertia.skeleton import GRAVITY_M_S2, Axis, Joint, Skeleton
+from kinertia.io.osim_export import export_osim
+from kinertia.skeleton import Skeleton
 
 osim.Logger.removeFileSink()
 osim.Logger.setLevelString("Off")
 
 
 def build_opensim(skeleton: Skeleton, bsp: BodySegmentParameters) -> osim.Model:
-    """An OpenSim model with one pin or slider per axis; massless bodies between them where a joint has several."""
-    model = osim.Model()
-    model.setName(skeleton.name)
-    model.setGravity(osim.Vec3(0, -GRAVITY_M_S2, 0))
-    rows = dict(zip(bsp.segments, range(len(bsp.segments)), strict=True))
-    for joint in skeleton.joints:
-        mass, com, tensor = 1e-12, np.zeros(3), np.eye(3) * 1e-12
-        if joint.child in rows:
-            k = rows[joint.child]
-            mass, com, tensor = bsp.mass_kg[k], bsp.com_m[k], bsp.inertia_kgm2[k]
-        moments = [tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-        body = osim.Body(joint.child, float(mass), osim.Vec3(*com), osim.Inertia(*map(float, moments)))
-        model.addBody(body)
-        _add_joint(model, joint, body, skeleton)
-    for marker in skeleton.markers:
-        body = model.getBodySet().get(marker.segment)
-        model.addMarker(osim.Marker(marker.label, body, osim.Vec3(*map(float, marker.position))))
-    model.finalizeConnections()
-    return model
-
-
-def _add_joint(model: osim.Model, joint: Joint, body: osim.Body, skeleton: Skeleton) -> None:
-    parent = model.getGround() if joint.parent == "ground" else model.getBodySet().get(joint.parent)
-    place = (np.asarray(joint.rotation), np.asarray(joint.translation))
-    if not joint.axes:
-        unmoved = _vectors((np.eye(3), np.zeros(3)))
-        model.addJoint(osim.WeldJoint(f"to_{joint.child}", parent, *_vectors(place), body, *unmoved))
-    for i, axis in enumerate(joint.axes):
-        last = i == len(joint.axes) - 1
-        child = body
-        if not last:
-            child = osim.Body(f"{joint.child}_{i}", 1e-12, osim.Vec3(0), osim.Inertia(1e-12))
-            model.addBody(child)
-        model.addJoint(_one_axis(axis, parent, place, child, skeleton))
-        parent, place = child, None
-
-
-def _one_axis(axis: Axis, parent, place, child, skeleton: Skeleton) -> osim.Joint:
-    """A pin (about z) or slider (along x) whose frames are turned so that it moves as the axis says."""
-    rotation, translation = (np.eye(3), np.zeros(3)) if place is None else place
-    turned = _aligned(np.array(axis.direction), 2 if axis.kind == "rotation" else 0)
-    kind = osim.PinJoint if axis.kind == "rotation" else osim.SliderJoint
-    frames = (*_vectors((rotation @ turned, translation)), child, *_vectors((turned, np.zeros(3))))
-    joint = kind(f"joint_{axis.coordinate}", parent, *frames)
-    coordinate = joint.upd_coordinates(0)
-    coordinate.setName(axis.coordinate)
-    coordinate.setRangeMin(-10.0)
-    coordinate.setRangeMax(10.0)
-    if axis.coordinate in skeleton.locked:
-        coordinate.setDefaultValue(skeleton.locked[axis.coordinate])
-        coordinate.setDefaultLocked(True)
-    return joint
-
-
-def _aligned(direction: np.ndarray, column: int) -> np.ndarray:
-    """A rotation (3, 3) with this direction as the given column."""
-    other = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    other /= np.linalg.norm(other)
-    return np.roll(np.column_stack([direction, other, np.cross(direction, other)]), column, axis=1)
-
-
-def _vectors(place) -> tuple[osim.Vec3, osim.Vec3]:
-    """Translation and body-fixed X-Y-Z angles, as OpenSim's joints take them."""
-    rotation, translation = place
-    with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
-        angles = Rotation.from_matrix(rotation).as_euler("XYZ")
-    return osim.Vec3(*map(float, translation)), osim.Vec3(*map(float, angles))
+    """The model that OpenSim reads from our file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.osim"
+        export_osim(path, skeleton, bsp)
+        return osim.Model(str(path))
 
 
 class Oracle:

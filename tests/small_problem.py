@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from kinertia.bsp_prior import literature_prior
+from generic_static import smooth_motion
+from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.gait27 import HIP_OFFSETS
 from kinertia.instruments import FootPlates
+from kinertia.io.osim import read_osim
 from kinertia.map_terms import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
@@ -56,6 +60,36 @@ def small_problem(n_trials: int = 1) -> MapProblem:
     return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations, 0.1)
 
 
+def curved_problem(path: Path) -> MapProblem:
+    """Two segments from an OpenSim file: a knee that bends, turns and slides by one coordinate, and a turned root."""
+    curve = '<SimmSpline name="function"><x>-2 -1 0 0.7 1.6 3</x><y>0.1 -0.3 0.05 0.2 0.6 0.4</y></SimmSpline>'
+    fixed = '<Constant name="function"><value>0.02</value></Constant>'
+    functions = [LINEAR, curve, LINEAR, curve, fixed, ZERO]
+    axes = zip(("a", "a", "b", "a", "", ""), ("0 0 1", "1 0 0", "0 1 0") * 2, functions, strict=True)
+    places = (("0.1 -0.05 0.02", "0.3 -0.4 0.2"), ("0.01 0.02 0.03", "0.1 0.2 -0.3"))
+    root = joint("CustomJoint", "root", "/ground", "pelvis", FREE[1], CUSTOM_ROOT, places=places)
+    knee = joint("CustomJoint", "knee", "/bodyset/pelvis", "leg", "ab", transform(list(axes)))
+    path.write_text(model(root + knee))
+    ours = read_osim(path)
+    skeleton = ours.skeleton
+    time, motion = smooth_motion(skeleton, 13, 50.0)
+    rng = np.random.default_rng(0)
+    markers = skeleton.marker_positions(skeleton.pose(motion.q))
+    observation = Observation(
+        time=time,
+        markers=markers + rng.normal(0.0, 0.01, markers.shape),
+        marker_sd=np.linspace(0.01, 0.03, 5),
+        q=motion.q,
+        dynamic=np.arange(13) > 1,
+        ground=FootPlates.one_per_foot(smooth(time, rng.normal(0.0, 50.0, (13, 12)), 15.0), 13),
+        force_sd=6.0,
+        moment_sd=2.0,
+    )
+    prior = BspPrior(ours.bsp, np.diag(np.square(np.full(20, 0.01))), 13.0, 0.1)
+    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), 0.02, 0.02, 0.01)
+    return MapProblem(skeleton, prior, calibration, [observation], 0.1)
+
+
 def point(problem: MapProblem, seed: int = 1) -> tuple[list[np.ndarray], np.ndarray]:
     """Coefficients and static unknowns away from the start, so that nothing vanishes."""
     rng = np.random.default_rng(seed)
@@ -81,9 +115,10 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
         loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])
         loads[i, foot] *= 1.0 + gain
     reaction = np.einsum("nij,ni->nj", pose.jacobian[:, :, :6], loads.sum(axis=1))
-    model = skeleton.model_with(problem.bsp(static))
-    data = model.createData()
-    left = np.array([pin.rnea(model, data, *rows)[:6] for rows in zip(q, qd, qdd, strict=True)]) - reaction
+    loaded = skeleton.model_with(problem.bsp(static))
+    data = loaded.createData()
+    axes = zip(*skeleton.map.motion(q, qd, qdd), strict=True)
+    left = np.array([pin.rnea(loaded, data, *rows)[:6] for rows in axes]) - reaction
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
     moved = (coefficients - problem.bases[k].fit(trial.q)) / COEFFICIENT_SD
     return np.concatenate([errors[np.isfinite(errors)], left[trial.dynamic].ravel(), moved.ravel()])

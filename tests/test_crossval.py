@@ -68,5 +68,5 @@ def test_command(person, tmp_path):
     outcome = run("crossval", subject, "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     told = json.loads((tmp_path / "out" / "crossval.json").read_text())
-    assert {held["trial"] for held in told} == {"walk", "again"}
+    assert {held["trial"] for held in told["held_out"]} == {"walk", "again"}
     assert "2 of 2" in outcome.out

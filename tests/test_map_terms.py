@@ -5,12 +5,20 @@ import pytest
 
 from kinertia.log_cholesky import nearest_consistent
 from kinertia.map_terms import MapProblem
-from small_problem import point, residuals, small_problem
+from small_problem import curved_problem, point, residuals, small_problem
 
 
 @pytest.fixture(scope="module")
 def problem():
     return small_problem()
+
+
+@pytest.fixture(scope="module", params=["27 DOF", "curved axes"])
+def any_problem(request, problem, tmp_path_factory):
+    """Also one in which several axes follow one coordinate by curves, and the root stands on turned frames."""
+    if request.param == "27 DOF":
+        return problem
+    return curved_problem(tmp_path_factory.mktemp("curved") / "small.osim")
 
 
 @pytest.fixture(scope="module")
@@ -50,14 +58,16 @@ def test_gradient_of_the_motion(problem, here, coordinate):
     assert -(problem.normal(0, coefficients, static).right * step).sum() == pytest.approx(slope, rel=1e-5)
 
 
-def test_cost_is_half_the_sum_of_squares(problem, here):
-    coefficients, static = here
+def test_cost_is_half_the_sum_of_squares(any_problem):
+    problem = any_problem
+    (coefficients,), static = point(problem)
     expected = 0.5 * np.square(residuals(problem, 0, coefficients, static)).sum()
     assert cost(problem, coefficients, static) == pytest.approx(expected + problem.prior_terms(static)[2])
 
 
-def test_normal_equations_are_those_of_a_dense_jacobian(problem, here):
-    coefficients, static = here
+def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
+    problem = any_problem
+    (coefficients,), static = point(problem)
     size, c = coefficients.shape
     motion = np.arange(size * c)
     still = size * c + np.arange(len(static))

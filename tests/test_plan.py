@@ -114,3 +114,5 @@ def test_command(tmp_path):
     table = pd.read_csv(tmp_path / "out" / "plan.csv")
     assert {"walk", "fast walk", "squat", "arm swing", "trunk sway"} < set(table.columns)
     assert "fast walk" in outcome.out
+    again = run("plan", "-o", tmp_path / "out")
+    assert again.status == 0, again.err

@@ -186,4 +186,5 @@ def marker_jacobian(skeleton: Skeleton, pose: Pose) -> np.ndarray:
     positions = skeleton.marker_positions(pose)
     linear, angular = pose.jacobian[:, None, :3], pose.jacobian[:, None, 3:]
     turning = np.cross(angular, positions[..., None], axis=2)
-    return (linear + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
+    by_axes = (linear + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
+    return skeleton.map.to_coordinates(by_axes, pose.slopes)

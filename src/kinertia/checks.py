@@ -30,6 +30,8 @@ _OTHER_PERSON_M, _OTHER_PERSON = 0.04, 0.15
 """Two markers of a segment may differ in distance by this much between trials of one person: length, or share."""
 ESTIMATE_TOLERANCE = 0.03
 """Scale and estimated total mass may differ by this share before a warning."""
+CONTRADICTING_COM_M = 0.1
+"""A centre of mass this far from the literature contradicts it."""
 
 
 def known(value: float | None) -> float:
@@ -185,7 +187,7 @@ def fit_warnings(
         )
     moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
     worst = int(np.argmax(moved))
-    if moved[worst] > 0.1:
+    if moved[worst] > CONTRADICTING_COM_M:
         found.append(
             f"the estimate contradicts the literature: the centre of mass of {estimate.segments[worst]} "
             f"moved by {moved[worst] * 1e3:.0f} mm"

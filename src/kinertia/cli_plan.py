@@ -9,10 +9,12 @@ from typing import Annotated
 
 import typer
 
+from kinertia import __version__
+from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.crossval import HeldOut, cross_validate
 from kinertia.inputs import read_inputs
-from kinertia.io.folder import check_folder, complete_folder
+from kinertia.io.folder import complete_folder
 from kinertia.plan import Plan, plan_measured, plan_synthetic
 from kinertia.prepare import prepare
 from kinertia.terminal import out, plain_table, shown_progress
@@ -23,7 +25,9 @@ def plan(
         Path | None,
         typer.Argument(help="Subject file (.toml) whose trials to choose from; the package's motions if left out."),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Predict the error bar of every BSP from candidate motions, to know what to record. Estimates nothing.
 
@@ -33,7 +37,7 @@ def plan(
 
     kinertia plan subject.toml -o out
     """
-    check_folder(output)
+    results_folder(output, force)
     with shown_progress() as progress:
         if subject is None:
             progress("predicting", 0.0)
@@ -46,7 +50,10 @@ def plan(
     _report_plan(found)
     with complete_folder(output) as work:
         found.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
-    out.print(f"predicted deviation of every parameter in {output / 'plan.csv'}")
+        counts = {" + ".join(names): found.counts(names) for names in found.sd}
+        told = json.dumps({"kinertia": __version__, "recordings": counts}, indent=2)
+        (work / "plan.json").write_text(told + "\n", encoding="utf-8")
+    out.print(f"predicted deviation of every parameter in {output / 'plan.csv'}, counts in plan.json")
 
 
 def _report_plan(found: Plan) -> None:
@@ -66,7 +73,9 @@ def _report_plan(found: Plan) -> None:
 
 def crossval(
     subject: Annotated[Path, typer.Argument(help="Subject file (.toml) with two or more trials.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Hold out each trial in turn: do BSPs from the others explain it better than the literature's?
 
@@ -74,14 +83,14 @@ def crossval(
 
     kinertia crossval subject.toml -o out
     """
-    check_folder(output)
+    results_folder(output, force)
     wanted = read_subject(subject)
     with shown_progress() as progress:
         static, inputs, marker_set = read_inputs(wanted, progress)
         found = cross_validate(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
     _report_crossval(found)
     with complete_folder(output) as work:
-        told = json.dumps([asdict(held) for held in found], indent=2)
+        told = json.dumps({"kinertia": __version__, "held_out": [asdict(held) for held in found]}, indent=2)
         (work / "crossval.json").write_text(told + "\n", encoding="utf-8")
     out.print(f"results in {output / 'crossval.json'}")
 

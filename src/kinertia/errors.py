@@ -87,3 +87,17 @@ class PriorError(KinertiaError):
 
 class SettingsError(KinertiaError):
     """An entry of the subject file or an option of the command line is missing or cannot be."""
+
+
+class OsimError(FileError):
+    """An OpenSim model file cannot be used: broken, of an unknown format, or a model that Kinertia cannot represent.
+
+    Attributes:
+        element: name of the joint, body, marker or constraint it is about; empty where it is the file as a whole.
+        kind: the element's type, for example "EllipsoidJoint".
+    """
+
+    def __init__(self, path: str | Path, problem: str, line: int | None = None, element: str = "", kind: str = ""):
+        self.element = element
+        self.kind = kind
+        super().__init__(path, problem, line)

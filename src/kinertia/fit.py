@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,9 @@ from kinertia.simultaneous_fit import Posterior, fit_simultaneous
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording
 from kinertia.two_level import Window, correct_pelvis, estimate_two_level, stretches
+
+if TYPE_CHECKING:
+    from kinertia.report.plots import FitPlots
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +131,20 @@ class Fit:
     def calibration(self) -> pd.DataFrame | None:
         """Value, prior and posterior deviation and unit of every calibrated quantity; None after two-level."""
         return None if self.posterior is None else pd.DataFrame(dict(self.posterior.calibration)).T
+
+    @property
+    def plot(self) -> FitPlots:
+        """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
+        # here and in `_repr_html_`: estimation does not depend on the report, only asks for it when somebody looks
+        from kinertia.report.plots import FitPlots
+
+        return FitPlots(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: verdict, warnings, body segment parameters."""
+        from kinertia.report.notebook import fit_html
+
+        return fit_html(self)
 
 
 def estimate_bsp(

@@ -96,7 +96,7 @@ def solve_ik(
     if consecutive and len(fine) > 1:
         coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
         q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse], gain_tolerance_m2)
-        q_coarse[:, model.rotational] = np.unwrap(q_coarse[:, model.rotational], axis=0)
+        q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
     q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine], gain_tolerance_m2)
@@ -111,22 +111,14 @@ def solve_ik(
     errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
-    _turn_back(q)
+    q[:, :6] = model.root.turned_back(q[:, :6])
     if consecutive:
         _unwrap(q, model)
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
 
 
-def _turn_back(q: np.ndarray) -> None:
-    """Give the root's orientation by the three angles whose list is within a right angle; the others are its twin."""
-    twin = np.cos(q[:, 4]) < 0
-    q[twin, 3] += np.pi
-    q[twin, 4] = np.arcsin(np.sin(q[twin, 4]))
-    q[twin, 5] += np.pi
-
-
 def _unwrap(q: np.ndarray, model: Skeleton) -> None:
-    for c in np.flatnonzero(model.rotational):
+    for c in np.flatnonzero(model.periodic):
         seen = np.isfinite(q[:, c])
         q[seen, c] = np.unwrap(q[seen, c])
 
@@ -150,12 +142,7 @@ def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.nd
     flip = np.ones((len(u), 3))
     flip[:, 2] = np.sign(np.linalg.det(u @ vt))
     rotation = (u * flip[:, None, :]) @ vt
-    q = np.zeros((len(measured), 6))
-    q[:, :3] = mean_there - (rotation @ mean_here[..., None])[..., 0]
-    q[:, 3] = np.arctan2(-rotation[:, 0, 1], rotation[:, 1, 1])
-    q[:, 4] = np.arcsin(np.clip(rotation[:, 2, 1], -1.0, 1.0))
-    q[:, 5] = np.arctan2(-rotation[:, 2, 0], rotation[:, 2, 2])
-    return q, placed
+    return model.root.coordinates(rotation, mean_there - (rotation @ mean_here[..., None])[..., 0]), placed
 
 
 def _gauss_newton(
@@ -223,18 +210,20 @@ def normal_equations(
     wrench = per_segment @ np.concatenate([residual, np.cross(positions, residual)], axis=-1)
     support = model.support.astype(float)
     blocks = _marker_blocks(positions, weights, per_segment)
-    n, c = len(measured), support.shape[1]
-    carried = (support.T @ blocks.reshape(n, -1, 36)).reshape(n, c, 6, 6)
+    n, a = len(measured), support.shape[1]
+    carried = (support.T @ blocks.reshape(n, -1, 36)).reshape(n, a, 6, 6)
     columns = pose.jacobian.transpose(0, 2, 1)
     moved = (carried @ columns[..., None])[..., 0]
     upper = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
     normal = upper + np.triu(upper, 1).transpose(0, 2, 1)
     gradient = np.einsum("ncd,ncd->nc", columns, support.T @ wrench)
-    return normal, gradient, square
+    gradient = model.map.to_coordinates(gradient, pose.slopes)
+    half = model.map.to_coordinates(normal, pose.slopes).transpose(0, 2, 1)
+    return model.map.to_coordinates(half, pose.slopes), gradient, square
 
 
 def ancestor_of(model: Skeleton) -> np.ndarray:
-    """(c, c) True where coordinate i is coordinate j or moves it (parents come first, so this is upper triangular)."""
+    """(a, a) True where axis i is axis j or moves it (parents come first, so this is upper triangular)."""
     tree = model.model
     above = np.zeros((tree.nv, tree.nv), dtype=bool)
     for joint in range(1, tree.njoints):

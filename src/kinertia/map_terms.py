@@ -14,7 +14,6 @@ import pinocchio as pin
 
 from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
-from kinertia.dynamics import ground_load_to_generalised, root_axes
 from kinertia.ik import ancestor_of, normal_equations
 from kinertia.instruments import PLATE_UNKNOWNS, FootPlates
 from kinertia.log_cholesky import (
@@ -264,6 +263,7 @@ class MapProblem:
         )
         by_marker = pose.jacobian.transpose(0, 2, 1) @ twist.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
         by_marker *= np.repeat(skeleton.support[skeleton.marker_segments].T, 3, axis=1)
+        by_marker = skeleton.map.to_coordinates(by_marker.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
         across = np.concatenate([normal[:, moving[:, None], still], by_marker[:, moving]], axis=-1)
         k = len(still)
         static = np.zeros((k + 3 * m, k + 3 * m))
@@ -291,20 +291,23 @@ class MapProblem:
         bare, bare_data = smaller.model, smaller.model.createData()
         joints, place = smaller.placement_of_parameters(self.segments)
         columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
-        d, cf = len(frames), q.shape[1]
-        few = np.stack([part[:, self.moving] for part in (q, qd, qdd)])
-        dq, dv, da = np.empty((d, 6, cf)), np.empty((d, 6, cf)), np.empty((d, 6, cf))
+        x, v, a = skeleton.map.motion(q, qd, qdd)
+        few = np.stack(smaller.map.motion(*(part[:, self.moving] for part in (q, qd, qdd))))
+        d, axes = x.shape
+        dq, dv, da = np.empty((d, 6, axes)), np.empty((d, 6, axes)), np.empty((d, 6, axes))
         tau, regressor = np.empty((d, 6)), np.empty((d, 6, len(columns)))
         for i in range(d):
-            pin.computeRNEADerivatives(model, data, q[i], qd[i], qdd[i])
+            pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
             tau[i] = data.tau[:6]
             dq[i], dv[i], da[i] = data.dtau_dq[:6], data.dtau_dv[:6], data.M[:6]
             regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
         square = da[:, :, :6]
         da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
+        dq, dv, da = skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+        root = skeleton.root
         loads = self.foot_loads(k, static)[frames]
         wrench = loads.sum(axis=1)
-        dq[:, :, :6] -= _generalised_derivative(q[:, :6], wrench)
+        dq[:, :, :6] -= root.ground_load_derivative(q, wrench)
         by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
         by_static = np.zeros((d, 6, layout.in_root.stop))
         chain = dynamic_jacobian(static[layout.theta])
@@ -312,11 +315,11 @@ class MapProblem:
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
         by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
         for column in range(by_plate.shape[2]):
-            by_static[:, :, layout.plates.start + column] = -ground_load_to_generalised(q[:, :6], by_plate[..., column])
+            by_static[:, :, layout.plates.start + column] = -root.ground_load_to_generalised(q, by_plate[..., column])
         rates = self.foot_loads(k, static, 1)[frames].sum(axis=1)
-        by_static[:, :, layout.clock] = -ground_load_to_generalised(q[:, :6], rates)
+        by_static[:, :, layout.clock] = -root.ground_load_to_generalised(q, rates)
         sd = self.root_sd(trial)[None, :, None]
-        left = (tau - ground_load_to_generalised(q[:, :6], wrench)) / sd[..., 0]
+        left = (tau - root.ground_load_to_generalised(q, wrench)) / sd[..., 0]
         return (
             frames,
             dq[..., self.moving] / sd,
@@ -325,17 +328,3 @@ class MapProblem:
             by_static / sd,
             left,
         )
-
-
-def _generalised_derivative(root: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """(n, 6, 6) derivative of `ground_load_to_generalised` with respect to the root coordinates."""
-    axes = root_axes(root)
-    moment = wrench[:, 3:] - np.cross(root[:, :3], wrench[:, :3])
-    result = np.zeros((len(root), 6, 6))
-    for i, unit in enumerate(np.eye(3)):
-        result[:, 3:, i] = -np.einsum("nij,ni->nj", axes, np.cross(unit, wrench[:, :3]))
-    for later in range(3):
-        for earlier in range(later):
-            turned = np.cross(axes[:, :, earlier], axes[:, :, later])
-            result[:, 3 + later, 3 + earlier] = np.einsum("ni,ni->n", turned, moment)
-    return result

@@ -80,7 +80,7 @@ def plan_measured(skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinemati
         seen = [observe(used, k, prior.mass_kg, cutoff)[0] for k in trials]
         told = Information.at(used, prior, calibration_prior(used), seen, 1.0 / (2.0 * cutoff))
         names = [k.trial.name for k in trials]
-        sets = [(k,) for k in range(len(trials))]
+        sets: list[tuple[int, ...]] = [(k,) for k in range(len(trials))]
         sets += [
             max(combinations(range(len(trials)), size), key=lambda chosen: _gain(told, prior, chosen))
             for size in range(2, min(_LARGEST_SET, len(trials)) + 1)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from kinertia import __version__
 from kinertia.io.folder import complete_folder
 from kinertia.sensitivity_study import CONDITIONS, KINDS, SHOWN, Sensitivity
 
@@ -39,6 +40,7 @@ def sensitivity_figure(found: Sensitivity) -> Figure:
 def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
     """Write the three files into a folder; returns the folder."""
     told = {
+        "kinertia": __version__,
         "seed": found.seed,
         "draws": found.draws,
         "small_errors_up_to_twice_the_noise": {kind: found.insensitive(kind) for kind in KINDS},

@@ -26,7 +26,8 @@ GAIN_SD = 0.02
 """Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
 CLOCK_SD_S = 0.005
 _NOTABLE = 2.0
-_CONTRADICTION = 3.0
+CONTRADICTION_SD = 3.0
+"""A parameter this many prior deviations from the literature contradicts the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +135,8 @@ def _calibration(skeleton: Skeleton, result: SimultaneousResult) -> dict[str, di
     return found
 
 
-_SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
+SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
+"""Factor and unit in which people read a calibrated quantity."""
 
 
 def _warnings(
@@ -148,7 +150,7 @@ def _warnings(
     for name, told in posterior.calibration.items():
         value, sd = float(told["value"]), float(told["prior_sd"])
         if ":" in name and abs(value) > _NOTABLE * sd:
-            scale, unit = _SHOWN_UNIT[str(told["unit"])]
+            scale, unit = SHOWN_UNIT[str(told["unit"])]
             found.append(
                 f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.0f} {unit}); check the instruments"
             )
@@ -157,7 +159,7 @@ def _warnings(
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
-    for i, k in np.argwhere(np.abs(away) > _CONTRADICTION):
+    for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD):
         found.append(
             f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
             f"deviations from the literature; a wrong joint, plate or marker is likelier than an odd person"

@@ -1,10 +1,13 @@
 """`Skeleton`: segments, joints, coordinates and markers, as a Pinocchio model.
 
 A joint places its child segment in its parent by a constant placement followed by a list of single axes, each a
-rotation about or a translation along a fixed direction (DESIGN section 4). Every axis belongs to one coordinate and
+rotation about or a translation along a fixed direction (DESIGN section 4). Every axis follows one coordinate and
 becomes one 1-DOF Pinocchio joint, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are
 constants: they are folded into the placements, which is how a calibrated joint-centre offset (a coordinate that
 does not move in time) or an arm rotation that no marker shows enters the model.
+
+In the 27-DOF model an axis is its coordinate. In an OpenSim model it may be a function of it, and several may follow
+the same one: `Skeleton.map` goes from coordinates to axes and back. Pinocchio sees axes only.
 """
 
 from __future__ import annotations
@@ -18,7 +21,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
+from kinertia.axis_functions import AxisFunction
 from kinertia.bsp import BodySegmentParameters
+from kinertia.coordinate_map import CoordinateMap
+from kinertia.root import Root
 
 GRAVITY_M_S2 = 9.80665
 """Standard gravity; OpenSim's default models use 9.80665 or 9.8066."""
@@ -26,11 +32,15 @@ GRAVITY_M_S2 = 9.80665
 
 @dataclass(frozen=True)
 class Axis:
-    """One degree of freedom of a joint: `coordinate` moves along or about `direction` (unit, in the frame so far)."""
+    """One degree of freedom of a joint: `coordinate` moves along or about `direction` (unit, in the frame so far).
+
+    With a `function` the axis moves by its value at the coordinate, else by the coordinate itself (rad or m).
+    """
 
     coordinate: str
     kind: Literal["rotation", "translation"]
     direction: tuple[float, float, float]
+    function: AxisFunction | None = None
 
 
 @dataclass(frozen=True)
@@ -38,7 +48,8 @@ class Joint:
     """Places segment `child` in segment `parent` ("ground" for the root).
 
     The joint frame stands at `translation` (m) with `rotation` (3, 3) in the parent's frame; the `axes` follow in
-    order; after the last one stands the child's frame.
+    order; after the last one stands the joint's far frame, which is at `child_translation` with `child_rotation` in the
+    child's frame.
     """
 
     parent: str
@@ -46,6 +57,8 @@ class Joint:
     rotation: np.ndarray
     translation: np.ndarray
     axes: tuple[Axis, ...]
+    child_rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    child_translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)
@@ -64,13 +77,15 @@ class Pose:
     Attributes:
         rotation: (n, s, 3, 3) segment frames in ground.
         translation: (n, s, 3) m, segment origins in ground.
-        jacobian: (n, 6, c): column j is the spatial velocity in ground axes, at the ground origin, that coordinate j at
+        jacobian: (n, 6, a): column j is the spatial velocity in ground axes, at the ground origin, that axis j at
             unit rate gives to what it moves: linear first, then angular.
+        slopes: (n, a) derivatives of the axes by their coordinates; None where axes are coordinates.
     """
 
     rotation: np.ndarray
     translation: np.ndarray
     jacobian: np.ndarray
+    slopes: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -82,12 +97,14 @@ class Skeleton:
         joints: parents before children.
         markers: all markers, in order.
         locked: coordinates held at a constant value (rad or m).
+        gravity_m_s2: downward, along -y.
     """
 
     name: str
     joints: tuple[Joint, ...]
     markers: tuple[Marker, ...]
     locked: Mapping[str, float] = field(default_factory=dict)
+    gravity_m_s2: float = GRAVITY_M_S2
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -97,17 +114,44 @@ class Skeleton:
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates that move, root first (the order of q)."""
-        return tuple(axis.coordinate for axis in self._axes if axis.coordinate not in self.locked)
+        return tuple(dict.fromkeys(axis.coordinate for axis in self._axes if axis.coordinate not in self.locked))
 
     @cached_property
     def rotational(self) -> np.ndarray:
         """(c,) True where the coordinate is an angle (rad), False where it is a length (m)."""
-        kinds = {axis.coordinate: axis.kind for axis in self._axes}
-        return np.array([kinds[name] == "rotation" for name in self.coordinates])
+        angles = {axis.coordinate for axis in self._axes if axis.kind == "rotation"}
+        return np.array([name in angles for name in self.coordinates])
+
+    @cached_property
+    def periodic(self) -> np.ndarray:
+        """(c,) True where the coordinate is an angle and a full turn changes nothing."""
+        shaped = {axis.coordinate for axis in self._axes if axis.kind == "translation" or axis.function is not None}
+        return self.rotational & np.array([name not in shaped for name in self.coordinates])
 
     @property
     def _axes(self) -> list[Axis]:
         return [axis for joint in self.joints for axis in joint.axes]
+
+    @cached_property
+    def map(self) -> CoordinateMap:
+        """From the coordinates to the axes of the Pinocchio model."""
+        moving = [axis for axis in self._axes if axis.coordinate not in self.locked]
+        followed, functions = [axis.coordinate for axis in moving], [axis.function for axis in moving]
+        return CoordinateMap.of(self.coordinates, followed, functions)
+
+    @cached_property
+    def root(self) -> Root:
+        """The free joint of the first segment: its first three coordinates slide, the next three turn."""
+        joint = self.joints[0]
+        directions = np.array([axis.direction for axis in joint.axes]).T
+        return Root(
+            np.asarray(joint.rotation),
+            np.asarray(joint.translation),
+            directions[:, :3],
+            directions[:, 3:],
+            np.asarray(joint.child_rotation),
+            np.asarray(joint.child_translation),
+        )
 
     def lock(self, values: Mapping[str, float]) -> Skeleton:
         """The same skeleton with these coordinates held at these values (rad or m)."""
@@ -133,7 +177,7 @@ class Skeleton:
     def _built(self) -> tuple[pin.Model, dict[str, int], dict[str, pin.SE3]]:
         """Pinocchio model without masses, the joint that carries each segment, and each segment's place in it."""
         model = pin.Model()
-        model.gravity.linear = np.array([0.0, -GRAVITY_M_S2, 0.0])
+        model.gravity.linear = np.array([0.0, -self.gravity_m_s2, 0.0])
         carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
         for joint in self.joints:
             parent = carrier[joint.parent]
@@ -142,9 +186,10 @@ class Skeleton:
                 if axis.coordinate in self.locked:
                     place = place * _motion(axis, self.locked[axis.coordinate])
                     continue
-                parent = model.addJoint(parent, _pinocchio_joint(axis), place, axis.coordinate)
+                parent = model.addJoint(parent, _pinocchio_joint(axis), place, f"{axis.coordinate}:{model.njoints}")
                 place = pin.SE3.Identity()
-            carrier[joint.child], offset[joint.child] = parent, place
+            far = pin.SE3(np.asarray(joint.child_rotation), np.asarray(joint.child_translation))
+            carrier[joint.child], offset[joint.child] = parent, place * far.inverse()
         return model, carrier, offset
 
     @property
@@ -154,7 +199,7 @@ class Skeleton:
 
     @cached_property
     def support(self) -> np.ndarray:
-        """(s, c) True where coordinate c moves segment s."""
+        """(s, a) True where axis a moves segment s."""
         model, carrier, _ = self._built
         moves = np.zeros((len(self.segments), model.nv), dtype=bool)
         for i, segment in enumerate(self.segments):
@@ -183,18 +228,19 @@ class Skeleton:
         """Segment frames and Jacobian at the coordinates q (n, c)."""
         model, carrier, offset = self._built
         data = model.createData()
+        at = self.map.axes(q)
         n, s = len(q), len(self.segments)
         joints = [carrier[segment] for segment in self.segments]
         frames = [data.oMi[j] for j in joints]
         place = np.empty((n, s, 4, 4))
         jacobian = np.empty((n, 6, model.nv))
         for k in range(n):
-            jacobian[k] = pin.computeJointJacobians(model, data, q[k])
+            jacobian[k] = pin.computeJointJacobians(model, data, at[k])
             for i, frame in enumerate(frames):
                 place[k, i] = frame.homogeneous
         local = np.array([offset[segment].homogeneous for segment in self.segments])
         place = place @ local
-        return Pose(place[..., :3, :3], place[..., :3, 3], jacobian)
+        return Pose(place[..., :3, :3], place[..., :3, 3], jacobian, self.map.slopes(q))
 
     def marker_positions(self, pose: Pose) -> np.ndarray:
         """(n, m, 3) m, model markers in ground at this pose."""
@@ -207,7 +253,9 @@ class Skeleton:
         joints, place = self.placement_of_parameters(bsp.segments)
         moved = (place @ bsp.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
         for j in set(joints.tolist()):
-            model.inertias[j] = pin.Inertia.FromDynamicParameters(moved[joints == j].sum(axis=0))
+            total = moved[joints == j].sum(axis=0)
+            if total[0] != 0.0:  # Pinocchio would divide by it
+                model.inertias[j] = pin.Inertia.FromDynamicParameters(total)
         return model
 
     def placement_of_parameters(self, segments: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -228,6 +276,8 @@ class Skeleton:
 
 def _motion(axis: Axis, value: float) -> pin.SE3:
     direction = np.array(axis.direction)
+    if axis.function is not None:
+        value = float(axis.function(np.array([value]))[0])
     if axis.kind == "translation":
         return pin.SE3(np.eye(3), direction * value)
     return pin.SE3(Rotation.from_rotvec(direction * value).as_matrix(), np.zeros(3))

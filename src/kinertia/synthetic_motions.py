@@ -32,7 +32,7 @@ def squat(subject: SyntheticSubject) -> SyntheticTrial:
 def arm_swing(subject: SyntheticSubject) -> SyntheticTrial:
     """Both arms in turn forward and backward, out to the side, elbows bending."""
     swing, out, bend = np.sin(_phase(0.8)), 0.5 * (1.0 - np.cos(_phase(0.4))), 0.5 * (1.0 - np.cos(_phase(1.2)))
-    angles = {}
+    angles: dict[str, np.ndarray] = {}
     for side, sign in (("r", 1.0), ("l", -1.0)):
         angles |= {f"arm_flex_{side}": 50.0 * sign * swing, f"arm_add_{side}": -40.0 * out}
         angles[f"elbow_flex_{side}"] = 15.0 + 70.0 * bend

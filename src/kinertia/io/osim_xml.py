@@ -1,0 +1,95 @@
+"""XML elements with their line and their place in the file, so that a single value can be replaced.
+
+OpenSim files go back to the user with everything byte for byte that Kinertia did not estimate; that rules out parsing
+and writing again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+_START_TAG = re.compile(rb"""<[^\s/>]+(?:[^>"']|"[^"]*"|'[^']*')*>""")
+
+
+@dataclass(eq=False)
+class Element:
+    """One element.
+
+    Attributes:
+        tag, attributes: as in the file.
+        line: one-based, of the start tag.
+        outer: byte span from the start tag to the end of the end tag.
+        inner: byte span of the content; None where the element is closed in its start tag.
+        text: characters directly inside, without comments.
+        children: elements directly inside.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    outer: tuple[int, int]
+    inner: tuple[int, int] | None
+    text: str = ""
+    children: list[Element] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """The attribute `name`, or nothing."""
+        return self.attributes.get("name", "")
+
+    def child(self, *tags: str) -> Element | None:
+        """The first child with one of these tags."""
+        return next((child for child in self.children if child.tag in tags), None)
+
+    def all(self, *tags: str) -> Iterator[Element]:
+        """All elements inside with one of these tags, however deep, in the order of the file."""
+        for child in self.children:
+            if child.tag in tags:
+                yield child
+            yield from child.all(*tags)
+
+
+def parse(content: bytes) -> Element:
+    """The outermost element.
+
+    Raises:
+        xml.parsers.expat.ExpatError: the text is not XML; `lineno` says where.
+    """
+    parser = expat.ParserCreate()
+    top = Element("", {}, 0, (0, 0), None)
+    stack = [top]
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        at = parser.CurrentByteIndex
+        found = _START_TAG.match(content, at)
+        end = found.end() if found else at
+        inner = None if content[end - 2 : end] == b"/>" else (end, end)
+        element = Element(tag, attributes, parser.CurrentLineNumber, (at, end), inner)
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def finish(tag: str) -> None:
+        element = stack.pop()
+        if element.inner is not None:
+            at = parser.CurrentByteIndex
+            element.inner = (element.inner[0], at)
+            element.outer = (element.outer[0], content.index(b">", at) + 1)
+
+    def characters(text: str) -> None:
+        stack[-1].text += text
+
+    parser.StartElementHandler, parser.EndElementHandler = start, finish
+    parser.CharacterDataHandler = characters
+    parser.buffer_text = True
+    parser.Parse(content, True)
+    return top.children[0]
+
+
+def replaced(content: bytes, changes: list[tuple[tuple[int, int], bytes]]) -> bytes:
+    """The content with these byte spans replaced; spans do not overlap."""
+    for (start, end), new in sorted(changes, reverse=True):
+        content = content[:start] + new + content[end:]
+    return content

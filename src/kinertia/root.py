@@ -1,0 +1,112 @@
+"""`Root`: the free joint between ground and the root segment.
+
+Three translations, then three rotations about body-fixed axes that are square to one another: tilt (z), list (x),
+rotation (y) in the 27-DOF model, any such triple in an OpenSim model. "Residual" always means force (N) in ground axes
+and moment (N m) about the centre of these rotations (the pelvis origin, unless the model puts it elsewhere), in ground
+axes.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Root:
+    """Where the free joint stands, and its axes.
+
+    Attributes:
+        rotation, translation: (3, 3) and (3,) m, the joint's frame in ground.
+        slides: (3, 3) columns are the directions of the three translations, in the joint's frame.
+        turns: (3, 3) columns are the axes of the three rotations at zero, in the joint's frame.
+        child_rotation, child_translation: the joint's far frame in the root segment's frame.
+    """
+
+    rotation: np.ndarray
+    translation: np.ndarray
+    slides: np.ndarray
+    turns: np.ndarray
+    child_rotation: np.ndarray
+    child_translation: np.ndarray
+
+    def centre(self, q: np.ndarray) -> np.ndarray:
+        """(n, 3) m, centre of the rotations in ground, at the root coordinates q (n, 6 or more)."""
+        return self.translation + q[:, :3] @ self._slides.T
+
+    @property
+    def _slides(self) -> np.ndarray:
+        return self.rotation @ self.slides
+
+    def axes(self, q: np.ndarray) -> np.ndarray:
+        """(n, 3, 3): columns are the axes of the three rotations in ground; omega = A * angle rates."""
+        first, second, third = (self.rotation @ self.turns).T
+        c1, s1, c2, s2 = np.cos(q[:, 3, None]), np.sin(q[:, 3, None]), np.cos(q[:, 4, None]), np.sin(q[:, 4, None])
+        about_2 = c1 * second + s1 * np.cross(first, second)
+        # the third axis, turned by the second angle, then by the first
+        along = float(np.cross(second, third) @ first)
+        about_3 = c2 * (c1 * third + s1 * np.cross(first, third)) + s2 * along * first
+        return np.stack([np.broadcast_to(first, about_2.shape), about_2, about_3], axis=-1)
+
+    def load(self, q: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """Generalised forces (n, 6) or (n, 6, k) as force and moment about the centre, ground axes."""
+        columns = tau if tau.ndim == 3 else tau[..., None]
+        moment = np.linalg.solve(self.axes(q).transpose(0, 2, 1), columns[:, 3:])
+        load = np.concatenate([self._slides @ columns[:, :3], moment], axis=1)
+        return load if tau.ndim == 3 else load[..., 0]
+
+    def generalised(self, q: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """The inverse of `load`, (n, 6)."""
+        turned = np.einsum("nij,ni->nj", self.axes(q), load[:, 3:])
+        return np.concatenate([load[:, :3] @ self._slides, turned], axis=1)
+
+    def ground_load(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+        """Sum of ground reactions (n, 6: force, moment about the ground origin) taken about the centre."""
+        force, moment = wrench[:, :3], wrench[:, 3:]
+        return np.concatenate([force, moment - np.cross(self.centre(q), force)], axis=1)
+
+    def ground_load_to_generalised(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+        """Generalised force (n, 6) of ground reactions (n, 6: force, moment about the ground origin)."""
+        return self.generalised(q, self.ground_load(q, wrench))
+
+    def ground_load_derivative(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+        """(n, 6, 6) derivative of `ground_load_to_generalised` by the root coordinates."""
+        axes = self.axes(q)
+        moment = self.ground_load(q, wrench)[:, 3:]
+        result = np.zeros((len(q), 6, 6))
+        for i, direction in enumerate(self._slides.T):
+            result[:, 3:, i] = -np.einsum("nij,ni->nj", axes, np.cross(direction, wrench[:, :3]))
+        result[:, 3:, 3:] = self.turning(axes, moment)
+        return result
+
+    @staticmethod
+    def turning(axes: np.ndarray, moment: np.ndarray) -> np.ndarray:
+        """(n, 3, 3) derivative of axes^T moment by the three angles at constant moment: each turns those after it."""
+        result = np.zeros((len(axes), 3, 3))
+        for later in range(3):
+            for earlier in range(later):
+                turned = np.cross(axes[:, :, earlier], axes[:, :, later])
+                result[:, later, earlier] = np.einsum("ni,ni->n", turned, moment)
+        return result
+
+    def coordinates(self, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
+        """(n, 6) root coordinates that place the root segment at these rotations (n, 3, 3) and translations (n, 3)."""
+        centre = translation + rotation @ self.child_translation
+        turned = self.rotation.T @ rotation @ self.child_rotation
+        with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
+            angles = Rotation.from_matrix(turned).as_davenport(self.turns.T, "intrinsic")
+        slides = np.linalg.solve(self._slides, (centre - self.translation).T).T
+        return np.hstack([slides, angles])
+
+    @staticmethod
+    def turned_back(q: np.ndarray) -> np.ndarray:
+        """The same orientations with the second angle within a right angle of zero; the others are its twin."""
+        twin = np.cos(q[:, 4]) < 0
+        q = q.copy()
+        q[twin, 3] += np.pi
+        q[twin, 4] = np.arcsin(np.sin(q[twin, 4]))
+        q[twin, 5] += np.pi
+        return q
