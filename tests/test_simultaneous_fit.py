@@ -7,6 +7,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from accuracy import kinematics_of
+from kinertia.bsp_prior import literature_prior
 from kinertia.config import Settings, Subject
 from kinertia.fit import Fit, estimate_bsp
 from kinertia.io.recording import read_recording
@@ -29,7 +30,8 @@ def fitted(trial: SyntheticTrial, literature=None, disturb=lambda positions, loa
     disturb(positions, loads)
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
     with threadpool_limits(1, user_api="blas"):
-        return fit_simultaneous(trial.skeleton, literature or walking_subject().literature, [kinematics], "gcv")
+        prior = literature_prior(literature or walking_subject().literature)
+        return fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The commands on synthetic data: `kinertia demo`, `kinertia study table1`."""
+"""The commands on synthetic data: `kinertia demo`, `kinertia study table1`, `kinertia study accuracy`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from kinertia.accuracy_report import HEADINGS, accuracy_rows, angles_sentence, save_accuracy
+from kinertia.accuracy_study import SCENARIOS, run_accuracy
 from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.demo import Demo, run_demo
@@ -16,11 +18,6 @@ from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
-
-
-@study.callback()
-def _study() -> None:
-    """Keeps `table1` a sub-command while it is the only one."""
 
 
 def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
@@ -182,3 +179,32 @@ def _report_table1(table: Table1, deviation: np.ndarray) -> None:
             out.print(
                 f"{CONDITIONS[condition]}: {count} of {len(table.draws)} draws stopped at the limit of evaluations"
             )
+
+
+@study.command()
+def accuracy(
+    draws: Annotated[int, typer.Option(min=2, help="People in each scenario.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")] = 1,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")] = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Do the error bars hold? People drawn from the literature's prior, measured with faults, estimated.
+
+    [bold]Example[/]
+
+    kinertia study accuracy -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        found = run_accuracy(list(SCENARIOS), draws, seed, workers, lambda share: progress("people", share))
+    for scenario in found.values():
+        out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
+        shown = plain_table(*HEADINGS)
+        for row in accuracy_rows(scenario):
+            shown.add_row(*row)
+        out.print(shown)
+        out.print(angles_sentence(scenario))
+    save_accuracy(found, seed, output)
+    out.print(f"\nresults in {output}: accuracy.json, accuracy.md")

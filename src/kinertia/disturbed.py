@@ -97,9 +97,8 @@ def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Sk
             axis = np.array(joint.axes[0].direction)
             across = np.cross(axis, rng.standard_normal(3))
             turned = Rotation.from_rotvec(angle_rad * across / np.linalg.norm(across)).apply(axis)
-            joint = replace(
-                joint, axes=(replace(joint.axes[0], direction=(float(turned[0]), float(turned[1]), float(turned[2]))),)
-            )
+            x, y, z = map(float, turned)
+            joint = replace(joint, axes=(replace(joint.axes[0], direction=(x, y, z)),))
         joints.append(joint)
     return replace(skeleton, joints=tuple(joints))
 

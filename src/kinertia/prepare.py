@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.calibration import adapt, hold_uninformed, sampled
-from kinertia.checks import check_visible, complete_subject, known
+from kinertia.checks import check_same_person, check_visible, complete_subject, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.errors import MarkerSetError, TrialError
@@ -45,6 +46,7 @@ class Prepared:
         subject: with mass and height filled in.
         skeleton: calibrated model.
         literature: body segment parameters of its geometry.
+        prior: how far the person's may be from them.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
         warnings, notes: one sentence each.
@@ -53,6 +55,7 @@ class Prepared:
     subject: Subject
     skeleton: Skeleton
     literature: BodySegmentParameters
+    prior: BspPrior
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
     warnings: tuple[str, ...]
@@ -74,6 +77,7 @@ def calibrate(
     model = build_gait27(static, marker_set, known(subject.height_m), subject.sex, hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
+    check_same_person(model.skeleton, trials)
     skeleton, held = hold_uninformed(model.skeleton, trials, ARM_COORDINATES)
     for trial in trials:
         check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
@@ -140,6 +144,7 @@ def prepare(
         subject=subject,
         skeleton=skeleton,
         literature=literature,
+        prior=literature_prior(literature),
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
         warnings=tuple(warnings),

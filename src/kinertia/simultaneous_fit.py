@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.bsp_prior import BspPrior, literature_prior
+from kinertia.bsp import PARAMETERS
+from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.identifiability import BaseParameters, base_parameters
@@ -78,26 +78,23 @@ class SimultaneousFit:
 
 def fit_simultaneous(
     skeleton: Skeleton,
-    literature: BodySegmentParameters,
+    prior: BspPrior,
     trials: Sequence[Kinematics],
     cutoff_hz: float | str,
 ) -> SimultaneousFit:
-    """Estimate motion, BSPs and calibration of all trials together, with the literature as the prior.
+    """Estimate motion, BSPs and calibration of all trials together.
 
     Args:
         skeleton: calibrated.
-        literature: body segment parameters whose total mass is the scale's.
+        prior: of the body segment parameters, and the total mass by the scale.
         trials: kinematics of the trials.
         cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
     """
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    prior = literature_prior(literature)
-    seen = [observe(used, k, literature.total_mass_kg, cutoff) for k in trials]
-    centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
-    places = np.full(len(used.markers), MARKER_SD_M)
-    calibration = CalibrationPrior(dict.fromkeys(centres, JOINT_CENTRE_SD_M), places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    seen = [observe(used, k, prior.mass_kg, cutoff) for k in trials]
+    calibration = calibration_prior(used)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
     loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
@@ -113,6 +110,12 @@ def fit_simultaneous(
         ),
     )
     return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
+
+
+def calibration_prior(skeleton: Skeleton) -> CalibrationPrior:
+    """How far a calibrated skeleton with these markers, plates and clock may be off."""
+    centres = dict.fromkeys((*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS), JOINT_CENTRE_SD_M)
+    return CalibrationPrior(centres, np.full(len(skeleton.markers), MARKER_SD_M), PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
 
 
 def _calibration(skeleton: Skeleton, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:

@@ -16,7 +16,7 @@ from kinertia.errors import FileError
 
 GENERATOR = '<meta name="generator" content="kinertia'
 """In the head of every HTML page that is a result of its own."""
-_TELLING = ("fit.json", "table1.json", "check.html")
+_TELLING = ("fit.json", "table1.json", "accuracy.json", "check.html")
 
 
 def check_folder(folder: str | Path) -> None:
