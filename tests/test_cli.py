@@ -102,8 +102,9 @@ def test_progress_tells_the_time_left_of_the_stage(monkeypatch):
             time.sleep(0.15)
             progress("estimate", share)
         time.sleep(0.15)
-    last = re.findall(r"estimate .*?left (\S+)", screen.getvalue())
-    assert re.search(r"0:00:0[01]", last[-1])
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
+    assert re.search(r"estimate \S+ +0:00:0[01] 0:00:0[01] left", shown)
+    assert not re.search(r"reading \S+ +\S+ +\S* ?left", shown)
 
 
 @pytest.fixture

@@ -58,7 +58,8 @@ def _rule(headings: Sequence[str]) -> list[str]:
 
 def save_accuracy(found: Mapping[str, ScenarioAccuracy], seed: int, folder: str | Path) -> Path:
     """Write `accuracy.json` and `accuracy.md` into a folder; returns the folder."""
-    told = {"kinertia": __version__, "seed": seed, "scenarios": {key: asdict(scenario) for key, scenario in found.items()}}
+    scenarios = {key: asdict(scenario) for key, scenario in found.items()}
+    told = {"kinertia": __version__, "seed": seed, "scenarios": scenarios}
     with complete_folder(folder) as work:
         (work / "accuracy.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         (work / "accuracy.md").write_text(accuracy_markdown(found) + "\n", encoding="utf-8")
