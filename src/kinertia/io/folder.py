@@ -16,7 +16,8 @@ from kinertia.errors import FileError
 
 GENERATOR = '<meta name="generator" content="kinertia'
 """In the head of every HTML page that is a result of its own."""
-_TELLING = ("fit.json", "table1.json", "accuracy.json", "check.html")
+_TELLING = (".json", ".html")
+"""Types of the result files that name Kinertia as what made them."""
 
 
 def check_folder(folder: str | Path) -> None:
@@ -40,7 +41,7 @@ def expect_own_folder(folder: str | Path) -> None:
     if not folder.is_dir():
         return
     names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
-    if names and not any(_says_kinertia(folder / name) for name in _TELLING):
+    if names and not any(_says_kinertia(folder / name) for name in names if name.endswith(_TELLING)):
         listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
         raise FileError(
             folder,
