@@ -75,7 +75,6 @@ def check(
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.
-
     Exit status 1 if a verdict is against: no fit, or no simulation.
 
     [bold]Examples[/]
@@ -97,6 +96,22 @@ def check(
     measured = [path for path in files if path.suffix.lower() != ".osim"]
     recordings, more = _check_recordings(measured, loads, None if markers is None else read_marker_set(markers), mass)
     mistakes += more
+    _show(recordings, models, mistakes, output, verbose)
+    if mistakes:
+        raise typer.Exit(2)
+    judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
+    if any(map(stands_against, judged)):
+        raise typer.Exit(1)
+
+
+def _show(
+    recordings: Sequence[tuple[str, RecordingCheck]],
+    models: Sequence[tuple[str, ModelCheck]],
+    mistakes: Sequence[str],
+    output: Path | None,
+    verbose: bool,
+) -> None:
+    """Everything on the terminal, and as a page if there is a folder for it."""
     for title, recording in recordings:
         _show_recording(title, recording, verbose)
     for title, model in models:
@@ -105,11 +120,6 @@ def check(
         out.print(f"page in {save_check_page(recordings, models, mistakes, output)}", soft_wrap=True)
     for mistake in mistakes:
         show_error(mistake)
-    if mistakes:
-        raise typer.Exit(2)
-    judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
-    if any(map(stands_against, judged)):
-        raise typer.Exit(1)
 
 
 def _check_models(
