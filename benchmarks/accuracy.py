@@ -414,12 +414,12 @@ The gait2354 walk, cut in two: differences of the BSPs from the estimate of the 
 
 {sections["pooling"]}
 
-**The halves together do not quite give the estimate of the whole.** What differs most is lateral: the CoMs of shanks and
-torso along z. The forces of this walk contradict themselves about the vertical: the free moments of both plates turn
-the person to the same side all the time (on average 1.5 N m right, 4 N m left), which over a whole walk would spin
+**The halves together do not quite give the estimate of the whole.** What differs most is lateral: the CoMs of shanks
+and torso along z. The forces of this walk contradict themselves about the vertical: the free moments of both plates
+turn the person to the same side all the time (on average 1.5 N m right, 4 N m left), which over a whole walk would spin
 anybody round. The whole walk leaves this as a residual (2.7 N m RMS about the vertical); each half explains it by other
-initial rates of turning and by CoMs moved to the side (1.4 N m). With the free moments taken out, the residual about the
-vertical is 0.2 N m. On synthetic data with correct deviations, halves and whole agree.
+initial rates of turning and by CoMs moved to the side (1.4 N m). With the free moments taken out, the residual about
+the vertical is 0.2 N m. On synthetic data with correct deviations, halves and whole agree.
 
 ## Speed
 

@@ -83,7 +83,15 @@ def test_impossible_segments_are_named_and_bodies_without_mass_are_not():
     table[1, 4:7] = 0.1, 0.5, 0.1
     wrong = BodySegmentParameters.from_table((*BODY.segments, "patella_r"), np.vstack([table, np.zeros(10)]))
     found = verdicts(fit(estimate=wrong, literature=wrong))
-    assert level(found, "physically impossible segments: 1 of 2 (thigh_r)") == "against"
+    assert level(found, "physically impossible segments: 1 of 3 (thigh_r)") == "against"
+
+
+def test_a_body_without_thickness_is_let_pass():
+    """The toes of OpenSim's gait2354: 0.0001 + 0.0001 = 0.0002, but not in binary."""
+    toes = np.array([[0.2166, 0.0346, 0.006, -0.0175, 0.0001, 0.0002, 0.0001, 0, 0, 0]])
+    flat = BodySegmentParameters.from_table((*BODY.segments, "toes_r"), np.vstack([BODY.table(), toes]))
+    assert not flat.physically_consistent().all()
+    assert not stands_against(verdicts(fit(estimate=flat, literature=flat)))
 
 
 def test_centre_of_mass_far_from_the_literature():

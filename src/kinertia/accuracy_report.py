@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinertia import __version__
 from kinertia.accuracy_study import ScenarioAccuracy
 from kinertia.io.folder import complete_folder
 
@@ -25,7 +26,7 @@ def accuracy_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     """One row per class of parameters, under `HEADINGS`."""
     rows = []
     for name, found in scenario.classes.items():
-        factor, unit, form = _SHOWN[name]
+        factor, unit, form = _SHOWN.get(name, (1.0, "prior sd", ".2f"))
         errors = (f"{factor * value:{form}}" for value in (found.rms, found.bound, found.rms_literature))
         cover = f"{100 * found.cover:.1f} ± {100 * found.cover_sd:.1f} %"
         rows.append([f"{name} ({unit})", cover, f"{found.ratio:.2f}", *errors, f"{100 * found.better:.0f} %"])
@@ -57,7 +58,11 @@ def _rule(headings: Sequence[str]) -> list[str]:
 
 def save_accuracy(found: Mapping[str, ScenarioAccuracy], seed: int, folder: str | Path) -> Path:
     """Write `accuracy.json` and `accuracy.md` into a folder; returns the folder."""
-    told = {"seed": seed, "scenarios": {key: asdict(scenario) for key, scenario in found.items()}}
+    told = {
+        "kinertia": __version__,
+        "seed": seed,
+        "scenarios": {key: asdict(scenario) for key, scenario in found.items()},
+    }
     with complete_folder(folder) as work:
         (work / "accuracy.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         (work / "accuracy.md").write_text(accuracy_markdown(found) + "\n", encoding="utf-8")

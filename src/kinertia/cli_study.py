@@ -10,9 +10,9 @@ import typer
 
 from kinertia.accuracy_report import HEADINGS, accuracy_rows, angles_sentence, save_accuracy
 from kinertia.accuracy_study import SCENARIOS, run_accuracy
+from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.demo import Demo, run_demo
-from kinertia.io.folder import check_folder
 from kinertia.study import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress
@@ -20,9 +20,7 @@ from kinertia.terminal import out, plain_table, shown_progress
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
 
 
-def demo(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
-) -> None:
+def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
     """Show what Kinertia does; needs no files.
 
     A synthetic person walks through a synthetic laboratory; the files it leaves are estimated from, and the estimate is
@@ -32,6 +30,7 @@ def demo(
 
     kinertia demo -o out
     """
+    results_folder(output, force)
     with shown_progress() as progress:
         result = run_demo(output, progress=progress)
     _report_demo(result, output)
@@ -42,8 +41,8 @@ def _report_demo(result: Demo, folder: Path) -> None:
     bodies = {
         "truth": result.truth,
         "literature": fit.literature,
-        "two-level": fit.estimate,
-        "simultaneous": result.simultaneous.estimate,
+        "estimate": fit.estimate,
+        "two-level": result.two_level.estimate,
     }
     trial = fit.trials[0]
     out.print(
@@ -75,16 +74,15 @@ def _report_demo(result: Demo, folder: Path) -> None:
     for k, (what, unit, form, factor) in enumerate(named):
         errors.add_row(what, unit, *(f"{values[k] * factor:{form}}" for values in found))
     out.print(errors)
-    loads = {**trial.residuals, "simultaneous": result.simultaneous.trials[0].residuals["estimate"]}
-    loads["two-level"] = loads.pop("estimate")
+    loads = {**trial.residuals, "two-level": result.two_level.trials[0].residuals["estimate"]}
     out.print(
         "residual at the pelvis, RMS: "
         + "; ".join(f"{stage} {_rms(load[:, :3]):.1f} N, {_rms(load[:, 3:]):.1f} N m" for stage, load in loads.items())
         + "\n"
     )
     out.print(_verdict(found[0], found[1]) + "\n")
-    out.print(_simultaneous_verdict(found[0], found[2]) + "\n")
-    for name, one in (("two-level", fit), ("simultaneous", result.simultaneous)):
+    out.print(_two_level_verdict(found[0], found[2]) + "\n")
+    for name, one in (("estimate", fit), ("two-level", result.two_level)):
         for warning in one.warnings:
             out.print(f"warning ({name}): {warning}")
     out.print(
@@ -99,21 +97,21 @@ def _rms(load: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(load).sum(axis=1))))
 
 
-def _simultaneous_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """How the simultaneous estimate compares with the literature, by the numbers of this run."""
+def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """How the estimate compares with the literature, by the numbers of this run."""
     shares = ", ".join(
         f"{what} {100 * (other / one - 1):+.0f} %"
         for what, one, other in zip(("mass", "centre of mass", "inertia"), before, after, strict=True)
     )
     return (
-        f"The simultaneous estimate (--method simultaneous) changes these errors by: {shares}. It weighs "
+        f"The simultaneous estimate changes the literature's errors by: {shares}. It weighs "
         "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says "
         "per parameter how much was measured."
     )
 
 
-def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """What the comparison shows, by the numbers of this run."""
+def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """What the comparison with two-level shows, by the numbers of this run."""
     worse = sum(one < other for one, other in zip(before, after, strict=True))
     if worse == len(before):
         finding = "Two-level explains the forces far better, yet every class of parameters is further from the truth"
@@ -139,7 +137,9 @@ def table1(
         Path | None,
         typer.Option(help="Subject file of a measured trial to start from; the package's walk if left out."),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
 
@@ -149,7 +149,7 @@ def table1(
 
     kinertia study table1 --repeats 3 --trial subject.toml -o out
     """
-    check_folder(output)
+    results_folder(output, force)
     with shown_progress() as progress:
         if trial is None:
             source, name = study_trial(), "synthetic walk"
@@ -185,7 +185,9 @@ def accuracy(
     draws: Annotated[int, typer.Option(min=2, help="People in each scenario.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")] = 1,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Do the error bars hold? People drawn from the literature's prior, measured with faults, estimated.
 
@@ -193,7 +195,7 @@ def accuracy(
 
     kinertia study accuracy -o out
     """
-    check_folder(output)
+    results_folder(output, force)
     with shown_progress() as progress:
         found = run_accuracy(list(SCENARIOS), draws, seed, workers, lambda share: progress("people", share))
     for scenario in found.values():

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.bsp import PARAMETERS, BodySegmentParameters, second_moments
 from kinertia.checks import CONTRADICTING_COM_M
 from kinertia.simultaneous_fit import CONTRADICTION_SD
 
@@ -27,6 +27,9 @@ GOOD_MOMENT_NM, OKAY_MOMENT_NM = (30.0, 50.0), (50.0, 75.0)
 """Residual moment: largest RMS, largest peak."""
 PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
+
+_ROUNDING = 1e-6
+_NAMED = 4
 
 
 class Verdict(NamedTuple):
@@ -52,20 +55,27 @@ def stands_against(found: Iterable[Verdict]) -> bool:
 def _convergence(fit: Fit) -> Verdict:
     if fit.converged:
         return Verdict("good", "the estimate converged")
-    return Verdict("against", "the estimate did not converge: its numbers are those of the best step so far")
+    return Verdict("against", "the estimate did not converge: the best step is reported")
+
+
+def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
+    """Segments that no distribution of mass can have.
+
+    Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
+    the triangle inequality, as rounded inertias have it) is let pass.
+    """
+    table, second = bsp.table(), np.linalg.eigvalsh(second_moments(bsp.inertia_kgm2))
+    there = table[:, [0, *range(4, 10)]].any(axis=1)
+    wrong = (bsp.mass_kg <= 0) | (second[:, 0] < -_ROUNDING * np.abs(second).max(axis=1))
+    return [bsp.segments[i] for i in np.flatnonzero(there & wrong)]
 
 
 def _physics(bsp: BodySegmentParameters) -> Verdict:
-    """Bodies without any mass and inertia, as OpenSim models have them, are not judged."""
-    there = bsp.table()[:, [0, *range(4, 10)]].any(axis=1)
-    impossible = [bsp.segments[i] for i in np.flatnonzero(there & ~bsp.physically_consistent())]
+    impossible = impossible_segments(bsp)
     if not impossible:
         return Verdict("good", "every segment is physically possible")
-    return Verdict(
-        "against",
-        f"physically impossible segments: {len(impossible)} of {there.sum()} ({', '.join(impossible)}); no body has "
-        f"such mass and inertia",
-    )
+    named = ", ".join(impossible[:_NAMED]) + (f" and {len(impossible) - _NAMED} more" if impossible[_NAMED:] else "")
+    return Verdict("against", f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({named})")
 
 
 def _literature(fit: Fit) -> Verdict:
@@ -86,10 +96,7 @@ def _literature(fit: Fit) -> Verdict:
     said = f"{what} from the literature: {far or 'none'} (farthest, {told})"
     if not far:
         return Verdict("good", said)
-    return Verdict(
-        "against",
-        f"{said}: the data contradict the model; a wrong joint, plate or marker is likelier than an odd person",
-    )
+    return Verdict("against", f"{said}: the data contradict the model")
 
 
 def _residuals(trial: TrialFit) -> list[Verdict]:
