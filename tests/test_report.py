@@ -27,13 +27,13 @@ PARTS = ["verdict", "bsp", "residuals", "kinematics", "moments", "markers", "vie
 
 @pytest.fixture(scope="module")
 def fit(demo_run):
-    """The demo's simultaneous fit."""
-    return demo_run[0].simultaneous
+    """The demo's fit, with error bars."""
+    return demo_run[0].fit
 
 
 @pytest.fixture(scope="module")
 def two_level(demo_run):
-    return demo_run[0].fit
+    return demo_run[0].two_level
 
 
 @pytest.fixture(scope="module")
@@ -217,6 +217,7 @@ def prolonged(trial, times):
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
         moments={stage: again(values) for stage, values in trial.moments.items()},
+        moment_sd=again(trial.moment_sd),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
     )
 

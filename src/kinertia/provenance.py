@@ -28,11 +28,6 @@ class Provenance:
     command: str
     files: Mapping[str, str]
 
-    def moved(self, before: Path, after: Path) -> Provenance:
-        """The same with files of one folder told to be in another."""
-        places = {Path(path): code for path, code in self.files.items()}
-        return Provenance(self.command, {str(after / path.relative_to(before)): code for path, code in places.items()})
-
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     """The command with the hashes of all files that the subject file names."""
