@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from command_line import run
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject
 from kinertia.dynamics import Motion
@@ -243,6 +245,20 @@ def test_command_and_hashes_are_in_the_report(demo_run):
         assert hashlib.sha256((folder / "lab" / name).read_bytes()).hexdigest() in told
     assert "neither command nor files" not in told
     assert "neither command nor files" in render(demo.fit)
+
+
+def test_the_command_in_a_report_repeats_the_fit(demo_run, tmp_path):
+    lab, folder = demo_run[1] / "lab", tmp_path / "my results"
+    given = ("fit", lab / "walk.trc", "--forces", lab / "walk_grf.mot", "--static", lab / "static.trc")
+    given = (*given, "--mass", 72.6, "--height", 1.803, "--sex", "male", "-o", folder)
+    assert run(*given).status in (0, 1)
+    told = Elements((folder / "report.html").read_text()).text
+    command = next(line for line in told.splitlines() if "kinertia fit" in line)
+    again = shlex.split(command[command.index("kinertia fit") :])
+    assert sorted(again[1:]) == sorted(map(str, given))
+    results = (folder / "bsp.csv").read_text()
+    assert run(*again[1:]).status in (0, 1)
+    assert (folder / "bsp.csv").read_text() == results
 
 
 def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):

@@ -21,8 +21,7 @@ class Provenance:
 
     Attributes:
         command: as typed on a command line.
-        files: SHA-256 of every input file, by its path from the folder that holds them all; reports travel, and the
-            folders of a laboratory are nobody's business.
+        files: SHA-256 of every input file, by its path from the folder that holds them all.
     """
 
     command: str
