@@ -39,6 +39,7 @@ from kinertia.study import MARGIN_S, START_SHARE, symmetric_truth
 from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.trial import FootLoads, Markers, Trial
 from kinertia.two_level import Window, estimate_two_level
+from kinertia.unknowns import gait27_unknowns
 from measured_trials import results, table
 from walks import WALKS, data_folder
 
@@ -278,7 +279,7 @@ def timed(duration_s: float) -> Timing:
     kinematics = kinematics_of(trial, moved)
     with threadpool_limits(1):
         started = time.perf_counter()
-        fitted = fit_simultaneous(trial.skeleton, person.literature, [kinematics], CUTOFF_HZ)
+        fitted = fit_simultaneous(trial.skeleton, gait27_unknowns(person.literature), [kinematics], CUTOFF_HZ)
         seconds = time.perf_counter() - started
     steps = fitted.result.iterations
     return Timing(duration_s, len(trial.time), steps, seconds, 1e6 * bare_calls(trial) / len(trial.time))

@@ -15,6 +15,7 @@ from kinertia.prepare import TrialInput
 from kinertia.results import save_fit
 from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, JOINT_CENTRE_SD_M, PLATE_SD_M, fit_simultaneous
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+from kinertia.unknowns import gait27_unknowns
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,9 @@ def fitted(trial: SyntheticTrial, literature=None, disturb=lambda positions, loa
     disturb(positions, loads)
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
     with threadpool_limits(1, user_api="blas"):
-        return fit_simultaneous(trial.skeleton, literature or walking_subject().literature, [kinematics], "gcv")
+        return fit_simultaneous(
+            trial.skeleton, gait27_unknowns(literature or walking_subject().literature), [kinematics], "gcv"
+        )
 
 
 @pytest.fixture(scope="module")

@@ -22,6 +22,7 @@ from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.simultaneous_fit import fit_simultaneous
 from kinertia.skeleton import Skeleton
 from kinertia.synthetic import walk, walking_subject
+from kinertia.unknowns import gait27_unknowns
 
 DURATION_S = 2.5
 CLASSES = {
@@ -143,7 +144,7 @@ def run_draw(seed: int, case: tuple[str, int]) -> Draw:
     trial = walk(replace(subject, bsp=prior.draw(of_person)), DURATION_S, trapezoid=False)
     skeleton, kinematics = measured(trial, scenario.faults, of_noise)
     if scenario.calibrated:
-        fitted = fit_simultaneous(skeleton, subject.literature, [kinematics], "gcv")
+        fitted = fit_simultaneous(skeleton, gait27_unknowns(subject.literature), [kinematics], "gcv")
         result, motion = fitted.result, fitted.motions[0]
     else:
         seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)

@@ -6,7 +6,7 @@ Errors come before the estimation, warnings after it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from kinertia.two_level import TwoLevelResult
 if TYPE_CHECKING:
     from kinertia.fit import TrialFit
 
+T = TypeVar("T")
+
 FORCE_MASS_TOLERANCE = 0.02
 """Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
 CONTRADICTING_MASS = 0.10
@@ -29,15 +31,21 @@ ESTIMATE_TOLERANCE = 0.03
 """Scale and estimated total mass may differ by this share before a warning."""
 
 
-def known(value: float | None) -> float:
-    """The value of a field that `complete_subject` has filled in."""
+def known(value: T | None) -> T:
+    """The value of a field that the subject file or `complete_subject` has filled in."""
     if value is None:
         raise ValueError("complete_subject must come first")
     return value
 
 
-def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple[Subject, list[str]]:
+def complete_subject(
+    subject: Subject, recordings: Sequence[Recording], mass_only: bool = False
+) -> tuple[Subject, list[str]]:
     """Mass and height from the files where the user gave none; warnings where both are given and disagree.
+
+    Args:
+        subject, recordings: what the user says, and the files.
+        mass_only: height and sex may stay unknown.
 
     Raises:
         SubjectError: neither the user nor a file gives mass or height, or the value cannot be true.
@@ -48,6 +56,8 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple
         told = [(r.name, getattr(r, quantity)) for r in recordings if getattr(r, quantity) is not None]
         given = getattr(subject, quantity)
         if given is None and not told:
+            if mass_only and quantity == "height_m":
+                continue
             raise SubjectError(
                 quantity, None, f"no file carries it; give it with {option} or as {quantity} under [subject]"
             )
@@ -55,7 +65,7 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple
         for name, value in told:
             if abs(value - found[quantity]) > 0.01 * found[quantity]:
                 warnings.append(f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}")
-    check_subject(found["mass_kg"], found["height_m"], subject.sex)
+    check_subject(found["mass_kg"], found.get("height_m", 1.7), subject.sex or "male")
     return subject.model_copy(update=found), warnings
 
 

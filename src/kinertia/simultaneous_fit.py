@@ -8,19 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.dynamics import Motion
-from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.identifiability import BaseParameters, base_parameters
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
+from kinertia.unknowns import Unknowns
 
-JOINT_CENTRE_SD_M = 0.010
-MARKER_SD_M = 0.005
-"""The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
 PLATE_SD_M = 0.010
 GAIN_SD = 0.02
 """Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
@@ -53,7 +49,8 @@ class Posterior:
     @property
     def information(self) -> np.ndarray:
         """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything."""
-        return 1.0 - np.square(self.sd / self.prior_sd)
+        known = self.prior_sd > 0  # segments that are held have no deviation
+        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +59,8 @@ class SimultaneousFit:
 
     Attributes:
         result: of the estimator.
+        bsp: all segments, those that are held included.
+        skeleton: with the estimated marker positions and static coordinates.
         posterior: deviations and calibration.
         motions: per trial, at the frames of its measured window.
         foot_loads: per trial (w, 2, 6) at the corrected place and time.
@@ -69,6 +68,8 @@ class SimultaneousFit:
     """
 
     result: SimultaneousResult
+    bsp: BodySegmentParameters
+    skeleton: Skeleton
     posterior: Posterior
     motions: tuple[Motion, ...]
     foot_loads: tuple[np.ndarray, ...]
@@ -77,48 +78,59 @@ class SimultaneousFit:
 
 def fit_simultaneous(
     skeleton: Skeleton,
-    literature: BodySegmentParameters,
+    unknowns: Unknowns,
     trials: Sequence[Kinematics],
     cutoff_hz: float | str,
 ) -> SimultaneousFit:
-    """Estimate motion, BSPs and calibration of all trials together, with the literature as the prior.
+    """Estimate motion, BSPs and calibration of all trials together.
 
     Args:
         skeleton: calibrated.
-        literature: body segment parameters whose total mass is the scale's.
+        unknowns: what may change and how far.
         trials: kinematics of the trials.
         cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
     """
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    prior = literature_prior(literature)
-    seen = [observe(used, k, literature.total_mass_kg, cutoff) for k in trials]
-    centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
-    places = np.full(len(used.markers), MARKER_SD_M)
-    calibration = CalibrationPrior(dict.fromkeys(centres, JOINT_CENTRE_SD_M), places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    used = used.carrying(unknowns.held)
+    prior = unknowns.prior
+    seen = [observe(used, k, unknowns.total_mass_kg, cutoff) for k in trials]
+    places = np.full(len(used.markers), unknowns.marker_sd_m)
+    calibration = CalibrationPrior(unknowns.centres, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
     loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
+    covariance, before = (unknowns.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
-        prior.sd,
-        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
-        result.bsp_covariance,
-        _calibration(used, result),
+        np.sqrt(np.diag(before)).reshape(-1, 10),
+        np.sqrt(np.diag(covariance)).reshape(-1, 10),
+        covariance,
+        _calibration(used, unknowns, result),
         tuple(noise for _, noise in seen),
         result.iterations,
         base_parameters(
             result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o, _ in seen]
         ),
     )
-    return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
+    return SimultaneousFit(
+        result,
+        unknowns.whole(result.bsp),
+        result.skeleton.carrying(None),
+        posterior,
+        motions,
+        loads,
+        tuple(_warnings(unknowns, result, posterior, trials)),
+    )
 
 
-def _calibration(skeleton: Skeleton, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
+def _calibration(
+    skeleton: Skeleton, unknowns: Unknowns, result: SimultaneousResult
+) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
-        found[name] = {"value": change, "prior_sd": JOINT_CENTRE_SD_M, "sd": sd, "unit": "m"}
+        found[name] = {"value": change, "prior_sd": unknowns.centres[name], "sd": sd, "unit": "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for axis, value, deviation in zip("xz", values, sds, strict=False):
@@ -135,9 +147,9 @@ _SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
 
 
 def _warnings(
-    prior: BspPrior, result: SimultaneousResult, posterior: Posterior, trials: Sequence[Kinematics]
+    unknowns: Unknowns, result: SimultaneousResult, posterior: Posterior, trials: Sequence[Kinematics]
 ) -> list[str]:
-    found = []
+    prior, found = unknowns.prior, []
     if not result.converged:
         found.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
@@ -157,6 +169,6 @@ def _warnings(
     for i, k in np.argwhere(np.abs(away) > _CONTRADICTION):
         found.append(
             f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
-            f"deviations from the literature; a wrong joint, plate or marker is likelier than an odd person"
+            f"deviations from {unknowns.source}; a wrong joint, plate or marker is likelier than an odd person"
         )
     return found
