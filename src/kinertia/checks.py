@@ -138,9 +138,16 @@ def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
 
 
 def fit_warnings(
-    mass_kg: float, literature: BodySegmentParameters, estimate: BodySegmentParameters, trials: Sequence[TrialFit]
+    mass_kg: float,
+    literature: BodySegmentParameters,
+    estimate: BodySegmentParameters,
+    trials: Sequence[TrialFit],
+    source: str = "the literature",
 ) -> list[str]:
-    """What the user should know before using the numbers, whatever the estimator."""
+    """What the user should know before using the numbers, whatever the estimator.
+
+    `source` says where the parameters before the estimate come from.
+    """
     found = []
     for trial in trials:
         by_force = mass_from_force_kg(literature, trial)
@@ -159,7 +166,7 @@ def fit_warnings(
     worst = int(np.argmax(moved))
     if moved[worst] > 0.1:
         found.append(
-            f"the estimate contradicts the literature: the centre of mass of {estimate.segments[worst]} "
+            f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
             f"moved by {moved[worst] * 1e3:.0f} mm"
         )
     return found

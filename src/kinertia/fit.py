@@ -192,7 +192,9 @@ def _fitted(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
     warnings = (
         *ready.warnings,
         *outcome.warnings,
-        *fit_warnings(known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials),
+        *fit_warnings(
+            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.unknowns.source
+        ),
     )
     return Fit(
         subject=ready.subject,

@@ -21,6 +21,8 @@ from kinertia.skeleton import Pose, Skeleton
 from kinertia.trial import Markers
 
 _WARM_START_EVERY = 10
+_FAR = 1.0
+"""Rad or m between frames a tenth of a second apart: more than a person moves."""
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
@@ -77,7 +79,7 @@ def solve_ik(
     used = [m for m in skeleton.markers if m.label in markers.labels]
     model = skeleton.with_markers(used)
     measured = markers.positions[:, [markers.labels.index(m.label) for m in used]]
-    q = np.zeros((len(measured), len(model.coordinates)))
+    q = np.tile([model.start.get(name, 0.0) for name in model.coordinates], (len(measured), 1))
     q[:, :6], placed = _place_root(model, measured, name)
     if not placed.any():
         raise TrialError(
@@ -88,19 +90,42 @@ def solve_ik(
     if consecutive and len(fine) > 1:
         coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
         q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse])
+        _carry_on(model, measured[coarse], q_coarse)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
     q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine])
     errors = np.full(measured.shape[:2], np.nan)
-    modelled = model.marker_positions(model.pose(q[fine]))
-    errors[fine] = np.linalg.norm(measured[fine] - modelled, axis=-1)
+    errors[fine] = _errors(model, measured[fine], q[fine])
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
     q[:, :6] = model.root.turned_back(q[:, :6])
     if consecutive:
         _unwrap(q, model)
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
+
+
+def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> None:
+    """Start frames that lie far from their neighbour again from there; they keep what fits better.
+
+    An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
+    """
+    count = len(q)
+    for order, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
+        for k in order:
+            change = q[k] - q[k + step]
+            change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
+            if np.abs(change).max() < _FAR:
+                continue
+            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]])
+            old, new = (np.nansum(np.square(_errors(model, measured[[k]], at))) for at in (q[[k]], again))
+            if new < old:
+                q[k] = again[0]
+
+
+def _errors(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """(n, m) distances between measured and model markers."""
+    return np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> None:

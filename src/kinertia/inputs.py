@@ -36,6 +36,9 @@ def _static(wanted: SubjectFile) -> Path:
 def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> list[TrialInput]:
     """The trials by their names in the subject file.
 
+    Columns of the same name in the force files of two trials need not come from the same plate (laboratories sort steps
+    into such files), so each trial's are plates of their own; the plates of C3D files are those of the laboratory.
+
     Raises:
         KinertiaError: a file is missing or broken.
     """
@@ -45,5 +48,8 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
         started = time.perf_counter()
         recording = read_recording(files.markers, files.forces, files.loads)
         seconds = time.perf_counter() - started
-        inputs.append(TrialInput(replace(recording, name=files.name), files.window_s, seconds))
+        plates = recording.plates
+        if plates is not None and files.forces is not None and len(wanted.trials) > 1:
+            plates = replace(plates, names=tuple(f"{name} ({files.name})" for name in plates.names))
+        inputs.append(TrialInput(replace(recording, name=files.name, plates=plates), files.window_s, seconds))
     return inputs

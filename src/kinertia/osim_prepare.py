@@ -24,7 +24,7 @@ from kinertia.kinematics import solve_kinematics
 from kinertia.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.skeleton import Axis, Skeleton
 from kinertia.trial import Trial
-from kinertia.unknowns import FIXED_MARKER_SD_M, JOINT_CENTRE_SD_M, MARKER_SD_M, Unknowns
+from kinertia.unknowns import JOINT_CENTRE_SD_M, MARKER_SD_M, Unknowns
 
 LIGHT_KG = 0.5
 """Bodies that weigh less together than this move with their joints, but are not estimated."""
@@ -200,7 +200,7 @@ def osim_unknowns(skeleton: Skeleton, own: BodySegmentParameters, calibrate: boo
         prior,
         part(rest) if rest else None,
         dict.fromkeys(offsets, JOINT_CENTRE_SD_M),
-        MARKER_SD_M if calibrate else FIXED_MARKER_SD_M,
+        MARKER_SD_M if calibrate else None,
         "the model's own",
     )
 

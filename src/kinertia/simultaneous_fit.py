@@ -21,6 +21,8 @@ PLATE_SD_M = 0.010
 GAIN_SD = 0.02
 """Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
 CLOCK_SD_S = 0.005
+_STAYING_SD_M = 1e-6
+"""Of markers that stay where they are."""
 _NOTABLE = 2.0
 _CONTRADICTION = 3.0
 
@@ -96,9 +98,11 @@ def fit_simultaneous(
     used = used.carrying(unknowns.held)
     prior = unknowns.prior
     seen = [observe(used, k, unknowns.total_mass_kg, cutoff) for k in trials]
-    places = np.full(len(used.markers), unknowns.marker_sd_m)
+    stay = unknowns.marker_sd_m is None
+    places = np.full(len(used.markers), _STAYING_SD_M if stay else unknowns.marker_sd_m)
     calibration = CalibrationPrior(unknowns.centres, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
+    found = result.skeleton.carrying(None)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
     loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
     covariance, before = (unknowns.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
@@ -116,7 +120,7 @@ def fit_simultaneous(
     return SimultaneousFit(
         result,
         unknowns.whole(result.bsp),
-        result.skeleton.carrying(None),
+        found.with_markers(used.markers) if stay else found,
         posterior,
         motions,
         loads,

@@ -14,8 +14,6 @@ from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 JOINT_CENTRE_SD_M = 0.010
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
-FIXED_MARKER_SD_M = 1e-6
-"""Stands for markers that stay where the model has them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +25,7 @@ class Unknowns:
         prior: of the body segment parameters to be estimated.
         held: of the segments that are not estimated; None where all are.
         centres: static coordinate of the skeleton (locked) -> prior deviation, m.
-        marker_sd_m: prior deviation of marker positions in their segments, each axis.
+        marker_sd_m: prior deviation of marker positions in their segments, each axis; None: they stay where they are.
         source: where the prior's mean comes from, for messages.
     """
 
@@ -35,7 +33,7 @@ class Unknowns:
     prior: BspPrior
     held: BodySegmentParameters | None
     centres: Mapping[str, float]
-    marker_sd_m: float
+    marker_sd_m: float | None
     source: str
 
     @property
