@@ -9,7 +9,6 @@ import contextlib
 import io
 import json
 import tempfile
-import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -32,11 +31,11 @@ def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
     return {**json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
 
 
-def worst_com_shift(bsp: pd.DataFrame) -> tuple[str, float]:
-    """The segment whose CoM moved most from the literature's, and by how much (m)."""
-    com = bsp[bsp["parameter"].str.startswith("com")]
-    moved = (com["estimate"] - com["literature"]).pow(2).groupby(com["segment"]).sum().pow(0.5)
-    return str(moved.idxmax()), float(moved.max())
+def farthest(bsp: pd.DataFrame) -> str:
+    """The parameter that is farthest from the literature's, in prior deviations."""
+    away = (bsp["estimate"] - bsp["literature"]) / bsp["prior_sd"]
+    worst = away.abs().idxmax()
+    return f"{bsp['parameter'][worst]} of {bsp['segment'][worst]} {away[worst]:+.1f}"
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -101,7 +100,7 @@ motion that goes with the estimate.
 ## Residual at the pelvis
 
 RMS (maximum) over the frames used. *Literature*: literature BSPs on the smoothed motion. *Corrected*: literature BSPs
-with pelvis correction. *Estimate*: two-level estimate of the BSPs with pelvis correction.
+with pelvis correction. *Estimate*: BSPs, motion and calibration of the simultaneous estimate.
 
 {residuals}
 
@@ -110,6 +109,9 @@ with pelvis correction. *Estimate*: two-level estimate of the BSPs with pelvis c
 {masses}
 
 ## What the estimated body segment parameters are worth
+
+How many of the 120 parameters the walk measures (information above 0.75), informs on (0.25 to 0.75) or leaves assumed;
+see [accuracy](accuracy.md) for what the deviations are worth.
 
 {_worth(runs)}
 
@@ -126,31 +128,12 @@ On the machine that wrote this page; see [speed](speed.md) for times next to Ope
 
 
 def _worth(runs: dict[str, dict[str, Any]]) -> str:
-    shifts = {name: worst_com_shift(run["bsp"]) for name, run in runs.items()}
-    worst = max(shifts, key=lambda name: shifts[name][1])
-    listed = ", ".join(f"{WALKS[name]} {segment} {_length(moved)}" for name, (segment, moved) in shifts.items())
-    impossible = sum(any("physically impossible" in warning for warning in run["warnings"]) for run in runs.values())
-    lowered = [
-        run["trials"][0]["residual_force_rms_N"]["estimate"] / run["trials"][0]["residual_force_rms_N"]["corrected"]
-        for run in runs.values()
-    ]
-    paragraphs = [
-        f"**They are not believable as this person's.** The estimate explains the forces: the residual force falls to "
-        f"{100 * min(lowered):.0f} to {100 * max(lowered):.0f} % of what the corrected literature model leaves. But in "
-        f"{impossible} of the {len(runs)} walks it does so with segments that no body can have, and centres of mass go "
-        f"far from where they can be. The farthest from the literature's, walk by walk: {listed}. The worst is "
-        f"{shifts[worst][0]} in the {WALKS[worst]}, {_length(shifts[worst][1])} off.",
-        "This is what the study behind the method found. With perfect synthetic measurements the same estimator finds "
-        "every parameter; with skin-motion noise of 4 mm RMS it was wrong by 18 cm RMS in the centres of mass, and "
-        "correcting the pelvis rescued only part of it. Small residuals alone prove nothing: six pelvis coordinates "
-        "and dozens of free parameters absorb six residuals. Use the estimate to reproduce or compare the method; for "
-        "joint loads of this person use `inverse_dynamics_literature.sto`.",
-    ]
-    return "\n\n".join(textwrap.fill(paragraph, 120) for paragraph in paragraphs)
-
-
-def _length(metres: float) -> str:
-    return f"{metres:.2f} m" if metres >= 1 else f"{metres * 1e3:.0f} mm"
+    rows = []
+    for name, run in runs.items():
+        words = run["bsp"]["evidence"].value_counts()
+        counts = [str(words.get(word, 0)) for word in ("measured", "informed", "assumed")]
+        rows.append([WALKS[name], farthest(run["bsp"]), *counts])
+    return table(["walk", "farthest from the literature (prior deviations)", "measured", "informed", "assumed"], rows)
 
 
 def main() -> None:

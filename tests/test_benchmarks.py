@@ -14,16 +14,17 @@ def test_there_and_back_does_not_jump():
     np.testing.assert_array_equal(stages.there_and_back(np.array([1, 2, 3]), 3), [1, 2, 3, 2, 1, 2, 3])
 
 
-def test_worst_com_shift():
+def test_farthest_from_the_literature():
     bsp = pd.DataFrame(
         {
-            "segment": ["a"] * 3 + ["b"] * 3,
-            "parameter": ["mass", "com_x", "com_z"] * 2,
-            "literature": [1.0, 0.0, 0.1, 2.0, 0.0, 0.0],
-            "estimate": [9.0, 0.3, 0.5, 2.0, 0.4, 0.0],
+            "segment": ["a"] * 2 + ["b"] * 2,
+            "parameter": ["mass", "com_x"] * 2,
+            "literature": [1.0, 0.0, 2.0, 0.0],
+            "estimate": [9.0, 0.3, 2.0, -0.4],
+            "prior_sd": [9.0, 0.1, 1.0, 0.1],
         }
     )
-    assert measured_trials.worst_com_shift(bsp) == ("a", pytest.approx(0.5))
+    assert measured_trials.farthest(bsp) == "com_x of b -4.0"
 
 
 def test_page_of_measured_trials(fit_of):

@@ -4,10 +4,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.checks import check_masses, complete_subject, fit_warnings, mass_from_force_kg, two_level_warnings
+from kinertia.checks import (
+    check_masses,
+    check_same_person,
+    complete_subject,
+    fit_warnings,
+    mass_from_force_kg,
+    two_level_warnings,
+)
 from kinertia.config import Subject
 from kinertia.errors import SubjectError, TrialError
-from kinertia.trial import Markers, Recording
+from kinertia.synthetic import walk, walking_subject
+from kinertia.trial import FootLoads, Markers, Recording, Trial
 
 MARKERS = Markers(np.array([0.0, 0.1]), ("A",), np.zeros((2, 1, 3)))
 STATIC = Recording("static", MARKERS, mass_kg=60.0, height_m=1.7)
@@ -92,3 +100,23 @@ def test_masses_that_contradict_each_other_or_the_scale():
         check_masses(70.0, {"a": 70.0, "b": 90.0})
     with pytest.raises(TrialError, match=r"trial 'a'.*60\.0 kg, the scale says 70\.0 kg"):
         check_masses(70.0, {"a": 60.0, "b": 63.5})
+
+
+def two_trials(stretch_m=0.0, label="R.Shank.Rear"):
+    made = walk(walking_subject(), 0.3)
+    trials = []
+    for name, more in (("one", 0.0), ("two", stretch_m)):
+        positions = made.markers.positions.copy()
+        positions[:, made.markers.labels.index(label), 1] += more
+        loads = FootLoads(made.time, made.foot_loads[..., :3], made.foot_loads[..., 3:])
+        trials.append(Trial(name, replace(made.markers, positions=positions), loads, np.ones(len(made.time), bool)))
+    return made.skeleton, trials
+
+
+def test_trials_of_one_person_may_differ_a_little():
+    check_same_person(*two_trials(0.03))
+
+
+def test_trials_of_different_people_are_not_pooled():
+    with pytest.raises(TrialError, match=r"trial 'two'.*R\.Shank\.Rear.*mm apart, in 'one' \d+ mm; pool only"):
+        check_same_person(*two_trials(-0.08))

@@ -6,6 +6,8 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from importlib.metadata import version
 
 import pytest
@@ -13,6 +15,7 @@ from rich.console import Console
 
 from command_line import fitted, run
 from kinertia import terminal
+from kinertia.verdict import OKAY_FORCE_N, OKAY_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
 from walks import fit_arguments
 
 
@@ -22,6 +25,28 @@ def test_version_and_help():
     assert shown.status == 0
     for word in ("--static", "--forces", "--loads", "--mass", "--height", "--sex", "--markers", "--method", "-o"):
         assert word in shown.out
+
+
+def test_help_reads_like_a_manual():
+    shown = run("--help")
+    text = " ".join(shown.out.split())
+    assert max(map(len, shown.out.splitlines())) <= 80
+    steps = [text.index(f"kinertia {command} ") for command in ("demo", "init", "check", "fit")]
+    assert steps == sorted(steps)
+    for status in ("0 done", "1 done, but a verdict is against", "2 a mistake", "130 interrupted"):
+        assert status in text
+    for limit in (*OKAY_FORCE_N, *OKAY_MOMENT_NM, 100 * PEAK_FORCE_SHARE):  # the manual says what the verdicts do
+        assert f" {limit:g} " in text
+    assert "no such option" in run("fit", "--nonsense").err.lower()
+
+
+@pytest.mark.parametrize("command", ["demo", "init", "check", "fit", "study table1"])
+def test_every_command_has_an_example_and_every_example_can_be_parsed(command):
+    shown = " ".join(run(*command.split(), "--help").out.split())
+    assert re.search(rf"Examples? kinertia {command}", shown)
+    known = {*run(*command.split(), "--help").out.split()}
+    for option in re.findall(r"--\w+", shown.split("Example", 1)[1].split("╭", 1)[0]):
+        assert option in known
 
 
 def test_installed_command():
@@ -67,6 +92,20 @@ def test_progress_is_a_bar_on_a_terminal(monkeypatch):
     assert "\r" in screen.getvalue()
 
 
+def test_progress_tells_the_time_left_of_the_stage(monkeypatch):
+    screen = io.StringIO()
+    monkeypatch.setattr(terminal, "err", Console(file=screen, force_terminal=True, width=80))
+    with terminal.shown_progress() as progress:
+        progress("reading", 0.9)
+        progress("estimate", 0.0)
+        for share in (0.2, 0.4, 0.6):
+            time.sleep(0.15)
+            progress("estimate", share)
+        time.sleep(0.15)
+    last = re.findall(r"estimate .*?left (\S+)", screen.getvalue())
+    assert re.search(r"0:00:0[01]", last[-1])
+
+
 @pytest.fixture
 def person(tmp_path, shared_data):
     """A folder with the two C3D files of one person."""
@@ -97,6 +136,80 @@ def test_init_then_fill_in_then_fit(person):
     assert fit.trial["window_s"] == pytest.approx([2.8, 3.05])
     assert "anna [b]: 41.5 kg" in fit.outcome.out
     assert "walk: 2.800 to 3.050 s used" in " ".join(fit.outcome.out.split())
+
+
+@pytest.fixture
+def fit_at_once(monkeypatch, short_fit, person):
+    """`kinertia fit` with these options on a fit that is there already and did not converge; counts its runs."""
+    done = []
+
+    def run_fit(_):
+        done.append(1)
+        return replace(short_fit, converged=False)
+
+    monkeypatch.setattr("kinertia.cli._run", run_fit)
+
+    def fit(*options):
+        return run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", *options)
+
+    fit.runs = done
+    return fit
+
+
+def test_a_verdict_against_is_status_1_and_the_results_are_there(fit_at_once, tmp_path):
+    outcome = fit_at_once("-o", tmp_path / "out")
+    assert outcome.status == 1
+    assert "against: the estimate did not converge" in outcome.out
+    assert json.loads((tmp_path / "out" / "fit.json").read_text())["converged"] is False
+    assert "assumed: " not in outcome.out
+    loud = fit_at_once("-o", tmp_path / "out", "--verbose")
+    assert "assumed: marker set: Plug-in Gait" in loud.out
+    assert "early: seconds: read 0.2" in " ".join(loud.out.split())
+    assert loud.out.count("good: ") > outcome.out.count("good: ")
+
+
+def test_nothing_against_is_status_0(fit_at_once, tmp_path, monkeypatch):
+    monkeypatch.setattr("kinertia.cli.verdicts", lambda fit: [Verdict("okay", "so so"), Verdict("good", "fine")])
+    outcome = fit_at_once("-o", tmp_path / "out")
+    assert outcome.status == 0
+    assert "okay: so so" in outcome.out
+    assert "good: 1 of 2 verdicts" in outcome.out
+
+
+def test_quiet_fit_says_nothing(fit_at_once, tmp_path):
+    outcome = fit_at_once("-o", tmp_path / "out", "--quiet")
+    assert (outcome.status, outcome.out, outcome.err) == (1, "", "")
+    assert (tmp_path / "out" / "fit.json").exists()
+    refused = run("fit", tmp_path / "none.toml", "-q")
+    assert (refused.status, refused.out) == (2, "")
+    assert refused.err.startswith("error: ")
+
+
+def test_quiet_progress(monkeypatch):
+    screen = io.StringIO()
+    monkeypatch.setattr(terminal, "err", Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(terminal.out, "quiet", True)
+    with terminal.shown_progress() as progress:
+        progress("reading", 0.9)
+    assert screen.getvalue() == ""
+
+
+def test_results_never_go_among_somebody_elses_files_unasked(fit_at_once, tmp_path):
+    """Refused before any work; with --force the others stay; its own results are replaced unasked."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.tex").write_text("mine")
+    for command in (fit_at_once, lambda *options: run("demo", *options), lambda *o: run("study", "table1", *o)):
+        refused = command("-o", out)
+        assert refused.status == 2
+        assert re.search(r"out: holds files that are not results of Kinertia \(thesis\.tex\); .* --force", refused.err)
+        assert [path.name for path in out.iterdir()] == ["thesis.tex"]
+    assert not fit_at_once.runs
+    assert fit_at_once("-o", out, "--force").status == 1
+    assert (out / "thesis.tex").read_text() == "mine"
+    (out / "fit.json").write_text('{"kinertia": "an older one"}')
+    assert fit_at_once("-o", out).status == 1
+    assert "older" not in (out / "fit.json").read_text()
 
 
 def test_init_leaves_an_existing_file_alone(person):
@@ -131,22 +244,31 @@ def test_one_walk_as_two_trials(tmp_path, shared_data):
     assert json.loads((fit.folder / "fit.json").read_text()) == fit.summary
 
 
-def test_interruption_leaves_nothing(tmp_path, person):
-    """As the shell's Ctrl-C does it: a signal in the middle of the work, once the first stage is told."""
+@pytest.mark.parametrize(
+    ("arguments", "stage"),
+    [
+        (["fit", "walk.c3d", "--static", "static.c3d", "--sex", "male"], "calibration"),
+        (["demo"], "inverse kinematics"),
+        (["study", "table1", "--repeats", "1"], "1 draws"),
+    ],
+)
+def test_interruption_leaves_nothing(tmp_path, person, arguments, stage):
+    """As the shell's Ctrl-C does it: a signal in the middle of the work, once this stage is told."""
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom kinertia.cli import main; main()"
     )
-    files = [person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", "-o", tmp_path / "deep" / "out"]
-    command = [sys.executable, "-c", code, "fit", *map(str, files)]
+    files = [str(person / word) if word.endswith(".c3d") else word for word in arguments]
+    command = [sys.executable, "-c", code, *files, "-o", str(tmp_path / "deep" / "out")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
-        while process.stderr.readline().strip() != "calibration":
+        while process.stderr.readline().strip() != stage:
             assert process.poll() is None
         os.kill(process.pid, signal.SIGINT)
         rest = process.stderr.read()
     assert process.returncode == 130
     assert "Traceback" not in rest
     assert not (tmp_path / "deep").exists()
+    assert [path.name for path in tmp_path.iterdir()] == [person.name]
 
 
 def test_trouble_with_the_disk_is_one_line(person, monkeypatch):

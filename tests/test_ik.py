@@ -42,6 +42,7 @@ def without(markers: Markers, labels, frames=slice(None)) -> Markers:
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), heading=st.floats(-3.0, 3.0))
 @example(seed=8912, heading=-1.40625)
+@example(seed=156, heading=0.25)
 def test_perfect_markers_give_back_the_coordinates(seed, heading):
     skeleton = generic_model().skeleton
     q = random_coordinates(skeleton, 4, seed, spread=0.6)

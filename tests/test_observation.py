@@ -94,3 +94,20 @@ def test_deviation_of_forces_grows_with_weight_and_with_repeated_frames(trial, w
     assert seen.moment_sd == pytest.approx(MOMENT_ARM_M * seen.force_sd)
     wide, _ = observed(trial, trial.markers, 100.0)
     assert wide.force_sd == pytest.approx(FORCE_SD_OF_WEIGHT * MASS_KG * GRAVITY_M_S2)
+
+
+def test_markers_that_err_together_count_as_few(trial):
+    """Skin motion moves all markers of a segment as one; noise of each marker on its own counts in full."""
+    rng = np.random.default_rng(3)
+    apart = camera_noise(trial.markers, 0.004, rng)
+    steps = rng.normal(0.0, 0.004, (len(trial.time), len(trial.skeleton.segments), 3))
+    shifted = trial.markers.positions + steps[:, trial.skeleton.marker_segments]
+    together = replace(trial.markers, positions=shifted)
+    ratios = []
+    for markers in (apart, together):
+        seen, noise = observed(trial, markers)
+        frames = noise.correlation_s * trial.markers.rate_hz
+        ratios.append(np.square(seen.marker_sd / np.array([noise.sd_m[n] for n in trial.skeleton.labels])) / frames)
+    assert np.median(ratios[0]) == pytest.approx(1.0, abs=0.1)
+    on_thigh = trial.skeleton.marker_segments == trial.skeleton.segments.index("thigh_r")
+    assert ratios[1][on_thigh] == pytest.approx(np.full(on_thigh.sum(), on_thigh.sum()), rel=0.4)

@@ -7,15 +7,16 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from accuracy import kinematics_of
+from kinertia.bsp_prior import literature_prior
 from kinertia.config import Settings, Subject
 from kinertia.fit import Fit, estimate_bsp
+from kinertia.freedom import JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.noise import camera_noise
 from kinertia.prepare import TrialInput
 from kinertia.results import save_fit
-from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, JOINT_CENTRE_SD_M, PLATE_SD_M, fit_simultaneous
+from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, PLATE_SD_M, fit_simultaneous
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
-from kinertia.unknowns import gait27_unknowns
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +31,8 @@ def fitted(trial: SyntheticTrial, literature=None, disturb=lambda positions, loa
     disturb(positions, loads)
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
     with threadpool_limits(1, user_api="blas"):
-        return fit_simultaneous(
-            trial.skeleton, gait27_unknowns(literature or walking_subject().literature), [kinematics], "gcv"
-        )
+        prior = literature_prior(literature or walking_subject().literature)
+        return fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from kinertia.errors import FileError
-from kinertia.io.trc import read_trc, read_trc_with_notes, write_trc
+from kinertia.io.trc import read_trc, read_trc_recording, write_trc
 from kinertia.trial import Markers
 
 HEADER = (
@@ -77,7 +77,9 @@ def _seconds(path):
 
 
 def test_rounded_times_are_put_back_on_their_grid(shared_data):
-    markers, notes = read_trc_with_notes(shared_data / "gait2354" / "subject01_walk1.trc")
+    recording = read_trc_recording(shared_data / "gait2354" / "subject01_walk1.trc")
+    markers, notes = recording.markers, recording.notes
+    assert recording.length_unit == "mm"
     np.testing.assert_allclose(markers.time, np.arange(151) / 60, atol=1e-12)
     assert len(notes) == 1
     assert "rounded by up to 0.33 ms" in notes[0]
@@ -123,7 +125,8 @@ def test_units(write, unit, metres):
 
 @pytest.mark.parametrize("cells", ["4\t5\t6\t\t\t", "4\t5\t6", "4\t5\t6\tNaN\tnan\tNaN", "4\t5\t6\t0\t0\t0.0"])
 def test_missing_markers(write, cells):
-    markers, notes = read_trc_with_notes(write(HEADER + ROWS.replace("1\t2\t3\t4\t5\t6", cells)))
+    recording = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3\t4\t5\t6", cells)))
+    markers, notes = recording.markers, recording.notes
     assert np.isnan(markers.positions[:, 1]).all()
     np.testing.assert_allclose(markers.positions[0, 0], [0.004, 0.005, 0.006])
     assert [note for note in notes if "0 0 0" in note] == list(notes)

@@ -18,13 +18,14 @@ from kinertia.disturbed import Faults, measured
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.parallel import in_parallel
-from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
-from kinertia.simultaneous_fit import fit_simultaneous
+from kinertia.predicted import Information
+from kinertia.simultaneous import estimate_simultaneous
+from kinertia.simultaneous_fit import calibration_prior, fit_simultaneous
 from kinertia.skeleton import Skeleton
 from kinertia.synthetic import walk, walking_subject
-from kinertia.unknowns import gait27_unknowns
 
 DURATION_S = 2.5
+SPACING_S = 1.0 / (2.0 * CUTOFF_HZ)
 CLASSES = {
     "mass": slice(0, 1),
     "CoM": slice(1, 4),
@@ -72,6 +73,8 @@ class Draw:
     Attributes:
         errors, literature_errors: (s, 10) estimate and literature minus truth, in the table's order and units.
         sd: (s, 10) posterior deviations.
+        bound: (s, 10) the same at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's own
+            noise model, prior included.
         angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
         angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
         converged: of the estimate.
@@ -80,6 +83,7 @@ class Draw:
     errors: np.ndarray
     literature_errors: np.ndarray
     sd: np.ndarray
+    bound: np.ndarray
     angles_rad: tuple[float, float]
     angle_changes_rad: tuple[float, float]
     converged: bool
@@ -94,6 +98,7 @@ class ClassAccuracy:
         cover_sd: its standard error over draws.
         ratio: RMS of error over posterior deviation.
         rms, rms_literature: RMS errors of the estimate and the literature, SI.
+        bound: RMS of the Cramér-Rao bound of the estimator's own noise model at the truth, prior included, SI.
         better: share of draws in which the RMS error is below the literature's.
     """
 
@@ -102,6 +107,7 @@ class ClassAccuracy:
     ratio: float
     rms: float
     rms_literature: float
+    bound: float
     better: float
 
 
@@ -143,20 +149,25 @@ def run_draw(seed: int, case: tuple[str, int]) -> Draw:
     prior = literature_prior(subject.literature)
     trial = walk(replace(subject, bsp=prior.draw(of_person)), DURATION_S, trapezoid=False)
     skeleton, kinematics = measured(trial, scenario.faults, of_noise)
+    seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)
+    calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
     if scenario.calibrated:
-        fitted = fit_simultaneous(skeleton, gait27_unknowns(subject.literature), [kinematics], "gcv")
+        fitted = fit_simultaneous(skeleton, prior, [kinematics], "gcv")
         result, motion = fitted.result, fitted.motions[0]
     else:
-        seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)
-        result = estimate_simultaneous(skeleton, prior, held(skeleton), [seen], 1.0 / (2.0 * CUTOFF_HZ))
+        result = estimate_simultaneous(skeleton, prior, calibration, [seen], SPACING_S)
         motion = result.motions[0].cut(np.flatnonzero(seen.dynamic))
+    at_truth = replace(seen, q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)])
+    there = replace(prior, mean=trial.bsp)
+    bound = Information.at(trial.skeleton, there, calibration, [at_truth], SPACING_S).sd([0])
     angles = np.flatnonzero(trial.skeleton.rotational)[3:]
     inside = np.searchsorted(trial.time, kinematics.time - 1e-9)
     off = [q[:, angles] - trial.motion.q[inside][:, angles] for q in (kinematics.ik.q[kinematics.frames], motion.q)]
     return Draw(
         result.bsp.table() - trial.bsp.table(),
         prior.mean.table() - trial.bsp.table(),
-        _sd(result),
+        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
+        bound,
         (_rms(off[0]), _rms(off[1])),
         (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
         result.converged,
@@ -171,7 +182,8 @@ def held(skeleton: Skeleton) -> CalibrationPrior:
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
     """Cover, ratio and errors by class."""
-    errors, before, sd = (np.array([getattr(d, name) for d in draws]) for name in ("errors", "literature_errors", "sd"))
+    errors, before = (np.array([getattr(d, name) for d in draws]) for name in ("errors", "literature_errors"))
+    sd, bound = (np.array([getattr(d, name) for d in draws]) for name in ("sd", "bound"))
     classes = {}
     for name, columns in CLASSES.items():
         away = errors[..., columns] / sd[..., columns]
@@ -183,6 +195,7 @@ def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
             _rms(away),
             float(np.sqrt(each.mean())),
             float(np.sqrt(each_before.mean())),
+            _rms(bound[..., columns]),
             float(np.mean(each < each_before)),
         )
     angles = [_rms(np.array([getattr(d, kind)[i] for d in draws])) for kind in _ANGLES for i in range(2)]
@@ -191,10 +204,6 @@ def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
 
 
 _ANGLES = ("angles_rad", "angle_changes_rad")
-
-
-def _sd(result: SimultaneousResult) -> np.ndarray:
-    return np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -90,6 +90,20 @@ def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
         raise SubjectError("sex", sex, "the tables know 'male' and 'female'; give the one to use.")
 
 
+def reference_lengths(height_m: float, sex: str) -> dict[str, float]:
+    """Segment lengths (m) of the tables' reference subjects, scaled by stature; names as in `BodyGeometry`.
+
+    For what nobody measured. Torso and foot are Dumas', the rest de Leva's.
+    """
+    dumas, deleva = _dumas_table(sex), _deleva_table(sex)
+    torso = dumas["thorax"].length_m + dumas["abdomen"].length_m
+    per_dumas = {"torso": torso, "foot": dumas["foot"].length_m}
+    per_deleva = {name: deleva[name].length_m for name in ("thigh", "shank", "upper_arm", "forearm")}
+    per_deleva["foot_total"] = deleva["foot"].length_m
+    lengths = {name: height_m * length / _DUMAS_STATURE_M[sex] for name, length in per_dumas.items()}
+    return lengths | {name: height_m * length / _DELEVA_STATURE_M[sex] for name, length in per_deleva.items()}
+
+
 def literature_bsp(
     mass_kg: float, height_m: float, sex: str, geometry: BodyGeometry, source: str = "dumas"
 ) -> BodySegmentParameters:

@@ -25,7 +25,8 @@ from itertools import product
 
 import numpy as np
 
-from kinertia.bsp import MIRROR_SIGNS, BodySegmentParameters, block_diagonal, second_moments
+from kinertia.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, block_diagonal, second_moments
+from kinertia.errors import PriorError
 from kinertia.log_cholesky import nearest_consistent
 
 MASS_SD = {
@@ -59,7 +60,7 @@ class BspPrior:
         mass_kg, mass_sd_kg: the total mass by the scale, and its deviation.
 
     Raises:
-        ValueError: the covariance has the wrong shape or is not positive definite, or a deviation is not positive.
+        PriorError: the covariance has the wrong shape or is not positive definite, or a deviation is not positive.
     """
 
     mean: BodySegmentParameters
@@ -70,12 +71,26 @@ class BspPrior:
     def __post_init__(self) -> None:
         size = 10 * len(self.mean.segments)
         if self.covariance.shape != (size, size):
-            raise ValueError(f"the covariance must be {size} x {size}, got {self.covariance.shape}")
-        if not np.all(np.diag(self.covariance) > 0) or self.mass_sd_kg <= 0:
-            raise ValueError("every prior deviation must be positive")
+            raise PriorError(
+                f"the covariance is {' x '.join(map(str, self.covariance.shape))}; expected {size} x {size}, ten "
+                f"parameters for each of {len(self.mean.segments)} segments"
+            )
+        variances = np.diag(self.covariance)
+        if not np.all(variances > 0):
+            k = int(np.argmin(variances > 0))
+            name = f"{self.mean.segments[k // 10]}.{PARAMETERS[k % 10]}"
+            raise PriorError(f"the variance of {name} is {variances[k]:g}; every deviation must be positive", name)
+        if not self.mass_sd_kg > 0:
+            raise PriorError(f"the deviation of the body mass is {self.mass_sd_kg:g} kg; it must be positive")
         correlation = self.covariance / np.outer(self.sd, self.sd)
-        if not np.allclose(correlation, correlation.T) or np.linalg.eigvalsh(correlation)[0] <= 0:
-            raise ValueError("the prior covariance must be symmetric and positive definite")
+        if not np.allclose(correlation, correlation.T):
+            raise PriorError("the covariance is not symmetric")
+        smallest = float(np.linalg.eigvalsh(correlation)[0])
+        if smallest <= 0:
+            raise PriorError(
+                f"the covariance is not positive definite (smallest eigenvalue of the correlations {smallest:.2g}); "
+                f"lower the correlations"
+            )
 
     @property
     def sd(self) -> np.ndarray:

@@ -6,6 +6,7 @@ Errors come before the estimation, warnings after it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -27,8 +28,12 @@ FORCE_MASS_TOLERANCE = 0.02
 """Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
 CONTRADICTING_MASS = 0.10
 """Scale and vertical force, or two trials, may differ by this share before the simultaneous estimate refuses."""
+_OTHER_PERSON_M, _OTHER_PERSON = 0.04, 0.15
+"""Two markers of a segment may differ in distance by this much between trials of one person: length, or share."""
 ESTIMATE_TOLERANCE = 0.03
 """Scale and estimated total mass may differ by this share before a warning."""
+CONTRADICTING_COM_M = 0.1
+"""A centre of mass this far from the literature contradicts it."""
 
 
 def known(value: T | None) -> T:
@@ -92,6 +97,41 @@ def check_visible(skeleton: Skeleton, trial: Trial) -> None:
                 f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are "
                 f"unknown; use a trial that has them",
             )
+
+
+def check_same_person(skeleton: Skeleton, trials: Sequence[Trial]) -> None:
+    """Raise TrialError when marker distances say that trials are of different people, or of one marked anew.
+
+    Compared are distances between markers of one segment of pelvis, legs and feet: median over the frames of a trial.
+    """
+    segments = dict(zip(skeleton.labels, skeleton.marker_segments, strict=True))
+    lower = {skeleton.segments[0], *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl")}
+    for first, other in combinations(trials, 2):
+        labels = [name for name in skeleton.labels if name in first.markers.labels and name in other.markers.labels]
+        pairs = [
+            (a, b)
+            for a, b in combinations(labels, 2)
+            if segments[a] == segments[b] and skeleton.segments[segments[a]] in lower
+        ]
+        if not pairs:
+            continue
+        long, short = (_median_distances(trial, pairs) for trial in (first, other))
+        off = np.abs(long - short)
+        wrong = np.nan_to_num(np.minimum(off / _OTHER_PERSON_M, off / (_OTHER_PERSON * long)))
+        k = int(np.argmax(wrong))
+        if wrong[k] > 1.0:
+            raise TrialError(
+                other.name,
+                f"the markers {pairs[k][0]} and {pairs[k][1]} are {short[k] * 1e3:.0f} mm apart, in '{first.name}' "
+                f"{long[k] * 1e3:.0f} mm; pool only trials of one person with the markers left in place",
+            )
+
+
+def _median_distances(trial: Trial, pairs: Sequence[tuple[str, str]]) -> np.ndarray:
+    ends = (trial.markers.arranged([pair[i] for pair in pairs]) for i in range(2))
+    distances = np.linalg.norm(np.subtract(*ends), axis=-1)
+    seen = np.isfinite(distances).any(axis=0)
+    return np.where(seen, np.nanmedian(np.where(seen, distances, 0.0), axis=0), np.nan)
 
 
 def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, residual: np.ndarray) -> float:
@@ -164,7 +204,7 @@ def fit_warnings(
         )
     moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
     worst = int(np.argmax(moved))
-    if moved[worst] > 0.1:
+    if moved[worst] > CONTRADICTING_COM_M:
         found.append(
             f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
             f"moved by {moved[worst] * 1e3:.0f} mm"

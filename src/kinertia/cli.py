@@ -1,27 +1,66 @@
-"""The command line: `kinertia fit`, `kinertia init`; `kinertia.cli_study` has the others."""
+"""The command line: `kinertia fit` and `init`; `kinertia.cli_check` and `kinertia.cli_study` have the others."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 from rich.text import Text
 
 from kinertia import __version__
+from kinertia.cli_check import check
+from kinertia.cli_options import Force, Output, Quiet, Verbose, results_folder
 from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
 from kinertia.fit import Fit, estimate_bsp, estimate_bsp_of_model
 from kinertia.identifiability import evidence
 from kinertia.inputs import read_inputs, read_trials
-from kinertia.io.folder import check_folder
 from kinertia.io.osim import read_osim
+from kinertia.io.sto import write_then_rename
 from kinertia.results import save_fit, summary
 from kinertia.subject_draft import init_subject
-from kinertia.terminal import err, out, plain_table, shown_progress
+from kinertia.terminal import out, plain_table, show_error, show_verdicts, shown_progress
+from kinertia.verdict import Verdict, stands_against, verdicts
+
+# typer keeps these line ends: at most 78 columns
+_MANUAL = """Body segment parameters from gait.
+
+Markers and ground reaction forces in; masses, centres of mass and inertias of
+all segments out, with a motion that they and the forces explain.
+
+[bold]In which order[/]
+
+kinertia demo                 see it work, on a person who does not exist
+kinertia init FOLDER          draft FOLDER/subject.toml from your files
+kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
+kinertia fit subject.toml     estimate; the results go to the folder out
+
+Every command says more with --help, and has an example there.
+
+[bold]What it needs[/]
+
+A static trial (the person standing; C3D or TRC), one or more gait trials with
+force plates (C3D, or TRC with MOT or STO), body mass, stature and sex.
+
+[bold]Exit status[/]
+
+  0  done
+  1  done, but a verdict is against using the result. Of fit: not converged;
+     physically impossible segments; segments that contradict the literature;
+     residuals beyond OpenSim's guideline (force 10 N RMS, 25 N peak, 5 % of
+     the largest external force; moment 50 N m RMS, 75 N m peak).
+     Of check: something that a fit or a simulation cannot rest on.
+  2  a mistake in files or options, told in one line
+130  interrupted; nothing half-written is left
+
+Results go to standard output, progress and errors to standard error.
+"""
+_MARKS = {"measured": "**", "informed": "*", "assumed": ""}
+_STAGES = ("literature", "corrected", "estimate")
 
 app = typer.Typer(
     name="kinertia",
@@ -29,13 +68,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
-    help="Body segment parameters from gait: markers and ground reaction forces in; masses, centres of mass and "
-    "inertias of all segments out.",
+    help=_MANUAL,
 )
-app.command()(demo)
-app.add_typer(study, name="study")
-_MARKS = {"measured": "**", "informed": "*", "assumed": ""}
-_STAGES = ("literature", "corrected", "estimate")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -43,16 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         app(args=arguments, prog_name="kinertia")
     except KinertiaError as error:
-        _fail(str(error))
+        show_error(str(error))
     except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}; check the path, its permissions and the space on the disk")
-
-
-def _fail(message: str) -> NoReturn:
-    err.print(
-        Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default"),
-        soft_wrap=True,
-    )
+        show_error(f"{error.filename}: {error.strerror}; check the path, its permissions and the space on the disk")
     raise SystemExit(2)
 
 
@@ -71,10 +98,9 @@ def _root(
     pass
 
 
-@app.command()
 def fit(
     trial: Annotated[Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
     static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
     forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
     loads: Annotated[
@@ -94,8 +120,14 @@ def fit(
         bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
     ] = False,
     method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Estimate body segment parameters from gait.
+
+    Exit status 1 if the estimate is there but a verdict is against using it
+    (see kinertia --help).
 
     [bold]Examples[/]
 
@@ -130,13 +162,17 @@ def fit(
         wanted = _from_options(trial, options)
     if method is not None:
         wanted = with_settings(wanted, method=method)
-    check_folder(output)
+    results_folder(output, force)
     result = _run(wanted)
     folder = save_fit(result, output)
-    _report(result, folder)
+    judged = verdicts(result)
+    _report(result)
+    _report_verdicts(judged, result, verbose)
+    out.print(f"results in {folder}", soft_wrap=True)
+    if stands_against(judged):
+        raise typer.Exit(1)
 
 
-@app.command()
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder with the files of one person.")],
 ) -> None:
@@ -150,7 +186,7 @@ def init(
     if path.exists():
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
     text = init_subject(folder)
-    path.write_text(text, encoding="utf-8")
+    write_then_rename(path, text)
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
 
 
@@ -190,7 +226,7 @@ def _run(wanted: SubjectFile) -> Fit:
         return estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
 
 
-def _report(fit: Fit, folder: Path) -> None:
+def _report(fit: Fit) -> None:
     told = summary(fit)
     subject, mass = told["subject"], told["total_mass_kg"]
     height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
@@ -204,7 +240,20 @@ def _report(fit: Fit, folder: Path) -> None:
     out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
         out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
-    out.print(f"results in {folder}")
+
+
+def _report_verdicts(judged: Sequence[Verdict], fit: Fit, verbose: bool) -> None:
+    """The verdicts, of which the good ones and the assumptions are details."""
+    show_verdicts(verdict for verdict in judged if verbose or verdict.level != "good")
+    if not verbose:
+        good = sum(verdict.level == "good" for verdict in judged)
+        out.print(f"good: {good} of {len(judged)} verdicts (--verbose shows them)")
+        return
+    for note in fit.notes:
+        out.print(f"assumed: {note}")
+    for trial in fit.trials:
+        spent = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in trial.seconds.items())
+        out.print(f"{trial.name}: seconds: {spent}")
 
 
 def _report_trial(trial: dict[str, Any]) -> None:
@@ -245,3 +294,8 @@ def _bsp_table(fit: Fit) -> Table:
                 "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
             )
     return table
+
+
+for _command in (demo, init, check, fit):
+    app.command()(_command)
+app.add_typer(study, name="study")

@@ -1,4 +1,4 @@
-"""The commands on synthetic data: `kinertia demo`, `kinertia study table1`."""
+"""The commands on synthetic data: `kinertia demo`, `kinertia study table1`, `kinertia study accuracy`."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from kinertia.accuracy_report import HEADINGS, accuracy_rows, angles_sentence, save_accuracy
+from kinertia.accuracy_study import SCENARIOS, run_accuracy
+from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.demo import Demo, run_demo
-from kinertia.io.folder import check_folder
 from kinertia.study import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress
@@ -18,14 +20,7 @@ from kinertia.terminal import out, plain_table, shown_progress
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
 
 
-@study.callback()
-def _study() -> None:
-    """Keeps `table1` a sub-command while it is the only one."""
-
-
-def demo(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
-) -> None:
+def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
     """Show what Kinertia does; needs no files.
 
     A synthetic person walks through a synthetic laboratory; the files it leaves are estimated from, and the estimate is
@@ -35,6 +30,7 @@ def demo(
 
     kinertia demo -o out
     """
+    results_folder(output, force)
     with shown_progress() as progress:
         result = run_demo(output, progress=progress)
     _report_demo(result, output)
@@ -142,7 +138,9 @@ def table1(
         Path | None,
         typer.Option(help="Subject file of a measured trial to start from; the package's walk if left out."),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("out"),
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
 
@@ -152,7 +150,7 @@ def table1(
 
     kinertia study table1 --repeats 3 --trial subject.toml -o out
     """
-    check_folder(output)
+    results_folder(output, force)
     with shown_progress() as progress:
         if trial is None:
             source, name = study_trial(), "synthetic walk"
@@ -181,3 +179,32 @@ def _report_table1(table: Table1, deviation: np.ndarray) -> None:
             out.print(
                 f"{CONDITIONS[condition]}: {count} of {len(table.draws)} draws stopped at the limit of evaluations"
             )
+
+
+@study.command()
+def accuracy(
+    draws: Annotated[int, typer.Option(min=2, help="People in each scenario.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")] = 1,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")] = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Do the error bars hold? People drawn from the literature's prior, measured with faults, estimated.
+
+    [bold]Example[/]
+
+    kinertia study accuracy -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        found = run_accuracy(list(SCENARIOS), draws, seed, workers, lambda share: progress("people", share))
+    for scenario in found.values():
+        out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
+        shown = plain_table(*HEADINGS)
+        for row in accuracy_rows(scenario):
+            shown.add_row(*row)
+        out.print(shown)
+        out.print(angles_sentence(scenario))
+    save_accuracy(found, seed, output)
+    out.print(f"\nresults in {output}: accuracy.json, accuracy.md")

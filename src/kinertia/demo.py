@@ -17,7 +17,7 @@ from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject, with_settings
 from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
-from kinertia.io.folder import check_folder, complete_folder
+from kinertia.io.folder import complete_folder
 from kinertia.prepare import Progress
 from kinertia.results import save_fit
 from kinertia.synthetic import unlike_literature, walk, walking_subject
@@ -82,22 +82,19 @@ def run_demo(
         FileError: the folder cannot be written to.
     """
     folder = Path(folder)
-    check_folder(folder)
-    progress("measuring", 0.0)
-    truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
-    subject = unlike_literature(walking_subject(), truth_rng)
-    trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
-    recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
-    subject_file = write_lab(folder / "lab", recordings)
-
-    wanted = read_subject(subject_file)
-    static, inputs, marker_set = read_inputs(wanted, progress)
-    fits = []
-    for method, results in (("two-level", folder), ("simultaneous", folder / "simultaneous")):
-        settings = with_settings(wanted, method=method).settings
-        fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-        save_fit(fits[-1], results)
-    demo = Demo(fits[0], fits[1], subject.bsp, subject_file)
     with complete_folder(folder) as work:
+        progress("measuring", 0.0)
+        truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
+        subject = unlike_literature(walking_subject(), truth_rng)
+        trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
+        recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
+        wanted = read_subject(write_lab(work / "lab", recordings))
+        static, inputs, marker_set = read_inputs(wanted, progress)
+        fits = []
+        for method, results in (("two-level", work), ("simultaneous", work / "simultaneous")):
+            settings = with_settings(wanted, method=method).settings
+            fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
+            save_fit(fits[-1], results)
+        demo = Demo(fits[0], fits[1], subject.bsp, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from kinertia.freedom import JOINT_CENTRE_SD_M, MARKER_SD_M
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.kinematics import Kinematics, solve_kinematics
 from kinertia.noise import camera_noise, soft_tissue_artefact, study_noise
@@ -21,7 +22,6 @@ from kinertia.skeleton import GRAVITY_M_S2, Marker, Skeleton
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial
 from kinertia.trial import FootLoads, Markers, Trial
-from kinertia.unknowns import JOINT_CENTRE_SD_M, MARKER_SD_M
 
 CAMERA_SD_M = 0.0005
 WOBBLE_HZ, WOBBLE_DAMPING = 10.0, 0.3
@@ -98,9 +98,8 @@ def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Sk
             axis = np.array(joint.axes[0].direction)
             across = np.cross(axis, rng.standard_normal(3))
             turned = Rotation.from_rotvec(angle_rad * across / np.linalg.norm(across)).apply(axis)
-            joint = replace(
-                joint, axes=(replace(joint.axes[0], direction=(float(turned[0]), float(turned[1]), float(turned[2]))),)
-            )
+            x, y, z = map(float, turned)
+            joint = replace(joint, axes=(replace(joint.axes[0], direction=(x, y, z)),))
         joints.append(joint)
     return replace(skeleton, joints=tuple(joints))
 

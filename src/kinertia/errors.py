@@ -73,6 +73,18 @@ class SubjectError(KinertiaError):
         super().__init__(f"{field} = {value}: {problem}")
 
 
+class PriorError(KinertiaError):
+    """A prior of body segment parameters that cannot be: a deviation that is not positive, an impossible covariance.
+
+    Attributes:
+        parameter: "segment.parameter" that is wrong, or None.
+    """
+
+    def __init__(self, problem: str, parameter: str | None = None) -> None:
+        self.parameter = parameter
+        super().__init__(f"prior of body segment parameters: {problem}")
+
+
 class SettingsError(KinertiaError):
     """An entry of the subject file or an option of the command line is missing or cannot be."""
 

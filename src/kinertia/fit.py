@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp_prior import BspPrior
 from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
@@ -108,6 +110,13 @@ class Fit:
         told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
         return table.assign(**told, evidence=[evidence(value) for value in told["information"]])
 
+    def save(self, folder: str | Path) -> Path:
+        """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
+        # estimation does not depend on files, only asks for them when somebody saves
+        from kinertia.results import save_fit
+
+        return save_fit(self, folder)
+
     @property
     def covariance(self) -> pd.DataFrame | None:
         """Posterior covariance of all body segment parameters, by "segment.parameter"; None after two-level."""
@@ -129,6 +138,7 @@ def estimate_bsp(
     settings: Settings | None = None,
     marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
+    prior: BspPrior | None = None,
 ) -> Fit:
     """Body segment parameters of a person from a static trial and one or more gait trials.
 
@@ -139,25 +149,15 @@ def estimate_bsp(
         settings: defaults if None.
         marker_set: found from the static trial's labels if None.
         progress: called as the work goes on.
+        prior: of the body segment parameters, for the simultaneous estimate; the literature's if None.
 
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
     # the matrices are small: BLAS threads cost twice what they give, and ten times on a busy machine
     with threadpool_limits(limits=1, user_api="blas"):
-        return _estimate(subject, static, inputs, settings or Settings(), marker_set, progress)
-
-
-def _estimate(
-    subject: Subject,
-    static: Recording,
-    inputs: Sequence[TrialInput],
-    settings: Settings,
-    marker_set: MarkerSet | None,
-    progress: Progress,
-) -> Fit:
-    ready = prepare(subject, static, inputs, settings, marker_set, progress)
-    return _fitted(ready, settings, progress)
+        ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress)
+        return _estimate(ready if prior is None else replace(ready, prior=prior), settings or Settings(), progress)
 
 
 def estimate_bsp_of_model(
@@ -183,17 +183,17 @@ def estimate_bsp_of_model(
     """
     settings = settings or Settings()
     with threadpool_limits(limits=1, user_api="blas"):
-        return _fitted(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
+        return _estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
 
 
-def _fitted(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
+def _estimate(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     warnings = (
         *ready.warnings,
         *outcome.warnings,
         *fit_warnings(
-            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.unknowns.source
+            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.freedom.source
         ),
     )
     return Fit(
@@ -249,7 +249,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
         by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
     check_masses(known(ready.subject.mass_kg), by_force)
-    fitted = fit_simultaneous(ready.skeleton, ready.unknowns, ready.kinematics, settings.cutoff_hz)
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz, ready.freedom)
     bsp, skeleton = fitted.bsp, fitted.skeleton
     estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
     trials = _trial_fits(ready, skeleton, bsp, estimates, started)

@@ -26,6 +26,8 @@ _FAR = 1.0
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
+_ANEW_RAD = 1.0
+"""Frames that did not converge start anew with no joint farther than this from neutral."""
 _UNINFORMED_RAD_PER_M = 60.0
 """A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
 
@@ -62,7 +64,11 @@ def rms(values: np.ndarray) -> float:
 
 
 def solve_ik(
-    skeleton: Skeleton, markers: Markers, name: str = "markers", consecutive: bool = True
+    skeleton: Skeleton,
+    markers: Markers,
+    name: str = "markers",
+    consecutive: bool = True,
+    gain_tolerance_m2: float = 0.0,
 ) -> InverseKinematics:
     """All coordinates at every frame, by least squares on all visible markers.
 
@@ -71,6 +77,8 @@ def solve_ik(
         markers: measured markers.
         name: the trial's, for messages.
         consecutive: neighbouring frames show nearly the same pose, so that one may start from the other.
+        gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last; what goes on
+            moving then is a coordinate that the markers hardly show.
 
     Raises:
         MarkerSetError: fewer than three root markers of the skeleton are in the trial.
@@ -89,12 +97,18 @@ def solve_ik(
     fine = np.flatnonzero(placed)
     if consecutive and len(fine) > 1:
         coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
-        q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse])
-        _carry_on(model, measured[coarse], q_coarse)
+        q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse], gain_tolerance_m2)
+        _carry_on(model, measured[coarse], q_coarse, gain_tolerance_m2)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
-    q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine])
+    q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine], gain_tolerance_m2)
+    stuck = np.flatnonzero(~converged[fine])
+    if stuck.size:
+        # a joint may have gone beyond a right angle, where three angles describe the same pose twice
+        again = fine[stuck]
+        q[again, 6:] = np.clip(q[again, 6:], -_ANEW_RAD, _ANEW_RAD)
+        q[again], converged[again], normal[stuck] = _gauss_newton(model, measured[again], q[again], gain_tolerance_m2)
     errors = np.full(measured.shape[:2], np.nan)
     errors[fine] = _errors(model, measured[fine], q[fine])
     q[~placed] = np.nan
@@ -105,7 +119,7 @@ def solve_ik(
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
 
 
-def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> None:
+def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float) -> None:
     """Start frames that lie far from their neighbour again from there; they keep what fits better.
 
     An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
@@ -117,7 +131,7 @@ def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> None:
             change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
             if np.abs(change).max() < _FAR:
                 continue
-            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]])
+            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], gain_tolerance_m2)
             old, new = (np.nansum(np.square(_errors(model, measured[[k]], at))) for at in (q[[k]], again))
             if new < old:
                 q[k] = again[0]
@@ -156,7 +170,9 @@ def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.nd
     return model.root.coordinates(rotation, mean_there - (rotation @ mean_here[..., None])[..., 0]), placed
 
 
-def _gauss_newton(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _gauss_newton(
+    model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minimise the squared marker distances frame by frame; returns q (n, c), (n,) converged, J^T J (n, c, c).
 
     Steps are damped (Levenberg) per frame: a step that makes the fit worse is taken back and the damping raised.
@@ -181,7 +197,8 @@ def _gauss_newton(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple
         damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
         damping[active[~better]] *= 100.0
         step[active] = _damped_step(normal[active], gradient[active], damping[active])
-        small = np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE
+        gain = np.einsum("nc,nc->n", step[active], gradient[active])
+        small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | (gain < gain_tolerance_m2)
         done = active[small]
         converged[done] = True
         accepted[done] += step[done]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from kinertia.anthropometry import reference_lengths
 from kinertia.errors import MarkerSetError
 from kinertia.marker_set import MarkerSet, nearest_labels
 from kinertia.trial import Recording
@@ -27,10 +28,7 @@ _SUBTALAR_DROP_OF_FOOT = 0.018
 _METATARSALS_OF_FOOT = 0.73
 _CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
 _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
-_TORSO_OF_STATURE = {"male": 0.477 / 1.77, "female": 0.429 / 1.61}
 _CERVICAL = {"male": 0.55, "female": 0.53}
-_UPPER_ARM_OF_STATURE = {"male": 0.2817 / 1.741, "female": 0.2751 / 1.735}
-_FOREARM_OF_STATURE = {"male": 0.2689 / 1.741, "female": 0.2643 / 1.735}
 
 
 @dataclass(frozen=True)
@@ -227,7 +225,7 @@ def torso_frame(
         length = float(np.linalg.norm(top - lumbar))
     else:
         top = (marks["acromion_r"] + marks["acromion_l"]) / 2
-        length = _TORSO_OF_STATURE[sex] * height_m
+        length = reference_lengths(height_m, sex)["torso"]
     rotation = frame(top - lumbar, across)
     drop = _SHOULDER_DROP * np.linalg.norm(across) * rotation[:, 1]
     return rotation, length, {side: marks[f"acromion_{side}"] - drop for side in "rl"}
@@ -259,8 +257,9 @@ def arm(
 
 def hanging_arm(shoulder: np.ndarray, torso: np.ndarray, height_m: float, sex: str) -> tuple[np.ndarray, np.ndarray]:
     """Elbow and wrist centres of an arm without markers: it hangs along the torso, as long as de Leva's (1996)."""
-    elbow = shoulder - _UPPER_ARM_OF_STATURE[sex] * height_m * torso[:, 1]
-    return elbow, elbow - _FOREARM_OF_STATURE[sex] * height_m * torso[:, 1]
+    lengths = reference_lengths(height_m, sex)
+    elbow = shoulder - lengths["upper_arm"] * torso[:, 1]
+    return elbow, elbow - lengths["forearm"] * torso[:, 1]
 
 
 def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, torso: np.ndarray) -> np.ndarray:

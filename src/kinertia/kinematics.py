@@ -22,6 +22,8 @@ from kinertia.trial import Markers, Trial, runs
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
+FEWEST_FRAMES = 11
+"""A window needs at least as many frames."""
 AROUND_WINDOW_S = 0.25
 """Samples this near the measured window help to know what happens at its ends."""
 _END_PERIODS = 0.5
@@ -162,11 +164,11 @@ def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple
             f"another trial",
         )
     first, last = stretches[0]
-    if last - first < 10:
+    if last - first + 1 < FEWEST_FRAMES:
         raise TrialError(
             trial.name,
             f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} "
-            f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least 11 are needed",
+            f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least {FEWEST_FRAMES} are needed",
         )
     notes = []
     left_out = sum(end - start + 1 for start, end in stretches[1:])

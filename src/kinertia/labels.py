@@ -17,6 +17,8 @@ from kinertia.skeleton import Skeleton
 from kinertia.trial import Markers
 
 _FRAMES = 5
+_ENOUGH_M2 = 1e-6
+"""Errors of centimetres are compared: fits that would gain less than the square of a millimetre may stop."""
 _SUSPECT_M = 0.025
 """Markers that the static model misses by less than this are not doubted."""
 _MOST_SUSPECTS = 8
@@ -96,7 +98,8 @@ def _errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -
     if not len(measured):
         return np.zeros((0, len(labels)))
     frames = measured.reshape(-1, *measured.shape[2:])
-    ik = solve_ik(skeleton, Markers(np.arange(len(frames), dtype=float), labels, frames), consecutive=False)
+    unrelated = Markers(np.arange(len(frames), dtype=float), labels, frames)
+    ik = solve_ik(skeleton, unrelated, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
     errors = ik.errors_m.reshape(measured.shape[:3])
     seen = np.isfinite(errors).any(axis=1)
     return np.where(seen, np.nanmedian(np.where(seen[:, None], errors, 0.0), axis=1), 0.0)

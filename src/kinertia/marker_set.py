@@ -101,11 +101,15 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
     Raises:
         MarkerSetError: no preset fits; says for the best one what is missing and the nearest labels.
     """
-    presets = [read_marker_set(name) for name in preset_names()]
-    best = max(presets, key=lambda preset: _share(preset, labels))
+    best = nearest_preset(labels)
     if _share(best, labels) < 0.8:
         raise _mismatch(best, labels, "no marker-set preset fits the static trial; the nearest is")
     return best
+
+
+def nearest_preset(labels: Sequence[str]) -> MarkerSet:
+    """The preset that shares most of its labels with these, be it many or few."""
+    return max(map(read_marker_set, preset_names()), key=lambda preset: _share(preset, labels))
 
 
 def check_marker_set(marker_set: MarkerSet, labels: Sequence[str]) -> None:

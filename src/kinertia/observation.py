@@ -3,8 +3,8 @@ are.
 
 Marker noise is not white (DESIGN section 6): skin motion lasts for many frames. Its deviation and correlation length
 are read from the errors that inverse kinematics leaves, and the deviation is inflated by the square root of the number
-of frames over which errors are alike. Inverse kinematics absorbs part of the noise; the deviation makes up for its
-degrees of freedom only on average.
+of frames over which errors are alike, and of the number of markers that err alike: those of a segment ride on the same
+skin. Inverse kinematics absorbs part of the noise; the deviation makes up for its degrees of freedom only on average.
 """
 
 from __future__ import annotations
@@ -110,7 +110,21 @@ def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float
         frames / rate_hz,
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
-    return noise, sd * np.sqrt(frames)
+    return noise, sd * np.sqrt(frames * _alike(skeleton, filled))
+
+
+def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
+    """(m,) how many markers of each marker's segment err as one, from errors (n, m, 3): 1 if each errs on its own.
+
+    The variance of a sum of k equal errors is k times that of k independent ones.
+    """
+    count = np.ones(errors.shape[1])
+    for segment in np.unique(skeleton.marker_segments):
+        own = skeleton.marker_segments == segment
+        apart = np.square(errors[:, own]).sum()
+        if apart > 0:
+            count[own] = max(1.0, float(np.square(errors[:, own].sum(axis=1)).sum() / apart))
+    return count
 
 
 def _correlation_frames(errors: np.ndarray) -> float:

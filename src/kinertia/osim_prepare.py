@@ -19,12 +19,12 @@ from kinertia.checks import complete_subject, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.errors import OsimError, TrialError
+from kinertia.freedom import JOINT_CENTRE_SD_M, MARKER_SD_M, Freedom
 from kinertia.io.osim import OsimModel
 from kinertia.kinematics import solve_kinematics
 from kinertia.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.skeleton import Axis, Skeleton
 from kinertia.trial import Trial
-from kinertia.unknowns import JOINT_CENTRE_SD_M, MARKER_SD_M, Unknowns
 
 LIGHT_KG = 0.5
 """Bodies that weigh less together than this move with their joints, but are not estimated."""
@@ -71,7 +71,11 @@ def prepare_osim(
         ).skeleton
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, known(subject.mass_kg))
-    unknowns = osim_unknowns(skeleton, own, calibrate)
+    prior, held = parted(skeleton, own)
+    offsets = [name for name in skeleton.locked if "/offset_" in name]
+    freedom = Freedom(
+        dict.fromkeys(offsets, JOINT_CENTRE_SD_M), MARKER_SD_M if calibrate else None, held, "the model's own"
+    )
 
     kinematics, seconds = [], []
     for k, trial in enumerate(trials):
@@ -84,15 +88,16 @@ def prepare_osim(
         f"OpenSim model: {model.path.name}",
         *_mass_note(model, own, factor),
         *_idle_note(model, idle),
-        *_held_note(skeleton, unknowns),
+        *_held_note(skeleton, held),
         *_marker_notes(model, trials),
         *(note for k in kinematics for note in k.notes),
     ]
     return Prepared(
         subject=subject,
         skeleton=skeleton,
-        literature=own,
-        unknowns=unknowns,
+        literature=freedom.whole(prior.mean),
+        prior=prior,
+        freedom=freedom,
         feet=feet,
         file=model,
         kinematics=tuple(kinematics),
@@ -183,37 +188,27 @@ def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentPara
     return scaled, factor
 
 
-def osim_unknowns(skeleton: Skeleton, own: BodySegmentParameters, calibrate: bool) -> Unknowns:
-    """Prior around the model's own parameters; of bodies that move as one the heaviest is estimated."""
-    estimated = [name for name in own.segments if name in _estimated(skeleton, own)]
-    rows = dict(zip(own.segments, own.table(), strict=True))
-    rest = [name for name in own.segments if name not in estimated]
+def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
+    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others.
 
-    def part(names: list[str]) -> BodySegmentParameters:
-        return BodySegmentParameters.from_table(tuple(names), np.array([rows[name] for name in names]))
-
-    prior = literature_prior(part(estimated), [kind_of(name) for name in estimated])
-    prior = BspPrior(prior.mean, prior.covariance, prior.mass_kg, SCALE_SD * own.total_mass_kg)
-    offsets = [name for name in skeleton.locked if "/offset_" in name] if calibrate else []
-    return Unknowns(
-        own.segments,
-        prior,
-        part(rest) if rest else None,
-        dict.fromkeys(offsets, JOINT_CENTRE_SD_M),
-        MARKER_SD_M if calibrate else None,
-        "the model's own",
-    )
-
-
-def _estimated(skeleton: Skeleton, own: BodySegmentParameters) -> set[str]:
-    """Of every group of bodies that move as one, the heaviest; none of a group that is light altogether."""
+    Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
+    """
     mass = dict(zip(own.segments, own.mass_kg, strict=True))
     groups: dict[int, list[str]] = {}
     carriers, _ = skeleton.placement_of_parameters(own.segments)
     for name, carrier in zip(own.segments, carriers.tolist(), strict=True):
         groups.setdefault(carrier, []).append(name)
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
-    return {max(names, key=mass.__getitem__) for names in heavy}
+    chosen = {max(names, key=mass.__getitem__) for names in heavy}
+    estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
+    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
+    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
+    return prior, rest if rest.segments else None
+
+
+def _part(bsp: BodySegmentParameters, names: Sequence[str]) -> BodySegmentParameters:
+    rows = [bsp.segments.index(name) for name in names]
+    return BodySegmentParameters(tuple(names), bsp.mass_kg[rows], bsp.com_m[rows], bsp.inertia_kgm2[rows])
 
 
 def _mass_note(model: OsimModel, own: BodySegmentParameters, factor: float) -> list[str]:
@@ -237,11 +232,11 @@ def _idle_note(model: OsimModel, idle: Sequence[str]) -> list[str]:
     return [f"no marker shows these coordinates, which are locked at their defaults: {listed}"]
 
 
-def _held_note(skeleton: Skeleton, unknowns: Unknowns) -> list[str]:
-    if unknowns.held is None:
+def _held_note(skeleton: Skeleton, held: BodySegmentParameters | None) -> list[str]:
+    if held is None:
         return []
     parents = {joint.child: joint.parent for joint in skeleton.joints}
-    listed = ", ".join(f"{name} ({parents[name]})" for name in unknowns.held.segments)
+    listed = ", ".join(f"{name} ({parents[name]})" for name in held.segments)
     return [
         f"bodies that weigh less than {LIGHT_KG:g} kg or move as one with another are estimated as one with it: they "
         f"keep the model's own parameters, and what the data say of them goes to the neighbour (in brackets the "

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.calibration import adapt, hold_uninformed, sampled
-from kinertia.checks import check_visible, complete_subject, known
+from kinertia.checks import check_same_person, check_visible, complete_subject, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
 from kinertia.io.osim import OsimModel
 from kinertia.kinematics import Kinematics, facing, solve_kinematics
@@ -20,7 +22,6 @@ from kinertia.labels import check_labels
 from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording, Trial
-from kinertia.unknowns import Unknowns, gait27_unknowns
 
 LOWER_BODY_SD_M = 0.01
 UPPER_BODY_SD_M = 0.04
@@ -48,7 +49,8 @@ class Prepared:
         subject: with mass and height filled in.
         skeleton: calibrated model.
         literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
-        unknowns: what the simultaneous estimate may change.
+        prior: how far the person's may be from them.
+        freedom: what else the simultaneous estimate may move.
         feet: the segments that the ground reactions act on, right and left.
         file: the OpenSim model that the skeleton is from, if it is.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
@@ -59,7 +61,8 @@ class Prepared:
     subject: Subject
     skeleton: Skeleton
     literature: BodySegmentParameters
-    unknowns: Unknowns
+    prior: BspPrior
+    freedom: Freedom
     feet: tuple[str, str]
     file: OsimModel | None
     kinematics: tuple[Kinematics, ...]
@@ -83,6 +86,7 @@ def calibrate(
     model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
+    check_same_person(model.skeleton, trials)
     skeleton, held = hold_uninformed(model.skeleton, trials, dict.fromkeys(ARM_COORDINATES, 0.0))
     for trial in trials:
         check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
@@ -149,7 +153,8 @@ def prepare(
         subject=subject,
         skeleton=skeleton,
         literature=literature,
-        unknowns=gait27_unknowns(literature),
+        prior=literature_prior(literature),
+        freedom=GAIT27_FREEDOM,
         feet=("foot_r", "foot_l"),
         file=None,
         kinematics=tuple(kinematics),

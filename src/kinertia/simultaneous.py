@@ -88,8 +88,8 @@ def estimate_simultaneous(
         if kept > 0.0:
             values, coefficients, here = new_values, new_coefficients, there
         damping = max(damping * _change_of_damping(kept), 1e-9)
-    information = here.information + sum(_reduced(normal, 0.0)[0] for normal in here.normals)
-    return _result(problem, coefficients, values, _inverse(information), converged, iterations, (begin, here.cost))
+    information = here.information + sum(reduced(normal, 0.0)[0] for normal in here.normals)
+    return _result(problem, coefficients, values, covariance_of(information), converged, iterations, (begin, here.cost))
 
 
 def _change_of_damping(kept: float) -> float:
@@ -99,7 +99,7 @@ def _change_of_damping(kept: float) -> float:
     return 1.0 if kept > 0.25 else 10.0
 
 
-def _inverse(information: np.ndarray) -> np.ndarray:
+def covariance_of(information: np.ndarray) -> np.ndarray:
     """Covariance; finite also where a segment has come near the edge of what is physically possible.
 
     There the logarithm of a second moment tells nothing any more, and the information on it may round to below zero.
@@ -113,15 +113,15 @@ def _inverse(information: np.ndarray) -> np.ndarray:
 def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], float]:
     """Step of the static unknowns (S,) and of each trial's coefficients, and by how much it would lower the cost."""
     information, right = here.information.copy(), here.right.copy()
-    reduced = [_reduced(normal, damping) for normal in here.normals]
-    for schur, reduced_right, *_ in reduced:
+    parts = [reduced(normal, damping) for normal in here.normals]
+    for schur, reduced_right, *_ in parts:
         information += schur
         right += reduced_right
     information[np.diag_indices_from(information)] += damping * scale
     step = np.linalg.solve(information, right)
     moves = []
     promised = 0.5 * float(here.right @ step)
-    for (_, _, band, border, motion), normal in zip(reduced, here.normals, strict=True):
+    for (_, _, band, border, motion), normal in zip(parts, here.normals, strict=True):
         size, c = normal.right.shape
         move = band.backward(motion - border @ step[:, None]).reshape(-1, c)[:size]
         moves.append(move)
@@ -129,7 +129,7 @@ def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarr
     return step, moves, promised
 
 
-def _reduced(
+def reduced(
     normal: NormalEquations, damping: float
 ) -> tuple[np.ndarray, np.ndarray, BlockBand, np.ndarray, np.ndarray]:
     """Schur complement (S, S) and right-hand side (S,) of the static unknowns, with what back-substitution needs."""

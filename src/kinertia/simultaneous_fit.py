@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
+from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import BaseParameters, base_parameters
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
-from kinertia.unknowns import Unknowns
 
 PLATE_SD_M = 0.010
 GAIN_SD = 0.02
@@ -24,7 +25,8 @@ CLOCK_SD_S = 0.005
 _STAYING_SD_M = 1e-6
 """Of markers that stay where they are."""
 _NOTABLE = 2.0
-_CONTRADICTION = 3.0
+CONTRADICTION_SD = 3.0
+"""A parameter this many prior deviations from the literature contradicts the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,37 +82,36 @@ class SimultaneousFit:
 
 def fit_simultaneous(
     skeleton: Skeleton,
-    unknowns: Unknowns,
+    prior: BspPrior,
     trials: Sequence[Kinematics],
     cutoff_hz: float | str,
+    freedom: Freedom = GAIT27_FREEDOM,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
     Args:
         skeleton: calibrated.
-        unknowns: what may change and how far.
+        prior: of the body segment parameters, and the total mass of its segments by the scale.
         trials: kinematics of the trials.
         cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
+        freedom: what may move beside these segments.
     """
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    used = used.carrying(unknowns.held)
-    prior = unknowns.prior
-    seen = [observe(used, k, unknowns.total_mass_kg, cutoff) for k in trials]
-    stay = unknowns.marker_sd_m is None
-    places = np.full(len(used.markers), _STAYING_SD_M if stay else unknowns.marker_sd_m)
-    calibration = CalibrationPrior(unknowns.centres, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    used = used.carrying(freedom.held)
+    seen = [observe(used, k, prior.mass_kg + freedom.held_kg, cutoff) for k in trials]
+    calibration = calibration_prior(used, freedom)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
     found = result.skeleton.carrying(None)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
     loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
-    covariance, before = (unknowns.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
+    covariance, before = (freedom.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, unknowns, result),
+        _calibration(used, freedom, result),
         tuple(noise for _, noise in seen),
         result.iterations,
         base_parameters(
@@ -119,22 +120,26 @@ def fit_simultaneous(
     )
     return SimultaneousFit(
         result,
-        unknowns.whole(result.bsp),
-        found.with_markers(used.markers) if stay else found,
+        freedom.whole(result.bsp),
+        found.with_markers(used.markers) if freedom.marker_sd_m is None else found,
         posterior,
         motions,
         loads,
-        tuple(_warnings(unknowns, result, posterior, trials)),
+        tuple(_warnings(prior, freedom, result, posterior, trials)),
     )
 
 
-def _calibration(
-    skeleton: Skeleton, unknowns: Unknowns, result: SimultaneousResult
-) -> dict[str, dict[str, float | str]]:
+def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
+    """How far a calibrated skeleton with these markers, plates and clock may be off."""
+    places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
+    return CalibrationPrior(freedom.centres, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+
+
+def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
-        found[name] = {"value": change, "prior_sd": unknowns.centres[name], "sd": sd, "unit": "m"}
+        found[name] = {"value": change, "prior_sd": freedom.centres[name], "sd": sd, "unit": "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for axis, value, deviation in zip("xz", values, sds, strict=False):
@@ -151,9 +156,13 @@ _SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
 
 
 def _warnings(
-    unknowns: Unknowns, result: SimultaneousResult, posterior: Posterior, trials: Sequence[Kinematics]
+    prior: BspPrior,
+    freedom: Freedom,
+    result: SimultaneousResult,
+    posterior: Posterior,
+    trials: Sequence[Kinematics],
 ) -> list[str]:
-    prior, found = unknowns.prior, []
+    found = []
     if not result.converged:
         found.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
@@ -170,9 +179,9 @@ def _warnings(
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
-    for i, k in np.argwhere(np.abs(away) > _CONTRADICTION):
+    for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD):
         found.append(
             f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
-            f"deviations from {unknowns.source}; a wrong joint, plate or marker is likelier than an odd person"
+            f"deviations from {freedom.source}; a wrong joint, plate or marker is likelier than an odd person"
         )
     return found

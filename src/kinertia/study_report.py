@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from kinertia import __version__
 from kinertia.io.folder import complete_folder
 from kinertia.study import CONDITIONS, PUBLISHED, Table1, table1_json
 
@@ -121,7 +122,9 @@ def save_table1(table: Table1, folder: str | Path) -> Path:
         caption="Start: every parameter off by up to 50 %. The scale is logarithmic.",
     )
     with complete_folder(folder) as work:
-        (work / "table1.json").write_text(json.dumps(table1_json(table), indent=1) + "\n", encoding="utf-8")
+        (work / "table1.json").write_text(
+            json.dumps({"kinertia": __version__, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
+        )
         table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")
         (work / "table1.html").write_text(page, encoding="utf-8")
         figure.savefig(work / "table1.png", dpi=150)

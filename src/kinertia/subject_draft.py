@@ -13,7 +13,8 @@ from kinertia.config import Model, Settings, Subject, Table, TrialFiles
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.recording import read_recording
 
-_STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
+STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
+"""What the names of static trials contain."""
 
 
 def init_subject(folder: str | Path) -> str:
@@ -40,12 +41,12 @@ def init_subject(folder: str | Path) -> str:
     others = [file.name for file in c3d + trc if file not in (static, *trials)]
     forces = [file for file in files if _holds_forces(file)]
     loads = [file for file in files if file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)]
-    chosen = _matched([trial for trial in trials if trial not in c3d], forces)
+    chosen = matched_by_name([trial for trial in trials if trial not in c3d], forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
         text += [f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
-    guessed = static is not None and not _STATIC_NAME.search(static.stem)
+    guessed = static is not None and not STATIC_NAME.search(static.stem)
     note = " (the shortest recording)" if guessed else ""
     text += ["", "[model]", _entry(Model, "static", static and static.name, "static.trc", note)]
     text += ["# " + _entry(Model, "markers", "plug-in-gait")]
@@ -53,7 +54,7 @@ def init_subject(folder: str | Path) -> str:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
         if trial in chosen:
             text += [_entry(TrialFiles, "forces", chosen[trial].name, note=" (matched by name)")]
-            for file in _matched([chosen[trial]], loads).values():
+            for file in matched_by_name([chosen[trial]], loads).values():
                 text += [_entry(TrialFiles, "loads", file.name, note=" (matched by name)")]
         elif trial not in c3d:
             text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
@@ -82,7 +83,7 @@ def _subject_lines(c3d: Sequence[Path]) -> list[str]:
 
 def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:
     """The static trial and the dynamic trials that share most of the beginning of its name."""
-    statics = [file for file in captures if _STATIC_NAME.search(file.stem)]
+    statics = [file for file in captures if STATIC_NAME.search(file.stem)]
     if not statics and len(captures) > 1:
         statics = [min(captures, key=_duration_s)]
     dynamic = [file for file in captures if file not in statics]
@@ -117,11 +118,11 @@ def _head(file: Path) -> str:
 
 def _holds_forces(file: Path) -> bool:
     """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
-    motion = file.suffix.lower() in (".mot", ".sto") and not _STATIC_NAME.search(file.stem)
+    motion = file.suffix.lower() in (".mot", ".sto") and not STATIC_NAME.search(file.stem)
     return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
 
 
-def _matched(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
+def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
     """Pairs of files by the longest common part of their names, the best pair first; each file once.
 
     At least four letters must agree, unless there is one file on each side.

@@ -2,24 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
+
+from kinertia.verdict import Verdict
 
 # names of files and trials may contain what rich takes for markup
 out = Console(markup=False, emoji=False, highlight=False)
 err = Console(markup=False, emoji=False, highlight=False, stderr=True)
+_COLOURS = {"good": "green", "okay": "yellow", "against": "bold red"}
+
+
+def be_quiet(quiet: bool) -> bool:
+    """Silence results and progress, or not; errors are always shown."""
+    out.quiet = quiet
+    return quiet
+
+
+def show_error(message: str) -> None:
+    """One line for one mistake."""
+    text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
+    err.print(text, soft_wrap=True)
+
+
+def show_verdicts(verdicts: Iterable[Verdict]) -> None:
+    """One paragraph each, the level first."""
+    for level, sentence in verdicts:
+        out.print(Text(f"{level}: ", style=_COLOURS[level]).append(sentence, style="not bold default"))
 
 
 @contextmanager
 def shown_progress() -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on a terminal, a line per stage elsewhere; takes the stage's name and its share done."""
+    """Progress of the stage at work: a bar with the time left on a terminal, a line per stage elsewhere.
+
+    Yields a function that takes the stage's name and its share done.
+    """
+    seen: list[str] = []
+    if out.quiet:
+        yield lambda stage, share: None
+        return
     if not err.is_terminal:
-        seen: list[str] = []
 
         def line(stage: str, share: float) -> None:
             if stage not in seen:
@@ -28,10 +56,23 @@ def shown_progress() -> Iterator[Callable[[str, float], None]]:
 
         yield line
         return
-    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description:>20}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=err, transient=True) as bar:
         task = bar.add_task("", total=1.0)
-        yield lambda stage, share: bar.update(task, description=stage, completed=share)
+
+        def move(stage: str, share: float) -> None:
+            if seen[-1:] != [stage]:
+                seen.append(stage)
+                bar.reset(task, description=stage)  # its own time, or the time left would be wrong
+            bar.update(task, completed=share)
+
+        yield move
 
 
 def plain_table(*headings: str) -> Table:

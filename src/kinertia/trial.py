@@ -140,6 +140,8 @@ class Recording:
         height_m: body height if the file tells, else None.
         measurements: further lengths of the subject in m, by the file's own keys (`LKneeWidth`).
         notes: one sentence for each assumption made while reading.
+        length_unit: of the marker file ("mm"); everything here is in m.
+        vertical: the marker file's axis that points up ("+Z"); here it is +Y.
     """
 
     name: str
@@ -149,6 +151,8 @@ class Recording:
     height_m: float | None = None
     measurements: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    length_unit: str = "m"
+    vertical: str = "+Y"
 
 
 @dataclass(frozen=True, eq=False)

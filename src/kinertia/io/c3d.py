@@ -50,16 +50,16 @@ def read_c3d(path: str | Path) -> Recording:
     path = Path(path)
     file, notes = _open(path)
     parameters = file["parameters"]
-    unit = _metres_per_unit(path, parameters)
+    unit_name, unit = _length_unit(path, parameters)
     labels, positions, label_notes = _markers(path, file)
     time = _times(file, "points")
     plates, plate_notes = lab_plates(path, file, unit)
-    rotation, axis_notes = _to_ground(path, parameters, unit * positions, plates)
+    rotation, up, axis_notes = _to_ground(path, parameters, unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
     mass, height, measurements, subject_notes = _subject(path, parameters)
     notes += [*label_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
-    return Recording(path.stem, markers, ground_plates, mass, height, measurements, tuple(notes))
+    return Recording(path.stem, markers, ground_plates, mass, height, measurements, tuple(notes), unit_name, up)
 
 
 def _open(path: Path) -> tuple[Any, list[str]]:
@@ -116,11 +116,12 @@ def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
     return default
 
 
-def _metres_per_unit(path: Path, parameters: Any) -> float:
+def _length_unit(path: Path, parameters: Any) -> tuple[str, float]:
+    """Its name and how many metres it is."""
     unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"POINT:UNITS is '{unit}'; expected mm, cm or m, correct the parameter")
-    return METRES_PER_UNIT[unit]
+    return unit, METRES_PER_UNIT[unit]
 
 
 def _times(file: Any, kind: str) -> FloatArray:
@@ -204,8 +205,8 @@ def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[st
 
 def _to_ground(
     path: Path, parameters: Any, positions: FloatArray, plates: LabPlates | None
-) -> tuple[FloatArray, list[str]]:
-    """Rotation (3, 3) from lab to ground axes, from the file's word and from the data."""
+) -> tuple[FloatArray, str, list[str]]:
+    """Rotation (3, 3) from lab to ground axes and the axis that is up, from the file's word and from the data."""
     told = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
     told_up = _AXES.get(told)
     seen = positions[_seen(positions).any(axis=1)]
@@ -228,7 +229,7 @@ def _to_ground(
         notes.append(f"{path.name}: POINT:Y_SCREEN says {told} is up but {why} say {up}; {up} was believed")
     if up != "+Y":
         notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
-    return _rotation(*found_up), notes
+    return _rotation(*found_up), up, notes
 
 
 def _seen(positions: FloatArray) -> BoolArray:

@@ -9,7 +9,7 @@ from kinertia.errors import FileError, TrialError
 from kinertia.io.c3d import read_c3d
 from kinertia.io.loads import read_forces_with_notes
 from kinertia.io.rows import expect_file
-from kinertia.io.trc import read_trc_with_notes
+from kinertia.io.trc import read_trc_recording
 from kinertia.trial import Recording
 
 
@@ -33,11 +33,7 @@ def read_recording(
     """
     markers_path = Path(markers_path)
     _expect_kind(markers_path, (".trc", ".c3d"), "markers")
-    if markers_path.suffix.lower() == ".c3d":
-        recording = read_c3d(markers_path)
-    else:
-        markers, notes = read_trc_with_notes(markers_path)
-        recording = Recording(markers_path.stem, markers, notes=notes)
+    recording = (read_c3d if markers_path.suffix.lower() == ".c3d" else read_trc_recording)(markers_path)
     if forces_path is not None:
         _expect_kind(Path(forces_path), (".mot", ".sto"), "forces")
     if loads_path is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.io.rows import read_lines, read_rows
 from kinertia.io.sto import write_then_rename
-from kinertia.trial import FloatArray, Markers
+from kinertia.trial import FloatArray, Markers, Recording
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
@@ -23,16 +23,16 @@ def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
     Empty cells, NaN and the triple 0 0 0 are missing markers. Frame times that were rounded when written are
-    put back on the uniform grid they came from. `read_trc_with_notes` tells when either was needed.
+    put back on the uniform grid they came from. `read_trc_recording` tells when either was needed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
     """
-    return read_trc_with_notes(path)[0]
+    return read_trc_recording(path).markers
 
 
-def read_trc_with_notes(path: str | Path) -> tuple[Markers, tuple[str, ...]]:
-    """`read_trc` and the assumptions made while reading, one sentence each."""
+def read_trc_recording(path: str | Path) -> Recording:
+    """`read_trc` with the file's unit and the assumptions made while reading; Y is taken to point up."""
     path = Path(path)
     lines = read_lines(path)
     header = _header(path, lines)
@@ -51,7 +51,8 @@ def read_trc_with_notes(path: str | Path) -> tuple[Markers, tuple[str, ...]]:
     unit = header["Units"].lower()
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
-    return Markers(time, labels, positions * METRES_PER_UNIT[unit]), (*time_notes, *position_notes)
+    markers = Markers(time, labels, positions * METRES_PER_UNIT[unit])
+    return Recording(path.stem, markers, notes=(*time_notes, *position_notes), length_unit=unit)
 
 
 def write_trc(path: str | Path, markers: Markers) -> None:

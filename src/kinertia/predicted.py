@@ -1,0 +1,64 @@
+"""Error bars before any estimate: what trials tell at a given motion and given body segment parameters.
+
+The information of the simultaneous estimate (`simultaneous`) does not depend on the data but through the point at which
+it is taken. Taken at the literature's parameters it says beforehand what a recording will show; taken at the truth it
+is the Cramér-Rao bound of the estimator's own noise model, prior included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinertia.bsp import block_diagonal
+from kinertia.bsp_prior import BspPrior
+from kinertia.log_cholesky import table_jacobian
+from kinertia.map_terms import CalibrationPrior, MapProblem, Observation
+from kinertia.simultaneous import covariance_of, reduced
+from kinertia.skeleton import Skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What each of several trials of a person tells of parameters and calibration, and what the prior tells.
+
+    Attributes:
+        problem: at whose start it is taken: the observations' coordinates, the prior's mean.
+    """
+
+    problem: MapProblem
+
+    @classmethod
+    def at(
+        cls,
+        skeleton: Skeleton,
+        prior: BspPrior,
+        calibration: CalibrationPrior,
+        trials: Sequence[Observation],
+        spacing_s: float,
+    ) -> Information:
+        """The information at the prior's mean; the arguments are those of `estimate_simultaneous`."""
+        return cls(MapProblem(skeleton, prior, calibration, trials, spacing_s))
+
+    @cached_property
+    def of_trials(self) -> tuple[np.ndarray, ...]:
+        """Per trial (S, S) information on the static unknowns, motion eliminated."""
+        problem = self.problem
+        normals = (problem.normal(k, start, problem.start_static) for k, start in enumerate(problem.start))
+        return tuple(reduced(normal, 0.0)[0] for normal in normals)
+
+    @cached_property
+    def of_prior(self) -> np.ndarray:
+        """(S, S) information of all priors."""
+        return self.problem.prior_terms(self.problem.start_static)[0]
+
+    def sd(self, trials: Iterable[int]) -> np.ndarray:
+        """(s, 10) deviations of the body segment parameters that these trials together would leave."""
+        information = self.of_prior + sum(self.of_trials[k] for k in trials)
+        theta = self.problem.layout.theta
+        chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
+        covariance = chain @ covariance_of(information)[theta, theta] @ chain.T
+        return np.sqrt(np.diag(covariance)).reshape(-1, 10)
