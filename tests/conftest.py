@@ -8,9 +8,11 @@ import pytest
 
 from command_line import fitted
 from kinertia.config import Settings, Subject
+from kinertia.demo import Demo, run_demo
 from kinertia.fit import estimate_bsp
 from kinertia.io.recording import read_recording
 from kinertia.prepare import TrialInput
+from kinertia.two_level import TwoLevelResult, correct_pelvis
 from walks import fit_arguments
 
 FEW_EVALUATIONS = 30
@@ -46,6 +48,19 @@ def fit_of(shared_data, tmp_path_factory):
         return done[name]
 
     return get
+
+
+def given_back(skeleton, start, windows, symmetric=True, progress=None):
+    """In place of the two-level estimate: its start, without the seconds of iterating."""
+    return TwoLevelResult(start, tuple(correct_pelvis(skeleton, start, w) for w in windows), (), (0.0, 0.0), 1, True)
+
+
+@pytest.fixture(scope="session")
+def demo_run(tmp_path_factory) -> tuple[Demo, Path]:
+    """Outcome of `run_demo` and its folder, with a two-level estimate that stays at its start."""
+    folder = tmp_path_factory.mktemp("demo") / "out"
+    with mock.patch("kinertia.fit.estimate_two_level", given_back):
+        return run_demo(folder), folder
 
 
 @pytest.fixture

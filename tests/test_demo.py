@@ -5,23 +5,18 @@ import pandas as pd
 import pytest
 
 from command_line import run
+from conftest import given_back
 from kinertia import demo as demo_module
-from kinertia.cli_study import _verdict
+from kinertia.cli_study import _two_level_verdict
 from kinertia.config import read_subject
 from kinertia.inputs import read_inputs
 from kinertia.prepare import prepare
 from kinertia.synthetic import unlike_literature, walking_subject
-from kinertia.two_level import TwoLevelResult, correct_pelvis
 
 
 @pytest.fixture
 def quick_estimator(monkeypatch):
     """The pipeline with an estimator that gives back its start: all but the seconds of iterating."""
-
-    def given_back(skeleton, start, windows, symmetric=True, progress=None):
-        motions = tuple(correct_pelvis(skeleton, start, window) for window in windows)
-        return TwoLevelResult(start, motions, (), (0.0, 0.0), 1, True)
-
     monkeypatch.setattr("kinertia.fit.estimate_two_level", given_back)
 
 
@@ -34,17 +29,19 @@ def check_outcome(outcome, folder):
     names = {"static.trc", "walk.trc", "walk_grf.mot", "subject.toml"}
     assert {path.name for path in (folder / "lab").iterdir()} == names
     table = pd.read_csv(folder / "bsp_truth.csv")
-    columns = ["segment", "parameter", "unit", "truth", "literature", "estimate", "simultaneous", "simultaneous_sd"]
+    columns = ["segment", "parameter", "unit", "truth", "literature", "estimate", "sd", "two_level"]
     assert list(table.columns) == columns
     assert len(table) == 120
     mass = table[table["parameter"] == "mass"]
     assert mass["truth"].sum() == pytest.approx(72.6)
     assert np.abs(mass["truth"] / mass["literature"] - 1).max() > 0.03
     assert json.loads((folder / "fit.json").read_text())["trials"][0]["n_dynamic_frames"] > 90
-    for results in (folder, folder / "simultaneous"):
-        assert {"bsp.csv", "kinematics.mot", "residuals.sto"} <= {path.name for path in results.iterdir()}
-    off = {name: np.sqrt(np.mean((mass[name] - mass["truth"]) ** 2)) for name in ("literature", "simultaneous")}
-    assert off["simultaneous"] < off["literature"]
+    for results in (folder, folder / "two-level"):
+        assert {"report.html", "bsp.csv", "kinematics.mot", "residuals.sto"} <= {
+            path.name for path in results.iterdir()
+        }
+    off = {name: np.sqrt(np.mean((mass[name] - mass["truth"]) ** 2)) for name in ("literature", "estimate")}
+    assert off["estimate"] < off["literature"]
 
 
 def test_demo_without_the_iterations(tmp_path, quick_estimator):
@@ -56,7 +53,7 @@ def test_demo_without_the_iterations(tmp_path, quick_estimator):
 def test_demo_from_end_to_end(tmp_path):
     folder = tmp_path / "out"
     check_outcome(run("demo", "-o", folder), folder)
-    residuals = json.loads((folder / "fit.json").read_text())["trials"][0]["residual_force_rms_N"]
+    residuals = json.loads((folder / "two-level" / "fit.json").read_text())["trials"][0]["residual_force_rms_N"]
     assert residuals["estimate"] < residuals["corrected"] < residuals["literature"]
 
 
@@ -82,7 +79,7 @@ def test_files_hold_nothing_of_the_truth(tmp_path, quick_estimator):
 def test_errors_against_the_truth():
     subject = walking_subject()
     truth = unlike_literature(subject, np.random.default_rng(0)).bsp
-    demo = demo_module.Demo(fit=None, simultaneous=None, truth=truth, subject_file=None)
+    demo = demo_module.Demo(fit=None, two_level=None, truth=truth, subject_file=None)
     assert demo.rms_errors(truth) == (0.0, 0.0, 0.0)
     mass, com, inertia = demo.rms_errors(subject.literature)
     assert mass == pytest.approx(np.sqrt(np.mean((subject.literature.mass_kg - truth.mass_kg) ** 2)))
@@ -91,9 +88,9 @@ def test_errors_against_the_truth():
 
 
 def test_verdict_follows_the_numbers():
-    assert "every class" in _verdict((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))
-    assert "2 of 3 classes" in _verdict((1.0, 1.0, 1.0), (2.0, 0.5, 2.0))
-    assert "luck" in _verdict((1.0, 1.0, 1.0), (0.5, 0.5, 0.5))
+    assert "every class" in _two_level_verdict((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))
+    assert "2 of 3 classes" in _two_level_verdict((1.0, 1.0, 1.0), (2.0, 0.5, 2.0))
+    assert "luck" in _two_level_verdict((1.0, 1.0, 1.0), (0.5, 0.5, 0.5))
 
 
 def test_demo_refuses_a_folder_that_is_a_file(tmp_path):

@@ -53,10 +53,10 @@ def test_rows_fit_a_terminal_of_100_columns(table):
 
 def test_four_files_are_written(table, tmp_path):
     folder = save_table1(table, tmp_path / "deep" / "out")
-    assert sorted(path.name for path in folder.iterdir()) == ["table1.csv", "table1.html", "table1.json", "table1.png"]
+    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "table1.csv", "table1.json", "table1.png"]
     assert json.loads((folder / "table1.json").read_text())["seed"] == 3
     assert pd.read_csv(folder / "table1.csv").shape == (10, 2 + 12)
-    page = (folder / "table1.html").read_text()
+    page = (folder / "report.html").read_text()
     assert "walk &lt;1&gt;" in page
     assert "<svg" in page
     assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(

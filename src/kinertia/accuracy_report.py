@@ -26,7 +26,7 @@ def accuracy_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     """One row per class of parameters, under `HEADINGS`."""
     rows = []
     for name, found in scenario.classes.items():
-        factor, unit, form = _SHOWN[name]
+        factor, unit, form = _SHOWN.get(name, (1.0, "prior sd", ".2f"))
         errors = (f"{factor * value:{form}}" for value in (found.rms, found.bound, found.rms_literature))
         cover = f"{100 * found.cover:.1f} ± {100 * found.cover_sd:.1f} %"
         rows.append([f"{name} ({unit})", cover, f"{found.ratio:.2f}", *errors, f"{100 * found.better:.0f} %"])

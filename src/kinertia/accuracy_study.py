@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.bsp_prior import literature_prior
 from kinertia.disturbed import Faults, measured
+from kinertia.identifiability import evidence
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.parallel import in_parallel
@@ -33,6 +34,8 @@ CLASSES = {
     "products of inertia": slice(7, 10),
 }
 """Columns of `BodySegmentParameters.table`."""
+EVIDENCE = ("measured", "informed", "assumed")
+"""Parameters of all kinds by what stands behind their estimate (`identifiability.evidence`)."""
 WITHIN = 1.959964
 """Half width of a 95 % interval in deviations."""
 _HELD_SD_M = 1e-4
@@ -56,11 +59,9 @@ PROOF = {
 """What error bars are made for."""
 BREAKS = {
     "axes": Scenario("axes of knees, ankles and elbows 5 degrees off", Faults("artefact", axes_rad=np.radians(5.0))),
-    "hips": Scenario(
-        "hip centres 15 mm off, calibration switched off", Faults("artefact", hips_m=0.015), calibrated=False
-    ),
+    "hips": Scenario("hip centres 15 mm off, calibration switched off", Faults("artefact", hips_m=0.015), False),
     "wobbling": Scenario("40 % of the thighs' mass wobbles", Faults("artefact", wobbling=0.4)),
-    "gain": Scenario("right plate's gain 2 % off", Faults("artefact", gain=0.02)),
+    "gain": Scenario("right plate's gain 2 % off, calibration switched off", Faults("artefact", gain=0.02), False),
 }
 """What error bars are not made for: how far they fall."""
 SCENARIOS = PROOF | BREAKS
@@ -72,9 +73,9 @@ class Draw:
 
     Attributes:
         errors, literature_errors: (s, 10) estimate and literature minus truth, in the table's order and units.
-        sd: (s, 10) posterior deviations.
-        bound: (s, 10) the same at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's own
-            noise model, prior included.
+        prior_sd, sd: (s, 10) prior and posterior deviations.
+        bound: (s, 10) the latter at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's
+            own noise model, prior included.
         angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
         angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
         converged: of the estimate.
@@ -82,6 +83,7 @@ class Draw:
 
     errors: np.ndarray
     literature_errors: np.ndarray
+    prior_sd: np.ndarray
     sd: np.ndarray
     bound: np.ndarray
     angles_rad: tuple[float, float]
@@ -91,7 +93,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class ClassAccuracy:
-    """One class of parameters over all draws of a scenario.
+    """One class of parameters over all draws of a scenario; those by evidence are in prior deviations.
 
     Attributes:
         cover: share of parameters within their 95 % interval.
@@ -166,6 +168,7 @@ def run_draw(seed: int, case: tuple[str, int]) -> Draw:
     return Draw(
         result.bsp.table() - trial.bsp.table(),
         prior.mean.table() - trial.bsp.table(),
+        prior.sd,
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         bound,
         (_rms(off[0]), _rms(off[1])),
@@ -181,30 +184,44 @@ def held(skeleton: Skeleton) -> CalibrationPrior:
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
-    """Cover, ratio and errors by class."""
-    errors, before = (np.array([getattr(d, name) for d in draws]) for name in ("errors", "literature_errors"))
-    sd, bound = (np.array([getattr(d, name) for d in draws]) for name in ("sd", "bound"))
+    """Cover, ratio and errors by class and by evidence."""
+    errors, before, sd, bound, prior = (
+        np.array([getattr(d, name) for d in draws])
+        for name in ("errors", "literature_errors", "sd", "bound", "prior_sd")
+    )
     classes = {}
     for name, columns in CLASSES.items():
-        away = errors[..., columns] / sd[..., columns]
-        within = np.mean(np.abs(away) < WITHIN, axis=(1, 2))
-        each, each_before = (np.mean(np.square(e[..., columns]), axis=(1, 2)) for e in (errors, before))
-        classes[name] = ClassAccuracy(
-            float(within.mean()),
-            float(within.std() / np.sqrt(len(draws))),
-            _rms(away),
-            float(np.sqrt(each.mean())),
-            float(np.sqrt(each_before.mean())),
-            _rms(bound[..., columns]),
-            float(np.mean(each < each_before)),
-        )
+        classes[name] = _class(*(part[..., columns] for part in (errors, before, sd, bound)))
+    words = np.vectorize(evidence)(1.0 - np.square(sd / prior))
+    for word in EVIDENCE:
+        chosen = np.where(words == word, 1.0, np.nan) / prior
+        if np.isfinite(chosen).any():
+            classes[word] = _class(*(part * chosen for part in (errors, before, sd, bound)))
     angles = [_rms(np.array([getattr(d, kind)[i] for d in draws])) for kind in _ANGLES for i in range(2)]
     converged = float(np.mean([d.converged for d in draws]))
     return ScenarioAccuracy(title, len(draws), classes, (angles[0], angles[1]), (angles[2], angles[3]), converged)
+
+
+def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.ndarray) -> ClassAccuracy:
+    """Of arrays (draws, s, k); NaN is left out, and a draw of which nothing is left."""
+    left = np.isfinite(errors).any(axis=(1, 2))
+    errors, before, sd, bound = (part[left] for part in (errors, before, sd, bound))
+    away = errors / sd
+    within = np.nanmean(np.where(np.isfinite(away), np.abs(away) < WITHIN, np.nan), axis=(1, 2))
+    each, each_before = (np.nanmean(np.square(part), axis=(1, 2)) for part in (errors, before))
+    return ClassAccuracy(
+        float(within.mean()),
+        float(within.std() / np.sqrt(len(within))),
+        _rms(away),
+        _rms(errors),
+        _rms(before),
+        _rms(bound),
+        float(np.mean(each < each_before)),
+    )
 
 
 _ANGLES = ("angles_rad", "angle_changes_rad")
 
 
 def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+    return float(np.sqrt(np.nanmean(np.square(values))))

@@ -55,3 +55,17 @@ class BlockBand:
             known = right[i] if i == last else right[i] - self.below[i].T @ result[i + 1]
             result[i] = solve_triangular(self.diagonal[i], known, lower=True, trans="T", check_finite=False)
         return result
+
+    def inverse_blocks(self) -> tuple[np.ndarray, np.ndarray]:
+        """Blocks of the inverse on the diagonal (b, k, k) and below it (b - 1, k, k), by Takahashi's recursion."""
+        diagonal, below = np.empty_like(self.diagonal), np.empty_like(self.below)
+        unit = np.eye(self.diagonal.shape[1])
+        for i in range(len(diagonal) - 1, -1, -1):
+            half = solve_triangular(self.diagonal[i], unit, lower=True, check_finite=False)
+            if i == len(diagonal) - 1:
+                diagonal[i] = half.T @ half
+                continue
+            carried = self.below[i] @ half
+            below[i] = -diagonal[i + 1] @ carried
+            diagonal[i] = half.T @ half - carried.T @ below[i]
+        return diagonal, below

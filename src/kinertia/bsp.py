@@ -135,6 +135,12 @@ class BodySegmentParameters:
             }
         )
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a row per segment, a column per parameter, in kg, m and kg m2."""
+        headings = [f"{name} ({unit})" for name, unit in zip(PARAMETERS, UNITS, strict=True)]
+        frame = pd.DataFrame(self.table(), index=pd.Index(self.segments, name="segment"), columns=headings)
+        return str(frame.to_html(float_format=lambda value: f"{value:.4g}"))
+
     @classmethod
     def from_frame(cls, frame: pd.DataFrame) -> BodySegmentParameters:
         """Inverse of `to_frame`; rows may come in any order, segments keep the order of their first row.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +22,7 @@ from kinertia.identifiability import evidence
 from kinertia.inputs import read_inputs, read_trials
 from kinertia.io.osim import read_osim
 from kinertia.io.sto import write_then_rename
+from kinertia.provenance import provenance_of
 from kinertia.results import save_fit, summary
 from kinertia.subject_draft import init_subject
 from kinertia.terminal import out, plain_table, show_error, show_verdicts, shown_progress
@@ -164,7 +166,7 @@ def fit(
         wanted = with_settings(wanted, method=method)
     results_folder(output, force)
     result = _run(wanted)
-    folder = save_fit(result, output)
+    folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
     judged = verdicts(result)
     _report(result)
     _report_verdicts(judged, result, verbose)
@@ -188,6 +190,13 @@ def init(
     text = init_subject(folder)
     write_then_rename(path, text)
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
+
+
+def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
+    """The command line that repeats this run."""
+    given = {**options, "--method": method, "-o": output}
+    words = [str(word) for name, value in given.items() if value is not None for word in (name, value)]
+    return shlex.join(["kinertia", "fit", str(trial), *words])
 
 
 def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
@@ -296,6 +305,6 @@ def _bsp_table(fit: Fit) -> Table:
     return table
 
 
-for _command in (demo, init, check, fit):
-    app.command()(_command)
+for _entry in (demo, init, check, fit):
+    app.command()(_entry)
 app.add_typer(study, name="study")

@@ -41,8 +41,8 @@ def _report_demo(result: Demo, folder: Path) -> None:
     bodies = {
         "truth": result.truth,
         "literature": fit.literature,
-        "two-level": fit.estimate,
-        "simultaneous": result.simultaneous.estimate,
+        "estimate": fit.estimate,
+        "two-level": result.two_level.estimate,
     }
     trial = fit.trials[0]
     out.print(
@@ -74,16 +74,15 @@ def _report_demo(result: Demo, folder: Path) -> None:
     for k, (what, unit, form, factor) in enumerate(named):
         errors.add_row(what, unit, *(f"{values[k] * factor:{form}}" for values in found))
     out.print(errors)
-    loads = {**trial.residuals, "simultaneous": result.simultaneous.trials[0].residuals["estimate"]}
-    loads["two-level"] = loads.pop("estimate")
+    loads = {**trial.residuals, "two-level": result.two_level.trials[0].residuals["estimate"]}
     out.print(
         "residual at the pelvis, RMS: "
         + "; ".join(f"{stage} {_rms(load[:, :3]):.1f} N, {_rms(load[:, 3:]):.1f} N m" for stage, load in loads.items())
         + "\n"
     )
     out.print(_verdict(found[0], found[1]) + "\n")
-    out.print(_simultaneous_verdict(found[0], found[2]) + "\n")
-    for name, one in (("two-level", fit), ("simultaneous", result.simultaneous)):
+    out.print(_two_level_verdict(found[0], found[2]) + "\n")
+    for name, one in (("estimate", fit), ("two-level", result.two_level)):
         for warning in one.warnings:
             out.print(f"warning ({name}): {warning}")
     out.print(
@@ -98,21 +97,21 @@ def _rms(load: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(load).sum(axis=1))))
 
 
-def _simultaneous_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """How the simultaneous estimate compares with the literature, by the numbers of this run."""
+def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """How the estimate compares with the literature, by the numbers of this run."""
     shares = ", ".join(
         f"{what} {100 * (other / one - 1):+.0f} %"
         for what, one, other in zip(("mass", "centre of mass", "inertia"), before, after, strict=True)
     )
     return (
-        f"The simultaneous estimate (--method simultaneous) changes these errors by: {shares}. It weighs "
+        f"The simultaneous estimate changes the literature's errors by: {shares}. It weighs "
         "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says "
         "per parameter how much was measured."
     )
 
 
-def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """What the comparison shows, by the numbers of this run."""
+def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """What the comparison with two-level shows, by the numbers of this run."""
     worse = sum(one < other for one, other in zip(before, after, strict=True))
     if worse == len(before):
         finding = "Two-level explains the forces far better, yet every class of parameters is further from the truth"
@@ -159,7 +158,7 @@ def table1(
         table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     _report_table1(table, source.deviation)
     save_table1(table, output)
-    out.print(f"results in {output}: table1.json, table1.csv, table1.html, table1.png")
+    out.print(f"results in {output}: report.html, table1.json, table1.csv, table1.png")
 
 
 def _report_table1(table: Table1, deviation: np.ndarray) -> None:

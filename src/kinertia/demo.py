@@ -6,6 +6,7 @@ reads the laboratory's files.
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import complete_folder
 from kinertia.prepare import Progress
+from kinertia.provenance import provenance_of
 from kinertia.results import save_fit
 from kinertia.synthetic import unlike_literature, walk, walking_subject
 from kinertia.synthetic_lab import LabNoise, record, write_lab
@@ -34,23 +36,23 @@ class Demo:
     """Fits of synthetic files by both estimators, and the truth behind them.
 
     Attributes:
-        fit: the two-level estimate.
-        simultaneous: the simultaneous estimate from the same files.
+        fit: the simultaneous estimate.
+        two_level: the two-level estimate from the same files.
         truth: the BSPs that the files were made with.
         subject_file: of the synthetic laboratory.
     """
 
     fit: Fit
-    simultaneous: Fit
+    two_level: Fit
     truth: BodySegmentParameters
     subject_file: Path
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Columns segment, parameter, unit, truth, literature, estimate (two-level), simultaneous, simultaneous_sd."""
-        table, other = self.fit.bsp, self.simultaneous.bsp
+        """Columns segment, parameter, unit, truth, literature, estimate, sd, two_level."""
+        table = self.fit.bsp[["segment", "parameter", "unit", "literature", "estimate", "sd"]].copy()
         table.insert(3, "truth", self.truth.to_frame()["value"])
-        return table.assign(simultaneous=other["estimate"], simultaneous_sd=other["sd"])
+        return table.assign(two_level=self.two_level.bsp["estimate"])
 
     def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
         """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
@@ -70,7 +72,7 @@ def run_demo(
 ) -> Demo:
     """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
 
-    The two-level results stand in `folder` itself, those of the simultaneous estimate in `folder`/simultaneous.
+    The results of the simultaneous estimate stand in `folder` itself, those of two-level in `folder`/two-level.
 
     Args:
         folder: is made if need be.
@@ -90,11 +92,12 @@ def run_demo(
         recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
         wanted = read_subject(write_lab(work / "lab", recordings))
         static, inputs, marker_set = read_inputs(wanted, progress)
+        where = provenance_of(wanted, shlex.join(["kinertia", "demo", "-o", str(folder)])).moved(work, folder)
         fits = []
-        for method, results in (("two-level", work), ("simultaneous", work / "simultaneous")):
+        for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
             settings = with_settings(wanted, method=method).settings
             fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-            save_fit(fits[-1], results)
+            save_fit(fits[-1], results, where)
         demo = Demo(fits[0], fits[1], subject.bsp, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

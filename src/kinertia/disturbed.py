@@ -94,12 +94,13 @@ def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Sk
     """The skeleton with every joint of one rotation tilted by this angle, each in a random direction."""
     joints = []
     for joint in skeleton.joints:
-        if len(joint.axes) == 1 and joint.axes[0].kind == "rotation":
-            axis = np.array(joint.axes[0].direction)
-            across = np.cross(axis, rng.standard_normal(3))
-            turned = Rotation.from_rotvec(angle_rad * across / np.linalg.norm(across)).apply(axis)
-            x, y, z = map(float, turned)
-            joint = replace(joint, axes=(replace(joint.axes[0], direction=(x, y, z)),))
+        moving = [axis for axis in joint.axes if axis.coordinate not in skeleton.locked]
+        if len(moving) == 1 and moving[0].kind == "rotation":
+            direction = np.array(moving[0].direction)
+            across = np.cross(direction, rng.standard_normal(3))
+            x, y, z = map(float, Rotation.from_rotvec(angle_rad * across / np.linalg.norm(across)).apply(direction))
+            turned = replace(moving[0], direction=(x, y, z))
+            joint = replace(joint, axes=tuple(turned if axis is moving[0] else axis for axis in joint.axes))
         joints.append(joint)
     return replace(skeleton, joints=tuple(joints))
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,9 @@ from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording
 from kinertia.two_level import Window, correct_pelvis, estimate_two_level, stretches
 
+if TYPE_CHECKING:
+    from kinertia.report.plots import FitPlots
+
 
 @dataclass(frozen=True, eq=False)
 class TrialFit:
@@ -39,6 +43,7 @@ class TrialFit:
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
             "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
         moments: joint inverse dynamics (w, 27; N m, N) per stage: "literature", "estimate".
+        moment_sd: (w, 27) posterior deviations of those of the estimate; None after two-level.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
     """
@@ -47,6 +52,7 @@ class TrialFit:
     motion: Motion
     residuals: Mapping[str, np.ndarray]
     moments: Mapping[str, np.ndarray]
+    moment_sd: np.ndarray | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
 
@@ -129,6 +135,20 @@ class Fit:
     def calibration(self) -> pd.DataFrame | None:
         """Value, prior and posterior deviation and unit of every calibrated quantity; None after two-level."""
         return None if self.posterior is None else pd.DataFrame(dict(self.posterior.calibration)).T
+
+    @property
+    def plot(self) -> FitPlots:
+        """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
+        # here and in `_repr_html_`: estimation does not depend on the report, only asks for it when somebody looks
+        from kinertia.report.plots import FitPlots
+
+        return FitPlots(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: verdict, warnings, body segment parameters."""
+        from kinertia.report.notebook import fit_html
+
+        return fit_html(self)
 
 
 def estimate_bsp(
@@ -237,7 +257,7 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
     estimates = [
         (joined([next(motions) for _ in parts]), k.foot_loads) for k, parts in zip(ready.kinematics, cut, strict=True)
     ]
-    trials = _trial_fits(ready, ready.skeleton, result.bsp, estimates, started)
+    trials = _trial_fits(ready, ready.skeleton, result.bsp, estimates, [None] * len(estimates), started)
     warnings = two_level_warnings(result)
     return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
 
@@ -252,7 +272,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
     fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz, ready.freedom)
     bsp, skeleton = fitted.bsp, fitted.skeleton
     estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
-    trials = _trial_fits(ready, skeleton, bsp, estimates, started)
+    trials = _trial_fits(ready, skeleton, bsp, estimates, fitted.result.moment_sd, started)
     return _Outcome(skeleton, bsp, trials, fitted.result.converged, fitted.posterior, fitted.warnings)
 
 
@@ -261,13 +281,15 @@ def _trial_fits(
     skeleton: Skeleton,
     bsp: BodySegmentParameters,
     estimates: Sequence[tuple[Motion, np.ndarray]],
+    moment_sds: Sequence[np.ndarray | None],
     started: float,
 ) -> tuple[TrialFit, ...]:
     """Every trial before and after; `estimates` holds its motion and its foot loads (w, 2, 6) as estimated."""
     spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
     before, literature = ready.skeleton, ready.literature
     trials = []
-    for k, seconds, (motion, loads) in zip(ready.kinematics, ready.seconds, estimates, strict=True):
+    rows = zip(ready.kinematics, ready.seconds, estimates, moment_sds, strict=True)
+    for k, seconds, (motion, loads), moment_sd in rows:
         window = _window(k)
         corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
         residuals = {
@@ -282,7 +304,7 @@ def _trial_fits(
         errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
         timing = {**seconds, "estimate": spent * len(k.time)}
         timing["total"] = sum(timing.values())
-        trials.append(TrialFit(k, motion, residuals, moments, errors, timing))
+        trials.append(TrialFit(k, motion, residuals, moments, moment_sd, errors, timing))
     return tuple(trials)
 
 

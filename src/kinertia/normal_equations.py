@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.block_band import BlockBand
 from kinertia.motion_basis import MotionBasis
 
 
@@ -67,3 +68,44 @@ def assemble(
         normal.right[first : first + 6] += up
         for a in range(6):
             normal.band[first + a, : 6 - a] += block[a, a:]
+
+
+def reduced(
+    normal: NormalEquations, damping: float
+) -> tuple[np.ndarray, np.ndarray, BlockBand, np.ndarray, np.ndarray]:
+    """Schur complement (S, S) and right-hand side (S,) of the static unknowns, with what back-substitution needs."""
+    diagonal, below = _blocks(normal.band, damping)
+    band = BlockBand.factor(diagonal, below)
+    b, k, _ = diagonal.shape
+    size, c, s = normal.border.shape
+    right = np.zeros((b * 5, c, s + 1))
+    right[:size, :, :s], right[:size, :, s] = normal.border, normal.right
+    solved = band.forward(right.reshape(b, k, s + 1))
+    border, motion = solved[..., :s], solved[..., s:]
+    flat = border.reshape(-1, s)
+    return normal.static - flat.T @ flat, normal.static_right - flat.T @ motion.ravel(), band, border, motion
+
+
+def _blocks(band: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks of five splines: diagonal (b, 5 c, 5 c) and below it (b - 1, 5 c, 5 c)."""
+    size, _, c, _ = band.shape
+    b = -(-size // 5)
+    padded = np.zeros((5 * b + 5, 6, c, c))
+    padded[:size] = band
+    diagonal, below = np.zeros((b, 5, c, 5, c)), np.zeros((b, 5, c, 5, c))
+    for i in range(5):
+        rows = padded[i : 5 * b : 5]
+        for offset in range(6):
+            j = i + offset
+            if j < 5:
+                diagonal[:, i, :, j, :] += rows[:, offset]
+                if offset:
+                    diagonal[:, j, :, i, :] += rows[:, offset].transpose(0, 2, 1)
+            else:
+                below[:, j - 5, :, i, :] = rows[:, offset].transpose(0, 2, 1)
+    diagonal = diagonal.reshape(b, 5 * c, 5 * c)
+    inside = np.arange(5 * b * c) < size * c
+    entries = np.einsum("bii->bi", diagonal)
+    entries *= 1.0 + damping
+    entries += np.where(inside, 0.0, 1.0).reshape(b, -1)
+    return diagonal, below.reshape(b, 5 * c, 5 * c)[:-1]

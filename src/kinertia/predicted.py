@@ -17,7 +17,8 @@ from kinertia.bsp import block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import CalibrationPrior, MapProblem, Observation
-from kinertia.simultaneous import covariance_of, reduced
+from kinertia.normal_equations import reduced
+from kinertia.simultaneous import covariance_of
 from kinertia.skeleton import Skeleton
 
 

@@ -1,4 +1,4 @@
-"""Writes a `Fit` to a folder: `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
+"""Writes a `Fit` to a folder: `report.html`, `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
 
 Everything is written to a hidden folder first and moved when complete, so a run never leaves half a result.
 """
@@ -24,20 +24,24 @@ from kinertia.io.osim_export import export_osim
 from kinertia.io.osim_write import write_osim
 from kinertia.io.sto import write_sto
 from kinertia.osim_prepare import centre_offsets
+from kinertia.provenance import Provenance
+from kinertia.report.page import render
 
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
 
-def save_fit(fit: Fit, folder: str | Path) -> Path:
+def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None) -> Path:
     """Write all result files of a fit into a folder, which is made if need be; returns the folder.
 
-    With one trial its files stand in the folder itself, with several in a sub-folder per trial.
+    With one trial its files stand in the folder itself, with several in a sub-folder per trial. The report names
+    command and files where `provenance` tells them.
 
     Raises:
         FileError: the folder cannot be written to.
     """
     with complete_folder(folder) as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
+        (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
         fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
         _write_model(fit, work)
         for trial in fit.trials:
@@ -65,6 +69,10 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
     for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
         write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage]), False, file)
+    if trial.moment_sd is not None:
+        write_sto(
+            folder / "inverse_dynamics_sd.sto", _table(trial, loads, trial.moment_sd), False, "inverse_dynamics_sd"
+        )
     columns = [f"{stage}_{name}" for stage in trial.residuals for name in _RESIDUALS]
     residuals = np.hstack(list(trial.residuals.values()))
     write_sto(folder / "residuals.sto", _table(trial, columns, residuals), False, "residuals")

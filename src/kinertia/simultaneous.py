@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.block_band import BlockBand
 from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation
-from kinertia.normal_equations import NormalEquations
+from kinertia.moment_sd import joint_moment_sd
+from kinertia.normal_equations import reduced
 from kinertia.skeleton import Skeleton
 
 
@@ -38,6 +38,7 @@ class SimultaneousResult:
         clock_s: the time offset and its posterior deviation, s.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
+        moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
         converged: the last step promised to lower the cost by less than CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
@@ -51,6 +52,7 @@ class SimultaneousResult:
     clock_s: tuple[float, float]
     foot_loads: tuple[np.ndarray, ...]
     motions: tuple[Motion, ...]
+    moment_sd: tuple[np.ndarray, ...]
     converged: bool
     iterations: int
     cost: tuple[float, float]
@@ -129,47 +131,6 @@ def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarr
     return step, moves, promised
 
 
-def reduced(
-    normal: NormalEquations, damping: float
-) -> tuple[np.ndarray, np.ndarray, BlockBand, np.ndarray, np.ndarray]:
-    """Schur complement (S, S) and right-hand side (S,) of the static unknowns, with what back-substitution needs."""
-    diagonal, below = _blocks(normal.band, damping)
-    band = BlockBand.factor(diagonal, below)
-    b, k, _ = diagonal.shape
-    size, c, s = normal.border.shape
-    right = np.zeros((b * 5, c, s + 1))
-    right[:size, :, :s], right[:size, :, s] = normal.border, normal.right
-    solved = band.forward(right.reshape(b, k, s + 1))
-    border, motion = solved[..., :s], solved[..., s:]
-    flat = border.reshape(-1, s)
-    return normal.static - flat.T @ flat, normal.static_right - flat.T @ motion.ravel(), band, border, motion
-
-
-def _blocks(band: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks of five splines: diagonal (b, 5 c, 5 c) and below it (b - 1, 5 c, 5 c)."""
-    size, _, c, _ = band.shape
-    b = -(-size // 5)
-    padded = np.zeros((5 * b + 5, 6, c, c))
-    padded[:size] = band
-    diagonal, below = np.zeros((b, 5, c, 5, c)), np.zeros((b, 5, c, 5, c))
-    for i in range(5):
-        rows = padded[i : 5 * b : 5]
-        for offset in range(6):
-            j = i + offset
-            if j < 5:
-                diagonal[:, i, :, j, :] += rows[:, offset]
-                if offset:
-                    diagonal[:, j, :, i, :] += rows[:, offset].transpose(0, 2, 1)
-            else:
-                below[:, j - 5, :, i, :] = rows[:, offset].transpose(0, 2, 1)
-    diagonal = diagonal.reshape(b, 5 * c, 5 * c)
-    inside = np.arange(5 * b * c) < size * c
-    entries = np.einsum("bii->bi", diagonal)
-    entries *= 1.0 + damping
-    entries += np.where(inside, 0.0, 1.0).reshape(b, -1)
-    return diagonal, below.reshape(b, 5 * c, 5 * c)[:-1]
-
-
 def _result(
     problem: MapProblem,
     coefficients: Sequence[np.ndarray],
@@ -200,6 +161,7 @@ def _result(
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, coefficients, strict=True)),
+        tuple(joint_moment_sd(problem, k, part, values, covariance) for k, part in enumerate(coefficients)),
         converged,
         iterations,
         cost,

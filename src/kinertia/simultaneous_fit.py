@@ -152,7 +152,8 @@ def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResul
     return found
 
 
-_SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
+SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
+"""Factor and unit in which people read a calibrated quantity."""
 
 
 def _warnings(
@@ -170,7 +171,7 @@ def _warnings(
     for name, told in posterior.calibration.items():
         value, sd = float(told["value"]), float(told["prior_sd"])
         if ":" in name and abs(value) > _NOTABLE * sd:
-            scale, unit = _SHOWN_UNIT[str(told["unit"])]
+            scale, unit = SHOWN_UNIT[str(told["unit"])]
             found.append(
                 f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.0f} {unit}); check the instruments"
             )

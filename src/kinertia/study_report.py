@@ -1,19 +1,20 @@
-"""Table 1 on paper and screen: `table1.json`, `table1.csv`, a picture, and rows for the terminal."""
+"""Table 1 on paper and screen: `table1.json`, `table1.csv`, a picture, `report.html`, and rows for the terminal."""
 
 from __future__ import annotations
 
 import io
 import json
 from dataclasses import asdict
-from html import escape
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from kinertia import __version__
 from kinertia.io.folder import complete_folder
+from kinertia.report.page import rendered
 from kinertia.study import CONDITIONS, PUBLISHED, Table1, table1_json
 
 QUANTITIES = {
@@ -33,17 +34,6 @@ _COLOURS = {
     "correction_noise": "#D55E00",
 }
 _MARKS = {"start": "_", **dict(zip(CONDITIONS, "svo^", strict=True))}
-
-_PAGE = """<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>Table 1 repeated</title>
-<style>body{{font-family:sans-serif;max-width:60rem;margin:1rem auto;padding:0 1rem}}
-table{{border-collapse:collapse;font-size:.9rem}}
-td,th{{padding:.25rem .6rem;border-bottom:1px solid #ccc;text-align:right}}
-td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>
-<h1>Table 1 repeated</h1><p>{about}</p>{table}
-<h2>Error per segment</h2>{picture}<p>{caption}</p></html>
-"""
 
 
 def table1_frame(table: Table1) -> pd.DataFrame:
@@ -105,27 +95,26 @@ def table1_figure(table: Table1) -> Figure:
 
 
 def save_table1(table: Table1, folder: str | Path) -> Path:
-    """Write `table1.json`, `table1.csv`, `table1.html` and `table1.png` into a folder; returns the folder."""
+    """Write `table1.json`, `table1.csv`, `table1.png` and `report.html` into a folder; returns the folder."""
     figure = table1_figure(table)
     svg = io.StringIO()
     figure.savefig(svg, format="svg", metadata={"Date": None})
     picture = svg.getvalue()
-    about = (
-        f"{len(table.draws)} draws of start and noise, seed {table.seed}, {table.trial}. "
-        "RMS / max; ours (mean and standard deviation over the draws) above the published values."
-    )
-    rows = pd.DataFrame(table1_rows(table), columns=["error", *CONDITIONS.values()])
-    page = _PAGE.format(
-        about=escape(about),
-        table=rows.to_html(index=False, border=0),
-        picture=picture[picture.index("<svg") :],
-        caption="Start: every parameter off by up to 50 %. The scale is logarithmic.",
+    page = rendered(
+        "table1.html.j2",
+        title="Table 1 repeated",
+        draws=len(table.draws),
+        seed=table.seed,
+        trial=table.trial,
+        headings=list(CONDITIONS.values()),
+        rows=table1_rows(table),
+        picture=Markup(picture[picture.index("<svg") :]),
     )
     with complete_folder(folder) as work:
         (work / "table1.json").write_text(
             json.dumps({"kinertia": __version__, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
         )
         table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")
-        (work / "table1.html").write_text(page, encoding="utf-8")
+        (work / "report.html").write_text(page, encoding="utf-8")
         figure.savefig(work / "table1.png", dpi=150)
     return Path(folder)

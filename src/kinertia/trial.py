@@ -216,6 +216,13 @@ class Trial:
         """First and last time (s) of every contiguous run of measured frames, longest run first."""
         return windows(self.markers.time, self.measured)
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: frames, markers and their gaps, measured windows, notes."""
+        # only when somebody looks: trials know nothing of reports
+        from kinertia.report.notebook import trial_html
+
+        return trial_html(self)
+
     def rotated(self, rotation: FloatArray) -> Trial:
         """The same trial in axes turned about the vertical: new = rotation @ old, for markers and loads
         alike.

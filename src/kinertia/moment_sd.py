@@ -1,0 +1,154 @@
+"""Standard deviations of joint moments, from motion, body segment parameters and calibration together.
+
+Delta method: the joint moments' analytic derivatives by spline coefficients and static unknowns, times their posterior
+covariance. Of the coefficients' covariance only the blocks near the diagonal are needed, since six splines are active
+in any frame; they come from the block-banded factor (`BlockBand.inverse_blocks`) and the static unknowns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from kinertia.log_cholesky import dynamic_jacobian
+from kinertia.map_terms import MapProblem
+from kinertia.normal_equations import NormalEquations, reduced
+from kinertia.skeleton import Pose, Skeleton
+
+FEET = ("foot_r", "foot_l")
+"""Segments that the ground acts on, in the order of foot loads."""
+
+
+@dataclass(frozen=True)
+class MomentDerivatives:
+    """Derivatives of generalised forces at d frames.
+
+    Attributes:
+        q, qd, qdd: (d, c, c) by the coordinates that move and their rates.
+        static: (d, c, s) by the static unknowns that root equations depend on.
+    """
+
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    static: np.ndarray
+
+
+def joint_moment_sd(
+    problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray, covariance: np.ndarray
+) -> np.ndarray:
+    """(d, c) posterior deviations of the generalised forces of trial k at its dynamic frames, N m and N.
+
+    Args:
+        problem: of the estimate.
+        k: the trial.
+        coefficients, static: the estimate.
+        covariance: (S, S) posterior covariance of the static unknowns.
+    """
+    basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
+    by = moment_derivatives(problem, k, coefficients, static)
+    motion = _MotionCovariance.of(problem.normal(k, coefficients, static), covariance)
+    root = problem.layout.in_root
+    variance = np.empty(by.q.shape[:2])
+    for first in np.unique(basis.first[frames]):
+        rows = np.flatnonzero(basis.first[frames] == first)
+        values = basis.values[:, frames[rows], None, :, None]
+        through = sum(value * part[rows][:, :, None] for value, part in zip(values, (by.q, by.qd, by.qdd), strict=True))
+        through = through.reshape(len(rows), through.shape[1], -1)
+        own, across = motion.active(int(first), root)
+        still = by.static[rows]
+        variance[rows] = np.einsum("nri,nri->nr", through @ own, through)
+        variance[rows] += np.einsum("nri,nri->nr", 2.0 * through @ across + still @ covariance[root, root], still)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> MomentDerivatives:
+    """Derivatives of `dynamics.inverse_dynamics` at the dynamic frames of trial k."""
+    trial, layout = problem.trials[k], problem.layout
+    frames = np.flatnonzero(trial.dynamic)
+    skeleton = problem.placed(static)
+    q, qd, qdd = (part[frames] for part in problem.full(problem.bases[k].evaluate(coefficients), static))
+    model = skeleton.model_with(problem.bsp(static))
+    data = model.createData()
+    d, c = q.shape
+    dq, dv, da = np.empty((d, c, c)), np.empty((d, c, c)), np.empty((d, c, c))
+    joints, place = skeleton.placement_of_parameters(problem.segments)
+    columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
+    regressor = np.empty((d, c, len(columns)))
+    for i in range(d):
+        pin.computeRNEADerivatives(model, data, q[i], qd[i], qdd[i])
+        dq[i], dv[i], da[i] = data.dtau_dq, data.dtau_dv, data.M
+        regressor[i] = pin.computeJointTorqueRegressor(model, data, q[i], qd[i], qdd[i])[:, columns]
+    da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
+    loads, rates = (problem.foot_loads(k, static, order)[frames] for order in (0, 1))
+    pose = skeleton.pose(q)
+    by_static = np.zeros((d, c, layout.in_root.stop))
+    by_segment = (regressor.reshape(d, c, len(joints), 1, 10) @ place)[..., 0, :]
+    chain = dynamic_jacobian(static[layout.theta])
+    by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, c, 10 * len(joints))
+    for foot, name in enumerate(FEET):
+        moves = skeleton.support[skeleton.segments.index(name)]
+        jacobian = (pose.jacobian * moves).transpose(0, 2, 1)
+        only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
+        by_plate = trial.ground.by_plate(only, problem.carriers[k][frames], problem.plate_values(static))
+        by_static[:, :, layout.plates] -= jacobian @ by_plate
+        by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]
+        dq -= _load_derivative(skeleton, pose, moves, loads[:, foot])
+    by_static[:, :, layout.coordinates] = dq[:, :, problem.still]
+    rows = problem.moving[:, None]
+    by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (dq, dv, da))
+    return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving])
+
+
+def _load_derivative(skeleton: Skeleton, pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """(d, c, c) derivative of J^T load by the coordinates, for a load (d, 6) at the ground origin.
+
+    A coordinate turns the axes of all that come after it: column j of J changes by the motion product of i and j.
+    """
+    columns = pose.jacobian.transpose(0, 2, 1) * moves[:, None]
+    linear, angular = columns[..., :3], columns[..., 3:]
+    force, moment = load[:, None, :3], load[:, None, 3:]
+    # (J_i x J_j) . load = J_j . (load carried along by i)
+    carried = np.concatenate([np.cross(force, angular), np.cross(moment, angular) + np.cross(force, linear)], axis=-1)
+    changed = columns @ carried.transpose(0, 2, 1)
+    order = np.arange(len(moves))
+    return np.where(order[:, None] > order, changed, 0.0)
+
+
+@dataclass(frozen=True)
+class _MotionCovariance:
+    """Posterior covariance of neighbouring spline coefficients, and of each with the static unknowns.
+
+    Attributes:
+        diagonal, below: blocks of five splines (b, 5 c, 5 c), (b - 1, 5 c, 5 c), static unknowns known.
+        by_static: (5 b, c, S) minus the derivative of the coefficients by the static unknowns.
+        static: (S, S) covariance.
+    """
+
+    diagonal: np.ndarray
+    below: np.ndarray
+    by_static: np.ndarray
+    static: np.ndarray
+
+    @classmethod
+    def of(cls, normal: NormalEquations, covariance: np.ndarray) -> _MotionCovariance:
+        _, _, band, border, _ = reduced(normal, 0.0)
+        c = normal.right.shape[1]
+        return cls(*band.inverse_blocks(), band.backward(border).reshape(-1, c, border.shape[-1]), covariance)
+
+    def active(self, first: int, root: slice) -> tuple[np.ndarray, np.ndarray]:
+        """(6 c, 6 c) covariance of the six splines from `first` on, (6 c, s) theirs with the static unknowns `root`."""
+        block, offset = divmod(first, 5)
+        pair = np.block(
+            [
+                [self.diagonal[block], self.below[block].T],
+                [self.below[block], self.diagonal[block + 1]],
+            ]
+        )
+        c = self.by_static.shape[1]
+        here = slice(offset * c, (offset + 6) * c)
+        through = self.by_static[first : first + 6].reshape(6 * c, -1)
+        spread = through @ self.static
+        return pair[here, here] + spread @ through.T, -spread[:, root]

@@ -1,0 +1,52 @@
+"""Where a result comes from: the command, the files with their hashes, and the versions that computed it."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from kinertia.config import SubjectFile
+
+_COMPUTES = ("kinertia", "numpy", "scipy", "pin", "ezc3d")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What it takes to repeat a result.
+
+    Attributes:
+        command: as typed on a command line.
+        files: SHA-256 of every input file, by its path.
+    """
+
+    command: str
+    files: Mapping[str, str]
+
+    def moved(self, before: Path, after: Path) -> Provenance:
+        """The same with files of one folder told to be in another."""
+        places = {Path(path): code for path, code in self.files.items()}
+        return Provenance(self.command, {str(after / path.relative_to(before)): code for path, code in places.items()})
+
+
+def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
+    """The command with the hashes of all files that the subject file names."""
+    paths = [wanted.model.static]
+    if isinstance(wanted.model.markers, Path):
+        paths.append(wanted.model.markers)
+    for trial in wanted.trials:
+        paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
+    return Provenance(command, {str(path): _sha256(path) for path in dict.fromkeys(paths)})
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that numbers depend on."""
+    return {"Python": platform.python_version(), **{name: version(name) for name in _COMPUTES}}

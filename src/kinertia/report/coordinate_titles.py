@@ -1,0 +1,71 @@
+"""What gait reports call the coordinates, and which belong to the two sides of one panel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinertia.skeleton import Skeleton
+
+_GAIT27 = {
+    "pelvis_tx": "Pelvis forward",
+    "pelvis_ty": "Pelvis upward",
+    "pelvis_tz": "Pelvis to the right",
+    "pelvis_tilt": "Pelvis tilt, backward +",
+    "pelvis_list": "Pelvis list, right side down +",
+    "pelvis_rotation": "Pelvis rotation, to the left +",
+    "hip_flexion": "Hip flexion +",
+    "hip_adduction": "Hip adduction +",
+    "hip_rotation": "Hip internal rotation +",
+    "knee_angle": "Knee flexion +",
+    "ankle_angle": "Ankle dorsiflexion +",
+    "subtalar_angle": "Subtalar inversion +",
+    "lumbar_extension": "Trunk extension +",
+    "lumbar_bending": "Trunk bending, to the right +",
+    "lumbar_rotation": "Trunk rotation, to the left +",
+    "arm_flex": "Shoulder flexion +",
+    "arm_add": "Shoulder adduction +",
+    "elbow_flex": "Elbow flexion +",
+}
+"""Signs as in `kinertia.gait27`; other models may have others, so their coordinates keep their names."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One panel: its title, and per side ("r", "l", or "" where there is none) the column in q."""
+
+    title: str
+    columns: dict[str, int]
+    rotational: bool
+
+
+def panels_of(skeleton: Skeleton) -> list[Coordinate]:
+    """The coordinates of a skeleton in their order, left and right together."""
+    names = skeleton.coordinates
+    found: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        base, side = _split(name, names)
+        found.setdefault(base, {})[side] = column
+    known = _GAIT27 if skeleton.name == "gait27" else {}
+    return [
+        Coordinate(known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())]))
+        for base, columns in found.items()
+    ]
+
+
+def title_of(skeleton: Skeleton, column: int) -> str:
+    """One coordinate in a sentence: "hip flexion, right"."""
+    for one in panels_of(skeleton):
+        for side, index in one.columns.items():
+            if index == column:
+                words = one.title.removesuffix(" +").split(",")[0]
+                return words[0].lower() + words[1:] + {"r": ", right", "l": ", left", "": ""}[side]
+    raise IndexError(column)
+
+
+def _split(name: str, names: Sequence[str]) -> tuple[str, str]:
+    """Name without its side, and the side, where the other side is there too."""
+    base, _, side = name.rpartition("_")
+    if side in ("r", "l") and {f"{base}_r", f"{base}_l"} <= set(names):
+        return base, side
+    return name, ""

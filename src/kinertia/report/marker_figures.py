@@ -1,0 +1,93 @@
+"""Figures of the markers: how far the model is from each, and when each was not seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kinertia.fit import TrialFit
+from kinertia.report import style
+from kinertia.report.panels import base_layout, compact, plain
+from kinertia.trial import runs
+
+_ROW_PX = 17
+_LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}
+
+
+def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> go.Figure:
+    """RMS distance (mm) between every measured and modelled marker over the window; the farthest on top.
+
+    `wandering` names the markers that the estimate trusts less.
+    """
+    labels = trial.kinematics.ik.labels
+    found = {stage: 1e3 * rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
+    order = np.argsort(-np.nan_to_num(found["final"], nan=-1.0))
+    names = [plain(labels[k]) + (" (counts less)" if labels[k] in wandering else "") for k in order]
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "x": compact(found[stage][order]),
+            "y": names,
+            "name": name,
+            "marker": {"symbol": symbol, "size": 9, "color": colour, "line": {"width": 1.5, "color": colour}},
+            "hovertemplate": "%{y}: %{x:.1f} mm<extra>%{fullData.name}</extra>",
+        }
+        for stage, name, symbol, colour in (
+            ("ik", "inverse kinematics", "circle-open", style.ORANGE),
+            ("final", "estimate", "circle", style.BLUE),
+        )
+    ]
+    worst = order[0]
+    alt = (
+        f"Distance between measured and modelled markers of {trial.name}; the largest after the estimate is "
+        f"{found['final'][worst]:.0f} mm at {labels[worst]}."
+    )
+    layout = base_layout(alt)
+    layout |= {
+        "height": 100 + _ROW_PX * len(names),
+        "margin": {"t": 40, "b": 44, "l": 12, "r": 14},
+        "xaxis": {"title": {"text": "RMS distance (mm)"}, "rangemode": "tozero", "gridcolor": "#EFEFEF"},
+        "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
+    }
+    return go.Figure(traces, layout)
+
+
+def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
+    """(m,) root mean square of distances (w, m) over the frames that show the marker; NaN for one never seen."""
+    seen = np.isfinite(errors_m)
+    total = np.square(np.where(seen, errors_m, 0.0)).sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(total / seen.sum(axis=0))
+
+
+def gap_figure(trial: TrialFit) -> go.Figure | None:
+    """When each marker of the model was not seen, over the whole trial; None where all always were."""
+    kinematics = trial.kinematics
+    time = kinematics.trial.markers.time
+    hidden = np.asarray(np.isnan(kinematics.trial.markers.select(kinematics.ik.labels).positions).any(axis=2))
+    gappy = [k for k in range(hidden.shape[1]) if hidden[:, k].any()]
+    if not gappy:
+        return None
+    names = [plain(kinematics.ik.labels[k]) for k in gappy]
+    x: list[float | None] = []
+    y: list[str | None] = []
+    half = 0.5 * float(time[1] - time[0])
+    for name, k in zip(names, gappy, strict=True):
+        for first, last in runs(hidden[:, k]):
+            x += [round(float(time[first]) - half, 4), round(float(time[last]) + half, 4), None]
+            y += [name, name, None]
+    line = {"type": "scatter", "mode": "lines", "x": x, "y": y, "line": {"width": 9, "color": style.VERMILION}}
+    alt = f"Times at which markers of {trial.name} were not seen: gaps in {len(gappy)} of {hidden.shape[1]} markers."
+    layout = base_layout(alt)
+    start, end = kinematics.window_s
+    window = {"type": "rect", "xref": "x", "yref": "y domain", "x0": start, "x1": end, "y0": 0, "y1": 1}
+    layout |= {
+        "height": 80 + _ROW_PX * len(names),
+        "margin": {"t": 12, "b": 44, "l": 12, "r": 14},
+        "xaxis": {"title": {"text": "time (s)"}, "range": [float(time[0]), float(time[-1])], "gridcolor": "#EFEFEF"},
+        "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
+        "shapes": [{**window, "fillcolor": style.SKY, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}],
+        "showlegend": False,
+    }
+    return go.Figure([{**line, "hovertemplate": "%{y}, %{x:.3f} s<extra></extra>"}], layout)

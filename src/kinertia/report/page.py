@@ -1,0 +1,179 @@
+"""`report.html`: one self-contained file, from the templates beside this module.
+
+plotly.js is in the page once; its policy (Content-Security-Policy) forbids every request.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import jinja2
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from kinertia import __version__
+from kinertia.bsp import PARAMETERS
+from kinertia.fit import Fit, TrialFit
+from kinertia.identifiability import evidence
+from kinertia.provenance import Provenance, versions
+from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, read_in, segment_name
+from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
+from kinertia.report.skeleton_view import packed, scene
+from kinertia.report.time_figures import (
+    MOST_EVENTS,
+    MOST_FRAMES,
+    coordinate_figure,
+    moment_figure,
+    residual_figure,
+    rms_length,
+)
+from kinertia.report.verdict import words
+from kinertia.simultaneous_fit import SHOWN_UNIT
+from kinertia.trial import runs
+
+MOST_TRIALS = 6
+"""Trials whose curves are shown; all are in the table of residuals and in the files."""
+_VIEW_FRAMES = 800
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 8 MB."""
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("kinertia.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.globals["asset"] = _asset
+    return environment
+
+
+def _asset(name: str) -> Markup:
+    """A style sheet or script as it is; plotly.js from its package."""
+    if name == "plotly.js":
+        return Markup(get_plotlyjs())
+    loader = _environment().loader
+    assert loader is not None
+    return Markup(loader.get_source(_environment(), name)[0])
+
+
+def render(fit: Fit, provenance: Provenance | None = None) -> str:
+    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command."""
+    shown = fit.trials[:MOST_TRIALS]
+    information = information_figure(fit)
+    return rendered(
+        "report.html.j2",
+        title=f"{fit.subject.name}: body segment parameters",
+        fit=fit,
+        words=words(fit),
+        total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
+        bsp={"figure": written(bsp_figure(fit)), "rows": bsp_rows(fit)},
+        information=None if information is None else written(information),
+        residuals=residual_rows(fit),
+        trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
+        settings=fit.settings.model_dump(),
+        subject=fit.subject.model_dump(),
+        provenance=provenance,
+        versions=versions(),
+        shown_unit=SHOWN_UNIT,
+        most_events=MOST_EVENTS,
+        seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
+    )
+
+
+def rendered(template: str, **content: Any) -> str:
+    """A page from a template."""
+    return _environment().get_template(template).render(version=__version__, **content)
+
+
+def written(figure: go.Figure) -> dict[str, Any]:
+    """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
+    text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
+    return {"alt": figure.layout.meta["alt"], "json": Markup(text), "height": figure.layout.height}
+
+
+def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
+    """Everything that the templates show of one trial."""
+    frames = MOST_FRAMES // count
+    mass_kg = fit.literature.total_mass_kg
+    noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
+    gaps = gap_figure(trial)
+    return {
+        "id": f"trial{k + 1}",
+        "name": trial.name,
+        "window_s": trial.kinematics.window_s,
+        "frames": len(trial.time),
+        "every": -(-len(trial.time) // frames),
+        "all_frames": len(trial.kinematics.trial.markers.time),
+        "residuals": written(residual_figure(trial, frames)),
+        "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
+        "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames)),
+        "bands": getattr(trial, "moment_sd", None) is not None,
+        "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
+        "marker_rows": _marker_rows(
+            trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
+        ),
+        "noise": noise,
+        "gaps": None if gaps is None else written(gaps),
+        "scene": Markup(json.dumps(packed(scene(fit, trial, _VIEW_FRAMES // count)))),
+    }
+
+
+def residual_rows(fit: Fit) -> list[dict[str, Any]]:
+    """Per trial and stage: RMS and peak of force and of moment."""
+    rows = []
+    for trial in fit.trials:
+        row: dict[str, Any] = {"name": trial.name, "stages": {}}
+        for stage, values in trial.residuals.items():
+            parts = values[:, :3], values[:, 3:]
+            row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
+        rows.append(row)
+    return rows
+
+
+def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
+    """Table rows in the units people read: kg, mm, kg m2."""
+    away, posterior = departures(fit), fit.posterior
+    before, after = fit.literature.table(), fit.estimate.table()
+    rows = []
+    for i, segment in enumerate(fit.estimate.segments):
+        for k in range(len(PARAMETERS)):
+            unit, factor = read_in(k)
+            row: dict[str, Any] = {"segment": segment_name(segment), "parameter": NAMES[k], "unit": unit}
+            row |= {"literature": before[i, k] * factor, "estimate": after[i, k] * factor}
+            if posterior is not None and away is not None:
+                row |= {"prior_sd": posterior.prior_sd[i, k] * factor, "sd": posterior.sd[i, k] * factor}
+                told = float(posterior.information[i, k])
+                row |= {"away": away[i, k], "information": max(100 * told, 0.0), "evidence": evidence(told)}
+            rows.append(row)
+    return rows
+
+
+def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], wandering: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Per marker: distances in mm, share of frames that show it (whole trial), longest gap in s."""
+    kinematics = trial.kinematics
+    markers = kinematics.trial.markers.select(kinematics.ik.labels)
+    seen = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    found = {stage: rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
+    rows = []
+    for k, label in enumerate(markers.labels):
+        longest = max((last - first + 1 for first, last in runs(~seen[:, k])), default=0)
+        rows.append(
+            {
+                "label": label,
+                "ik": 1e3 * found["ik"][k],
+                "final": 1e3 * found["final"][k],
+                "seen": 100 * float(seen[:, k].mean()),
+                "gap": longest / markers.rate_hz,
+                "sd": 1e3 * sd_m[label] if label in sd_m else None,
+                "wandering": label in wandering,
+            }
+        )
+    return rows

@@ -1,0 +1,141 @@
+"""Small multiples: many panels in one plotly figure, in as many columns as there is room for.
+
+The page lays the panels out anew for its width: `layout.meta.arrangements` holds, per number of columns and for
+"print", what plotly's `relayout` needs for it.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kinertia.report import style
+
+_BOTTOM_PX, _RIGHT_PX = 44, 14
+_LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
+_TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
+MOST_COLUMNS = 3
+_PAPER_PX = 1250
+"""Rows of panels on a sheet of paper, beside headings, at the scale of the page's print style."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel of a figure.
+
+    Attributes:
+        title: with the unit.
+        traces: plotly traces without their axes.
+        shapes: plotly shapes without their axes; `yref` "domain" spans the height of the panel, `xref` its width.
+        y: further settings of the vertical axis.
+    """
+
+    title: str
+    traces: Sequence[dict[str, Any]]
+    shapes: Sequence[dict[str, Any]] = ()
+    y: dict[str, Any] | None = None
+
+
+def plain(text: str) -> str:
+    """Text that plotly shows as it is: names of markers and trials may hold what it takes for markup."""
+    return html.escape(text)
+
+
+def small_multiples(
+    panels: Sequence[Panel], alt: str, x: dict[str, Any], row_px: int = 170, left_px: int = 52, linked: bool = True
+) -> go.Figure:
+    """Panels of one kind as one figure.
+
+    Args:
+        panels: left to right, then downwards.
+        alt: the figure's text for those who cannot see it.
+        x: settings of the horizontal axes.
+        row_px: height of a panel.
+        left_px: room for the labels of a vertical axis.
+        linked: whether all panels have the same horizontal range.
+    """
+    data, shapes, titles = [], [], []
+    axes: dict[str, Any] = {}
+    shown: set[str] = set()
+    for k, panel in enumerate(panels):
+        suffix = "" if k == 0 else str(k + 1)
+        axes[f"xaxis{suffix}"] = {**_AXIS, **x, "anchor": f"y{suffix}", **({"matches": "x"} if k and linked else {})}
+        axes[f"yaxis{suffix}"] = {**_AXIS, **(panel.y or {}), "anchor": f"x{suffix}"}
+        for trace in panel.traces:
+            name = trace.get("name", "")
+            first = bool(name) and trace.get("showlegend", True) and name not in shown
+            shown |= {name} if first else set()
+            place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "legendgroup": name, "showlegend": first}
+            data.append({**trace, **place})
+        for shape in panel.shapes:
+            refs = {ref: f"{ref[0]}{suffix}{' domain' if shape.get(ref) else ''}" for ref in ("xref", "yref")}
+            shapes.append({**shape, **refs})
+        place = {"xref": f"x{suffix} domain", "yref": f"y{suffix} domain", "x": 0, "y": 1}
+        anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 13}}
+        titles.append({"text": f"<b>{plain(panel.title)}</b>", **place, **anchors})
+    ways: dict[str, Any] = {
+        str(c): _arrangement(len(panels), c, row_px, left_px, len(shown)) for c in range(1, MOST_COLUMNS + 1)
+    }
+    rows = math.ceil(len(panels) / MOST_COLUMNS)
+    on_paper_px = min(row_px, _PAPER_PX // rows - _TITLE_PX - _TICKS_PX)
+    ways["print"] = _arrangement(len(panels), MOST_COLUMNS, max(on_paper_px, 80), left_px, len(shown))
+    layout = {**base_layout(alt), **axes, "shapes": shapes, "annotations": titles}
+    layout["meta"] = {**layout["meta"], "arrangements": ways}
+    figure = go.Figure(data, layout)
+    figure.update_layout({key.replace(".", "_"): value for key, value in ways[str(MOST_COLUMNS)].items()})
+    return figure
+
+
+_AXIS = {
+    "zeroline": True,
+    "zerolinecolor": style.PALE,
+    "zerolinewidth": 1,
+    "gridcolor": "#EFEFEF",
+    "linecolor": style.GREY,
+    "ticks": "outside",
+    "ticklen": 3,
+    "tickfont": {"size": 11},
+    "automargin": False,
+}
+
+
+def base_layout(alt: str) -> dict[str, Any]:
+    """What all figures have: font, white ground, legend on top, and the text `alt`."""
+    return {
+        "template": "none",
+        "font": {"family": style.FONT, "size": 12, "color": "#1A1A1A"},
+        "paper_bgcolor": "#FFFFFF",
+        "plot_bgcolor": "#FFFFFF",
+        "margin": {"t": _TITLE_PX, "b": _BOTTOM_PX, "l": 52, "r": _RIGHT_PX},
+        "legend": {"orientation": "h", "yref": "container", "y": 1, "yanchor": "top", "x": 0, "xanchor": "left"},
+        "hovermode": "closest",
+        "meta": {"alt": alt},
+    }
+
+
+def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:
+    """Domains of all axes, top margin and height of the figure, for this many columns and entries of the legend."""
+    rows = math.ceil(count / columns)
+    inner_px = rows * row_px + (rows - 1) * (_TITLE_PX + _TICKS_PX)
+    gap = (left_px + 6) / (_NOMINAL_WIDTH_PX - left_px - _RIGHT_PX)
+    width = (1 - (columns - 1) * gap) / columns
+    top_px = _TITLE_PX + _LEGEND_ROW_PX * math.ceil(legend / _LEGEND_PER_ROW[columns])
+    found: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": left_px}
+    for k in range(count):
+        row, column = divmod(k, columns)
+        suffix = "" if k == 0 else str(k + 1)
+        left, top = column * (width + gap), 1 - row * (row_px + _TITLE_PX + _TICKS_PX) / inner_px
+        found[f"xaxis{suffix}.domain"] = [round(left, 5), round(min(left + width, 1.0), 5)]
+        found[f"yaxis{suffix}.domain"] = [round(max(top - row_px / inner_px, 0.0), 5), round(top, 5)]
+    return found
+
+
+def compact(values: np.ndarray) -> np.ndarray:
+    """Single precision: plotly writes arrays as binary, so that this halves the page."""
+    return np.asarray(values, dtype=np.float32)

@@ -1,0 +1,64 @@
+"""`fit.plot`: the report's figures one by one, for notebooks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import plotly.graph_objects as go
+
+from kinertia.fit import Fit, TrialFit
+from kinertia.report.bsp_figures import bsp_figure, information_figure
+from kinertia.report.marker_figures import gap_figure, marker_figure
+from kinertia.report.skeleton_view import skeleton_figure
+from kinertia.report.time_figures import coordinate_figure, moment_figure, residual_figure
+
+
+@dataclass(frozen=True, eq=False)
+class FitPlots:
+    """Plotly figures of a fit. Those of one trial take its name; left out, it is the first.
+
+    Raises:
+        KeyError: there is no trial of this name; names those there are.
+    """
+
+    fit: Fit
+
+    def residuals(self, trial: str | None = None) -> go.Figure:
+        """Root residual force and moment over time, stage by stage."""
+        return residual_figure(self._trial(trial))
+
+    def coordinates(self, trial: str | None = None) -> go.Figure:
+        """Every coordinate by inverse kinematics and as estimated."""
+        return coordinate_figure(self._trial(trial), self.fit.skeleton)
+
+    def moments(self, trial: str | None = None) -> go.Figure:
+        """Joint moments per body mass, literature against estimate."""
+        return moment_figure(self._trial(trial), self.fit.skeleton, self.fit.literature.total_mass_kg)
+
+    def markers(self, trial: str | None = None) -> go.Figure:
+        """Distance between every measured and modelled marker."""
+        one = self._trial(trial)
+        noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(one)]
+        return marker_figure(one, () if noise is None else noise.wandering)
+
+    def gaps(self, trial: str | None = None) -> go.Figure | None:
+        """When markers were not seen; None where all always were."""
+        return gap_figure(self._trial(trial))
+
+    def skeleton(self, trial: str | None = None) -> go.Figure:
+        """The skeleton in motion, with markers, centres of mass and ground reactions."""
+        return skeleton_figure(self.fit, self._trial(trial))
+
+    def bsp(self) -> go.Figure:
+        """Body segment parameters before and after, with intervals where there are any."""
+        return bsp_figure(self.fit)
+
+    def information(self) -> go.Figure | None:
+        """What the data told about each parameter; None after two-level."""
+        return information_figure(self.fit)
+
+    def _trial(self, name: str | None) -> TrialFit:
+        trials = {trial.name: trial for trial in self.fit.trials}
+        if name is not None and name not in trials:
+            raise KeyError(f"no trial '{name}' in this fit; there are: {', '.join(trials)}")
+        return self.fit.trials[0] if name is None else trials[name]

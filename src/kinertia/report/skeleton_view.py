@@ -1,0 +1,201 @@
+"""The skeleton walking: what stands where in every frame, for the report's own canvas and as a plotly figure.
+
+`templates/skeleton_view.js` plays it: one small drawing of lines and dots needs no 3-D library and stays smooth.
+"""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kinertia.bsp import BodySegmentParameters
+from kinertia.fit import Fit, TrialFit
+from kinertia.kinematics import Kinematics
+from kinertia.report import style
+from kinertia.report.bsp_figures import segment_name
+from kinertia.report.panels import base_layout
+from kinertia.skeleton import Skeleton
+from kinertia.trial import LOAD_THRESHOLD_N
+
+_PLOTLY_FRAMES = 60
+"""Plotly redraws the whole scene for every frame."""
+_ARROW_M_PER_N = 0.001
+_BALL_M_PER_KG = 0.03
+"""Radius of the ball that stands for one kilogram; it grows with the cube root of the mass."""
+_HIDDEN_MM = -32768
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Points in ground axes (m) over n frames.
+
+    Attributes:
+        time: (n,) s.
+        bones: (b, 2) indices into `points` of the ends of every line.
+        points: (n, p, 3) joint centres and segment ends.
+        measured, modelled: (n, m, 3) markers; NaN where not seen.
+        com: (n, s, 3) centres of mass, of segments with mass.
+        sides: (b,) "r", "l" or "" for every line.
+        com_radius_m: (s,) by mass.
+        com_names: (s,) segment and mass, in words.
+        arrows: (n, f, 2, 3) centre of pressure and tip of the ground reaction under each foot; NaN without load.
+    """
+
+    time: np.ndarray
+    bones: np.ndarray
+    sides: tuple[str, ...]
+    points: np.ndarray
+    measured: np.ndarray
+    modelled: np.ndarray
+    com: np.ndarray
+    com_radius_m: np.ndarray
+    com_names: tuple[str, ...]
+    arrows: np.ndarray
+
+
+def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
+    """What the view of a trial shows: the window, at most `most_frames` frames of it."""
+    chosen = slice(None, None, -(-len(trial.time) // most_frames))
+    labels = trial.kinematics.ik.labels
+    skeleton = fit.skeleton.with_markers([m for m in fit.skeleton.markers if m.label in labels])
+    pose = skeleton.pose(trial.motion.q[chosen])
+    bones, sides, points = _bones(skeleton, pose.rotation, pose.translation)
+    frames = trial.kinematics.frames[chosen]
+    com, radius, names = _centres(skeleton, fit.estimate, pose.rotation, pose.translation)
+    return Scene(
+        time=trial.time[chosen],
+        bones=bones,
+        sides=sides,
+        points=points,
+        measured=trial.kinematics.trial.markers.select(skeleton.labels).positions[frames],
+        modelled=skeleton.marker_positions(pose),
+        com=com,
+        com_radius_m=radius,
+        com_names=names,
+        arrows=_arrows(trial.kinematics)[chosen],
+    )
+
+
+def _bones(
+    skeleton: Skeleton, rotation: np.ndarray, translation: np.ndarray
+) -> tuple[np.ndarray, tuple[str, ...], np.ndarray]:
+    """A line to every joint centre from its parent's, across hips and shoulders, and to every last marker."""
+    index = {name: i for i, name in enumerate(skeleton.segments)}
+    parents = {joint.parent for joint in skeleton.joints}
+    bones = [(index[joint.parent], index[joint.child]) for joint in skeleton.joints if joint.parent in index]
+    named = [joint.child for joint in skeleton.joints if joint.parent in index]
+    parent = {joint.child: joint.parent for joint in skeleton.joints}
+    for right in skeleton.segments:
+        left = right[:-2] + "_l"
+        if right.endswith("_r") and parent.get(left) == parent[right]:
+            bones.append((index[right], index[left]))
+            named.append(parent[right])
+    points = [translation]
+    for i, segment in enumerate(skeleton.segments):
+        worn = skeleton.marker_locals[skeleton.marker_segments == i]
+        if not len(worn) or (segment in parents and segment != "torso"):
+            continue
+        end = worn[np.argmax(np.linalg.norm(worn, axis=1))]
+        points.append((rotation[:, i] @ end + translation[:, i])[:, None])
+        bones.append((i, len(index) + len(points) - 2))
+        named.append(segment)
+    sides = tuple(name[-1] if name.endswith(("_r", "_l")) else "" for name in named)
+    return np.array(bones), sides, np.concatenate(points, axis=1)
+
+
+def _centres(
+    skeleton: Skeleton, bsp: BodySegmentParameters, rotation: np.ndarray, translation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    rows = [skeleton.segments.index(name) for name in bsp.segments]
+    at = (rotation[:, rows] @ bsp.com_m[:, :, None])[..., 0] + translation[:, rows]
+    names = tuple(f"{segment_name(n)}: {m:.2f} kg" for n, m in zip(bsp.segments, bsp.mass_kg, strict=True))
+    return at, _BALL_M_PER_KG * np.cbrt(np.maximum(bsp.mass_kg, 0.0)), names
+
+
+def _arrows(kinematics: Kinematics) -> np.ndarray:
+    """(w, f, 2, 3) m: from the centre of pressure along the force, 1 mm per newton."""
+    force, moment = kinematics.foot_loads[..., :3], kinematics.foot_loads[..., 3:]
+    load = np.where(force[..., 1] > LOAD_THRESHOLD_N, force[..., 1], np.nan)
+    at = np.stack([moment[..., 2] / load, np.zeros_like(load), -moment[..., 0] / load], axis=-1)
+    return np.stack([at, at + _ARROW_M_PER_N * force], axis=2)
+
+
+def packed(shown: Scene) -> dict[str, Any]:
+    """The scene as the page carries it: whole millimetres from a place near the person, 16 bits each, base64."""
+    place = np.round(np.nanmean(shown.points, axis=(0, 1)) * [1, 0, 1], 3)
+    parts = {"points": shown.points, "measured": shown.measured, "modelled": shown.modelled, "com": shown.com}
+    parts["arrows"] = shown.arrows.reshape(len(shown.time), -1, 3)
+    return {
+        "time": [round(float(t), 4) for t in shown.time],
+        "bones": shown.bones.tolist(),
+        "colours": [style.SIDES[side][1] for side in shown.sides],
+        "radius_mm": [round(1e3 * float(r), 1) for r in shown.com_radius_m],
+        "count": {name: values.shape[1] for name, values in parts.items()},
+        "data": {name: _millimetres(values - place) for name, values in parts.items()},
+    }
+
+
+def _millimetres(positions: np.ndarray) -> str:
+    whole = np.where(np.isfinite(positions), np.clip(np.round(1e3 * positions), -32767, 32767), _HIDDEN_MM)
+    return base64.b64encode(whole.astype("<i2").tobytes()).decode("ascii")
+
+
+def skeleton_figure(fit: Fit, trial: TrialFit) -> go.Figure:
+    """The same as a plotly figure for notebooks, with a slider and a play button; at most 60 frames."""
+    shown = scene(fit, trial, _PLOTLY_FRAMES)
+    steps = [
+        {"label": f"{t:.2f}", "method": "animate", "args": [[str(k)], _at_once(0)]} for k, t in enumerate(shown.time)
+    ]
+    frame_ms = 1e3 * float(shown.time[-1] - shown.time[0]) / max(len(shown.time) - 1, 1)
+    play = {"label": "play", "method": "animate", "args": [None, _at_once(frame_ms)]}
+    pause = {"label": "pause", "method": "animate", "args": [[None], _at_once(0)]}
+    layout = base_layout(f"The skeleton of {trial.name} in motion, with markers, centres of mass and ground reactions.")
+    everything = [part.reshape(-1, 3) for part in (shown.points, shown.modelled)]
+    low, high = np.nanmin(np.concatenate(everything), axis=0), np.nanmax(np.concatenate(everything), axis=0)
+    axes: dict[str, dict[str, Any]] = {
+        name: {"range": [float(low[k]) - 0.1, float(high[k]) + 0.1], "title": {"text": title}}
+        for name, k, title in (("xaxis", 0, "forward (m)"), ("yaxis", 2, "right (m)"), ("zaxis", 1, "up (m)"))
+    }
+    axes["yaxis"]["range"] = axes["yaxis"]["range"][::-1]
+    layout |= {
+        "height": 560,
+        "margin": {"t": 30, "b": 60, "l": 0, "r": 0},
+        "scene": {**axes, "aspectmode": "data", "camera": {"eye": {"x": 0.5, "y": -2.7, "z": 0.3}}},
+        "sliders": [{"steps": steps, "currentvalue": {"prefix": "time (s): "}, "pad": {"b": 40}}],
+        "updatemenus": [{"type": "buttons", "buttons": [play, pause], "direction": "left", "y": 0, "yanchor": "top"}],
+    }
+    frames = [go.Frame(name=str(k), data=_traces(shown, k)) for k in range(len(shown.time))]
+    return go.Figure(_traces(shown, 0), layout, frames)
+
+
+def _at_once(duration_ms: float) -> dict[str, Any]:
+    return {"mode": "immediate", "frame": {"duration": duration_ms, "redraw": True}, "transition": {"duration": 0}}
+
+
+def _traces(shown: Scene, k: int) -> list[dict[str, Any]]:
+    """Plotly's z is our up, its y our right."""
+    lines = np.full((len(shown.bones), 3, 3), np.nan)
+    lines[:, :2] = shown.points[k][shown.bones]
+    sides = np.array(shown.sides)
+    arrows = np.full((shown.arrows.shape[1], 3, 3), np.nan)
+    arrows[:, :2] = shown.arrows[k]
+    balls = {"size": (300 * shown.com_radius_m).tolist(), "color": style.ORANGE, "opacity": 0.75, "line": {"width": 0}}
+    return [
+        *(
+            _trace(lines[sides == side], word or "trunk", mode="lines", line={"color": colour, "width": 5})
+            for side, (word, colour) in style.SIDES.items()
+        ),
+        _trace(arrows, "ground reaction", mode="lines", line={"color": style.GREEN, "width": 6}),
+        _trace(shown.modelled[k], "markers, model", mode="markers", marker={"size": 3, "color": style.SKY}),
+        _trace(shown.measured[k], "markers, measured", mode="markers", marker={"size": 3, "color": style.BLACK}),
+        _trace(shown.com[k], "centres of mass", mode="markers", marker=balls, text=list(shown.com_names)),
+    ]
+
+
+def _trace(points: np.ndarray, name: str, **settings: Any) -> dict[str, Any]:
+    x, y, z = points.reshape(-1, 3).T.astype(np.float32)
+    return {"type": "scatter3d", "x": x, "y": z, "z": y, "name": name, **settings}

@@ -1,0 +1,24 @@
+"""Colours and lines of all figures: Okabe and Ito's palette, which colour-blind people can tell apart, on white."""
+
+from __future__ import annotations
+
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+GREY, PALE, UNUSED = "#6B6B6B", "#C8C8C8", "#E9E9E9"
+
+SIDES = {"r": ("right", BLUE), "l": ("left", VERMILION), "": ("", BLACK)}
+"""Word and colour by the suffix of a coordinate's name; "" where it has no side."""
+
+STAGES = {
+    "literature": {"color": GREY, "dash": "dot", "width": 1.5},
+    "corrected": {"color": ORANGE, "dash": "dash", "width": 1.5},
+    "estimate": {"color": BLUE, "dash": "solid", "width": 2},
+}
+"""Line of each stage of the residuals."""
+
+FONT = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+
+
+def faded(colour: str, opacity: float) -> str:
+    """The colour "#rrggbb" as "rgba(...)"."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"

@@ -1,0 +1,68 @@
+"use strict";
+// Draws every figure of the page, one after the other so that reading is not held up, and again for another width.
+(() => {
+  const PRINT_PX = 960; // report.css scales it to the paper
+  const config = { displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  let printing = false;
+  const columns = (px) => (px < 560 ? 1 : px < 860 ? 2 : 3);
+
+  // relayout's flat form: {"xaxis2.domain": [0, 1], height: 300, ...}
+  function arrangement(layout, width) {
+    const ways = layout.meta && layout.meta.arrangements;
+    return { width, ...(ways ? ways[printing ? "print" : columns(width)] : {}) };
+  }
+
+  function applied(layout, flat) {
+    const whole = structuredClone(layout);
+    for (const [path, value] of Object.entries(flat)) {
+      const keys = path.split(".");
+      const last = keys.pop();
+      keys.reduce((inner, key) => (inner[key] ??= {}), whole)[last] = value;
+    }
+    return whole;
+  }
+
+  const plots = [...document.querySelectorAll(".plot")].map((element) => ({ element, width: 0, spec: null }));
+
+  function draw(plot, width) {
+    if (!plot.spec) {
+      const told = document.querySelector(`script[data-for="${plot.element.id}"]`);
+      plot.spec = JSON.parse(told.textContent);
+      const flat = arrangement(plot.spec.layout, width);
+      if (matchMedia("(pointer: coarse)").matches) flat.dragmode = false; // a finger scrolls the page
+      plot.width = width;
+      plot.element.style.minHeight = "";
+      Plotly.newPlot(plot.element, plot.spec.data, applied(plot.spec.layout, flat), config);
+      plot.element.dataset.drawn = "yes";
+    } else if (width !== plot.width) {
+      plot.width = width;
+      Plotly.relayout(plot.element, arrangement(plot.spec.layout, width));
+    }
+  }
+
+  const room = (plot) => Math.floor(plot.element.getBoundingClientRect().width);
+  const soon = window.requestIdleCallback || ((work) => setTimeout(work, 1));
+  let next = 0;
+  function drawNext() {
+    if (next >= plots.length) return;
+    draw(plots[next], room(plots[next]));
+    next += 1;
+    soon(drawNext, { timeout: 200 });
+  }
+  drawNext();
+
+  let waiting = 0;
+  window.addEventListener("resize", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => printing || plots.filter((plot) => plot.spec).forEach((plot) => draw(plot, room(plot))), 150);
+  });
+  window.addEventListener("beforeprint", () => {
+    printing = true;
+    document.querySelectorAll("details").forEach((part) => (part.open = true));
+    plots.forEach((plot) => draw(plot, PRINT_PX));
+  });
+  window.addEventListener("afterprint", () => {
+    printing = false;
+    plots.forEach((plot) => draw(plot, room(plot)));
+  });
+})();

@@ -1,0 +1,210 @@
+"""Figures over time: root residuals, coordinates and joint moments of a trial, the way gait reports draw them.
+
+Frames that were not used are shaded; upright lines are gait events, solid where a foot lands, dashed where it leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kinertia.fit import TrialFit
+from kinertia.ik import rms
+from kinertia.kinematics import Kinematics
+from kinertia.report import style
+from kinertia.report.coordinate_titles import Coordinate, panels_of
+from kinertia.report.gait_events import GaitEvent, gait_events
+from kinertia.report.panels import Panel, compact, small_multiples
+from kinertia.skeleton import Skeleton
+
+MOST_FRAMES = 1600
+"""Drawn per curve."""
+MOST_EVENTS = 40
+"""Gait events in the frames shown up to which they are drawn; more would hide the curves."""
+_AROUND = 0.2
+"""Share of the window that is shown before and after it."""
+_AXES = ("forward", "upward", "to the right")
+_BAND_SD = 1.96
+
+
+def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES) -> go.Figure:
+    """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage."""
+    thin, axis = _thin(len(trial.time), most_frames), _time_axis(trial.kinematics)
+    marks = _events(trial.kinematics)
+    panels = []
+    for k in range(6):
+        kind = "Force" if k < 3 else "Moment"
+        traces = [
+            {
+                **_curve(trial.time, values[:, k], thin),
+                "name": _STAGE_NAMES[stage],
+                "line": style.STAGES[stage],
+            }
+            for stage, values in trial.residuals.items()
+        ]
+        title = f"{kind} {_AXES[k % 3]} (N)" if k < 3 else f"Moment about {_MOMENT_AXES[k - 3]} (N m)"
+        panels.append(Panel(title, traces, [*_unused(trial.kinematics, axis), *marks]))
+    told = "; ".join(
+        f"{_STAGE_NAMES[stage]} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
+        for stage, values in trial.residuals.items()
+    )
+    alt = f"Residual force and moment at the pelvis of {trial.name} over time, RMS: {told}."
+    return small_multiples(panels, alt, axis)
+
+
+_MOMENT_AXES = ("forward axis", "vertical", "right axis")
+_STAGE_NAMES = {
+    "literature": "literature values",
+    "corrected": "literature values, pelvis corrected",
+    "estimate": "estimate",
+}
+
+
+def rms_length(vectors: np.ndarray) -> float:
+    """Root mean square length of vectors (n, k)."""
+    return rms(np.linalg.norm(vectors, axis=-1))
+
+
+def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> go.Figure:
+    """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated."""
+    ik, axis = trial.kinematics.ik, _time_axis(trial.kinematics)
+    shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
+    stages = (
+        ("inverse kinematics", ik.time[shown], ik.q[shown], {"dash": "dot", "width": 1.6}),
+        ("estimate", trial.time, trial.motion.q, {"width": 2}),
+    )
+    panels = []
+    for one in panels_of(skeleton):
+        traces = []
+        for name, time, values, line in stages:
+            thin = _thin(len(time), most_frames)
+            traces += _sides(one, name, time, np.degrees(values) if one.rotational else values, thin, line)
+        unit = "degrees" if one.rotational else "m"
+        panels.append(Panel(f"{one.title} ({unit})", traces, _background(trial.kinematics, axis, one)))
+    change = np.degrees(motion_change(trial)[:, skeleton.rotational])
+    alt = (
+        f"Coordinates of {trial.name} over time, inverse kinematics against estimate; the joint angles differ by "
+        f"{rms(change):.1f} degrees RMS."
+    )
+    return small_multiples(panels, alt, axis)
+
+
+def motion_change(trial: TrialFit) -> np.ndarray:
+    """(w, c) rad and m: estimated coordinates minus those of inverse kinematics; NaN where the markers told none."""
+    return trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
+
+
+def moment_figure(trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES) -> go.Figure:
+    """Joint moments (N m/kg) with literature values on the measured motion, and as estimated, with its 95 % band."""
+    axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
+    sd = getattr(trial, "moment_sd", None)
+    panels = []
+    for one in panels_of(skeleton):
+        if min(one.columns.values()) < 6:
+            continue
+        traces = [] if sd is None else _bands(one, trial, sd / mass_kg, mass_kg, thin)
+        for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
+            name = _STAGE_NAMES[stage]
+            traces += _sides(one, name, trial.time, trial.moments[stage] / mass_kg, thin, line)
+        unit = "N m/kg" if one.rotational else "N/kg"
+        title = f"{one.title.split(',')[0].removesuffix(' +')} moment ({unit})"
+        panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))
+    peak = np.abs(trial.moments["estimate"][:, 6:]).max() / mass_kg
+    alt = f"Joint moments of {trial.name} over time, literature against estimate; the largest is {peak:.2f} N m/kg."
+    return small_multiples(panels, alt, axis)
+
+
+def _bands(one: Coordinate, trial: TrialFit, sd: np.ndarray, mass_kg: float, thin: slice) -> list[dict[str, Any]]:
+    """A 95 % band around the estimate for each side: an unseen lower edge, and an upper one filled down to it."""
+    traces = []
+    for side, column in one.columns.items():
+        word, colour = style.SIDES[side]
+        middle, half = trial.moments["estimate"][:, column] / mass_kg, _BAND_SD * sd[:, column]
+        edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
+        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
+        traces.append({**_curve(trial.time, middle - half, thin), **edge, "showlegend": False})
+        traces.append({**_curve(trial.time, middle + half, thin), **edge, **fill})
+    return traces
+
+
+def _sides(
+    one: Coordinate, name: str, time: np.ndarray, values: np.ndarray, thin: slice, line: dict[str, Any]
+) -> list[dict[str, Any]]:
+    return [
+        {
+            **_curve(time, values[:, column], thin),
+            "name": ", ".join(filter(None, (style.SIDES[side][0], name))),
+            "line": {"color": style.SIDES[side][1], **line},
+        }
+        for side, column in one.columns.items()
+    ]
+
+
+def _curve(time: np.ndarray, values: np.ndarray, thin: slice) -> dict[str, Any]:
+    """A line over uniform frames; the times of single frames need not be written."""
+    shown = time[thin]
+    step = float(shown[1] - shown[0]) if len(shown) > 1 else 1.0
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x0": round(float(shown[0]), 6),
+        "dx": round(step, 9),
+        "y": compact(values[thin]),
+        "hovertemplate": "%{x:.3f} s: %{y:.3g}<extra>%{fullData.name}</extra>",
+    }
+
+
+def _thin(frames: int, most: int) -> slice:
+    return slice(None, None, -(-frames // most))
+
+
+def _time_axis(kinematics: Kinematics) -> dict[str, Any]:
+    """The window with a little around it."""
+    start, end = kinematics.window_s
+    around = _AROUND * (end - start)
+    time = kinematics.trial.markers.time
+    limits = [max(start - around, float(time[0])), min(end + around, float(time[-1]))]
+    title = {"text": "time (s)", "font": {"size": 11}, "standoff": 2}
+    return {"range": limits, "title": title, "nticks": 6}
+
+
+def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]]:
+    """Shades what lies outside the window."""
+    spans = zip((axis["range"][0], kinematics.window_s[1]), (kinematics.window_s[0], axis["range"][1]), strict=True)
+    return [
+        {
+            "type": "rect",
+            "x0": first,
+            "x1": last,
+            "y0": 0,
+            "y1": 1,
+            "yref": "domain",
+            "fillcolor": style.UNUSED,
+            "line": {"width": 0},
+            "layer": "below",
+        }
+        for first, last in spans
+        if last - first > 1e-6
+    ]
+
+
+def _background(kinematics: Kinematics, axis: dict[str, Any], one: Coordinate) -> list[dict[str, Any]]:
+    return [*_unused(kinematics, axis), *_events(kinematics, [side for side in one.columns if side])]
+
+
+def _events(kinematics: Kinematics, sides: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """Lines at the gait events of these sides; of both where there is none."""
+    first, last = _time_axis(kinematics)["range"]
+    shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
+    if len(shown) > MOST_EVENTS:
+        return []
+    return [_upright(event) for event in shown if not sides or event.side in sides]
+
+
+def _upright(event: GaitEvent) -> dict[str, Any]:
+    dash = "solid" if event.kind == "heel strike" else "dash"
+    line = {"color": style.faded(style.SIDES[event.side][1], 0.6), "width": 1, "dash": dash}
+    return {"type": "line", "x0": event.time_s, "x1": event.time_s, "y0": 0, "y1": 1, "yref": "domain", "line": line}

@@ -1,0 +1,44 @@
+"""Takes a report apart again."""
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+
+
+class Elements(HTMLParser):
+    """Tags with their attributes, and the text outside of scripts and styles."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.text, self._inside = [], "", None
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self._inside = tag
+
+    def handle_data(self, data):
+        if self._inside not in ("script", "style"):
+            self.text += data
+
+    def handle_endtag(self, tag):
+        self._inside = None
+
+    def named(self, tag):
+        return [attrs for name, attrs in self.tags if name == tag]
+
+
+def figures_of(page):
+    """The figures as plotly gets them, by the id of their element."""
+    found = re.findall(r'<script type="application/json" data-for="([^"]+)">(.*?)</script>', page, re.DOTALL)
+    return {name: json.loads(text) for name, text in found}
+
+
+def numbers(array):
+    """A plotly array, binary or not."""
+    if isinstance(array, dict):
+        return np.frombuffer(base64.b64decode(array["bdata"]), array["dtype"].replace("f", "<f").replace("i", "<i"))
+    return np.asarray(array, dtype=float)

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+
+from kinertia.block_band import BlockBand
+from kinertia.dynamics import Motion, inverse_dynamics
+from kinertia.moment_sd import joint_moment_sd, moment_derivatives
+from kinertia.normal_equations import reduced
+from kinertia.simultaneous import covariance_of
+from small_problem import point, small_problem
+
+
+@pytest.fixture(scope="module")
+def estimate():
+    problem = small_problem()
+    (coefficients,), static = point(problem)
+    return problem, coefficients, static
+
+
+def moments(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(d, c) joint moments at a point, by `inverse_dynamics`."""
+    names = problem.calibration.coordinates
+    values = dict(zip(names, static[problem.layout.coordinates].tolist(), strict=True))
+    dynamic = np.flatnonzero(problem.trials[0].dynamic)
+    motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
+    loads = problem.foot_loads(0, static)[dynamic]
+    return inverse_dynamics(problem.skeleton.lock(values), problem.bsp(static), motion, loads)
+
+
+def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """Information on all coefficients and static unknowns as one matrix."""
+    normal = problem.normal(0, coefficients, static)
+    size, _, c, _ = normal.band.shape
+    n, s = size * c, problem.layout.size
+    full = np.zeros((n + s, n + s))
+    for i in range(size):
+        for offset in range(min(6, size - i)):
+            j = i + offset
+            full[c * i : c * i + c, c * j : c * j + c] = normal.band[i, offset]
+            full[c * j : c * j + c, c * i : c * i + c] = normal.band[i, offset].T
+    full[:n, n:] = normal.border.reshape(n, s)
+    full[n:, :n] = full[:n, n:].T
+    full[n:, n:] = normal.static + problem.prior_terms(static)[0]
+    return full
+
+
+def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns."""
+    by = moment_derivatives(problem, 0, coefficients, static)
+    basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
+    size, c = coefficients.shape
+    through = np.zeros((len(frames), c, size, c))
+    for row, t in enumerate(frames):
+        for a, spline in enumerate(basis.active[t]):
+            parts = zip(basis.values[:, t, a], (by.q, by.qd, by.qdd), strict=True)
+            through[row, :, spline] = sum(value * part[row] for value, part in parts)
+    rest = np.zeros((len(frames), c, problem.layout.size - by.static.shape[2]))
+    return np.concatenate([through.reshape(len(frames), c, -1), by.static, rest], axis=2)
+
+
+def test_derivatives_agree_with_finite_differences(estimate):
+    """In random directions of one kind of unknown each, by `inverse_dynamics`."""
+    problem, coefficients, static = estimate
+    n, layout = coefficients.size, problem.layout
+    derivative = dense_derivative(problem, coefficients, static)
+    rng = np.random.default_rng(0)
+    parts = [slice(0, n), *(slice(n + p.start, n + p.stop) for p in (layout.theta, layout.plates, layout.coordinates))]
+    parts.append(slice(n + layout.clock, n + layout.clock + 1))
+    for part in parts:
+        for _ in range(3):
+            h = np.zeros(n + layout.size)
+            h[part] = rng.normal(0.0, 1e-5, part.stop - part.start)
+            ahead, behind = (
+                moments(problem, coefficients + s * h[:n].reshape(coefficients.shape), static + s * h[n:])
+                for s in (1.0, -1.0)
+            )
+            found = derivative @ h
+            np.testing.assert_allclose(found, (ahead - behind) / 2.0, atol=1e-6 * np.abs(found).max())
+
+
+def test_deviations_are_those_of_the_dense_covariance(estimate):
+    problem, coefficients, static = estimate
+    full = covariance_of(dense(problem, coefficients, static))
+    n = coefficients.size
+    by = dense_derivative(problem, coefficients, static)
+    expected = np.sqrt(np.einsum("dri,ij,drj->dr", by, full, by, optimize=True))
+    normal = problem.normal(0, coefficients, static)
+    covariance = covariance_of(problem.prior_terms(static)[0] + reduced(normal, 0.0)[0])
+    np.testing.assert_allclose(covariance, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
+    found = joint_moment_sd(problem, 0, coefficients, static, covariance)
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+def test_blocks_of_the_inverse():
+    rng = np.random.default_rng(0)
+    b, k = 4, 3
+    factor = np.tril(rng.normal(size=(b * k, b * k)))
+    for i in range(b):
+        factor[k * (i + 2) :, k * i : k * i + k] = 0.0
+    matrix = factor @ factor.T + np.eye(b * k)
+    blocks = matrix.reshape(b, k, b, k).transpose(0, 2, 1, 3)
+    band = BlockBand.factor(
+        np.array([blocks[i, i] for i in range(b)]), np.array([blocks[i + 1, i] for i in range(b - 1)])
+    )
+    inverse = np.linalg.inv(matrix).reshape(b, k, b, k).transpose(0, 2, 1, 3)
+    diagonal, below = band.inverse_blocks()
+    np.testing.assert_allclose(diagonal, [inverse[i, i] for i in range(b)])
+    np.testing.assert_allclose(below, [inverse[i + 1, i] for i in range(b - 1)])

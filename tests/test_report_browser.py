@@ -1,0 +1,290 @@
+"""The report in a browser: headless Chromium opens it as a user does, from a file."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (pip install -e '.[test]')")
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+PATIENCE_MS = 30_000
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if not CHROMIUM.exists():
+        pytest.skip(f"needs {CHROMIUM} (apt-get install chromium)")
+    with playwright.sync_playwright() as engine:
+        started = engine.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield started
+        started.close()
+
+
+class Opened:
+    """A report in a tab, with what it said and asked for."""
+
+    def __init__(self, browser, path, viewport=None):
+        self.page = browser.new_page(viewport=viewport or DESKTOP)
+        self.errors, self.requests = [], []
+        self.page.on(
+            "console", lambda message: message.type in ("error", "warning") and self.errors.append(message.text)
+        )
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri())
+        playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
+
+    def picture(self, locator):
+        """Pixels (h, w, 3), 0 to 1."""
+        return imread(io.BytesIO(locator.screenshot()), format="png")[..., :3]
+
+
+@pytest.fixture(scope="module")
+def demo(browser, demo_run):
+    opened = Opened(browser, demo_run[1] / "simultaneous" / "report.html")
+    yield opened
+    opened.page.close()
+
+
+@pytest.fixture(scope="module", params=["demo", "demo, two-level", "gait2354"])
+def opened(request, browser, demo_run):
+    """The reports that every check of drawing and silence goes over."""
+    folder = {"demo": demo_run[1] / "simultaneous", "demo, two-level": demo_run[1]}.get(request.param)
+    if folder is None:
+        folder = request.getfixturevalue("fit_of")("gait2354").folder
+    report = Opened(browser, folder / "report.html")
+    yield report
+    report.page.close()
+
+
+def ink(pixels):
+    """Share of the pixels that are not white."""
+    return float((pixels.min(axis=2) < 0.9).mean())
+
+
+def colour(pixels):
+    """Share of the pixels that are neither white, grey nor black: lines and markers, not axes and letters."""
+    return float((np.ptp(pixels, axis=2) > 0.25).mean())
+
+
+def test_nothing_goes_wrong_and_nothing_is_asked_for(opened):
+    assert opened.errors == []
+    outside = [url for url in opened.requests if not url.startswith(("data:", "blob:"))]
+    assert outside == [opened.page.url]
+
+
+def test_every_plot_is_drawn(opened):
+    plots = opened.page.locator(".plot").all()
+    assert len(plots) >= 5
+    for plot in plots:
+        name = plot.get_attribute("id")
+        traces = plot.locator(".trace").count() + plot.locator(".hm").count()
+        assert traces > 0, name
+        pixels = opened.picture(plot)
+        assert ink(pixels) > 0.005, name
+        assert colour(pixels) > 0.0005, name
+
+
+def test_every_curve_has_a_path(demo):
+    lines = demo.page.locator("#trial1-coordinates .cartesianlayer .js-line")
+    paths = lines.evaluate_all("lines => lines.map(line => line.getAttribute('d') || '')")
+    assert len(paths) == 2 * 27
+    assert min(len(path) for path in paths) > 100
+
+
+def test_a_page_without_data_would_be_found_blank(demo):
+    """The measures above tell a drawn plot from an empty one."""
+    demo.page.evaluate(
+        "Plotly.newPlot(Object.assign(document.body.appendChild(document.createElement('div')), {id: 'empty'}), [], {})"
+    )
+    empty = demo.page.locator("#empty")
+    assert colour(demo.picture(empty)) < 0.0005
+    empty.evaluate("element => element.remove()")
+
+
+# --- 3-D view
+
+
+@pytest.fixture
+def canvas(demo):
+    demo.page.locator("#trial1-view input[type=range]").evaluate(
+        "slider => { slider.value = 0; slider.dispatchEvent(new Event('input')); }"
+    )
+    return demo.page.locator("#trial1-view canvas")
+
+
+def frame(canvas):
+    return int(canvas.get_attribute("data-frame"))
+
+
+def test_view_plays_and_pauses(demo, canvas):
+    before = demo.picture(canvas)
+    assert colour(before) > 0.005
+    button = demo.page.locator("#trial1-view [data-do=play]")
+    button.click()
+    playwright.expect(button).to_have_text("Pause")
+    demo.page.wait_for_timeout(600)
+    button.click()
+    playwright.expect(button).to_have_text("Play")
+    stopped = frame(canvas)
+    assert stopped > 5
+    assert (np.abs(demo.picture(canvas) - before).max(axis=2) > 0.3).mean() > 0.002
+    demo.page.wait_for_timeout(200)
+    assert frame(canvas) == stopped
+
+
+def test_view_plays_in_real_time_and_starts_again(demo, canvas):
+    """At full speed a second of the trial takes a second, whatever the number of frames, and the end leads back."""
+    view = demo.page.locator("#trial1-view")
+    view.locator("select").select_option("1")
+    seen = canvas.evaluate(
+        """canvas => new Promise(resolve => {
+            const seen = [], started = performance.now();
+            const look = () => {
+                seen.push([performance.now() - started, Number(canvas.dataset.frame)]);
+                if (seen.at(-1)[0] < 1500) requestAnimationFrame(look); else resolve(seen);
+            };
+            document.querySelector("#trial1-view [data-do=play]").click();
+            look();
+        })"""
+    )
+    view.locator("[data-do=play]").click()
+    view.locator("select").select_option("0.5")
+    times, frames = np.array(seen).T
+    back = np.flatnonzero(np.diff(frames) < 0)
+    until = back[0] + 1 if len(back) else len(frames)
+    assert until > 10
+    rate = np.polyfit(times[:until] / 1e3, frames[:until], 1)[0]
+    assert rate == pytest.approx(100.0, rel=0.15)
+
+
+def test_drawing_300_frames_is_quick_enough_for_60_a_second(demo, canvas):
+    """Median time of one frame, so that a busy machine does not decide."""
+    milliseconds = demo.page.locator("#trial1-view input[type=range]").evaluate(
+        """slider => {
+            const spent = [];
+            for (let k = 1; k <= 300; k++) {
+                slider.value = k % (Number(slider.max) + 1);
+                const started = performance.now();
+                slider.dispatchEvent(new Event("input"));
+                spent.push(performance.now() - started);
+            }
+            return spent.sort((a, b) => a - b)[150];
+        }"""
+    )
+    assert milliseconds < 16
+
+
+def test_view_is_scrubbed_and_turned_by_keyboard_and_pointer(demo, canvas):
+    slider = demo.page.locator("#trial1-view input[type=range]")
+    slider.focus()
+    for _ in range(3):
+        demo.page.keyboard.press("ArrowRight")
+    assert frame(canvas) == 3
+    assert slider.get_attribute("aria-valuetext").endswith(" s")
+    canvas.focus()
+    for turn in (
+        lambda: demo.page.keyboard.press("ArrowLeft"),
+        lambda: demo.page.keyboard.press("ArrowUp"),
+        lambda: drag(demo.page, canvas),
+        lambda: demo.page.locator("#trial1-view [data-do=right]").click(),
+    ):
+        before = demo.picture(canvas)
+        turn()
+        assert (np.abs(demo.picture(canvas) - before).max(axis=2) > 0.3).mean() > 0.001
+    assert frame(canvas) == 3
+    canvas.focus()
+    demo.page.keyboard.press(" ")
+    demo.page.wait_for_timeout(300)
+    demo.page.keyboard.press(" ")
+    assert frame(canvas) != 3
+
+
+def drag(page, canvas):
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 260, box["y"] + 200)
+    page.mouse.up()
+
+
+def test_parts_of_the_view_are_switched_off(demo, canvas):
+    boxes = demo.page.locator("#trial1-view [data-show]")
+    for box in boxes.all():
+        before = demo.picture(canvas)
+        box.uncheck()
+        assert ink(demo.picture(canvas)) < ink(before), box.get_attribute("data-show")
+    for box in boxes.all():
+        box.check()
+
+
+# --- table, width, print
+
+
+def column(page, number):
+    cells = page.locator(f"#bsp-table tbody td:nth-child({number})")
+    return cells.evaluate_all("cells => cells.map(cell => Number(cell.dataset.sort))")
+
+
+def test_table_sorts_by_pointer_and_keyboard(demo):
+    heading = demo.page.locator("#bsp-table thead th").filter(has_text="estimate")
+    heading.locator("button").click()
+    assert heading.get_attribute("aria-sort") == "ascending"
+    values = column(demo.page, 6)
+    assert len(values) == 120
+    assert values == sorted(values)
+    heading.locator("button").focus()
+    demo.page.keyboard.press("Enter")
+    assert heading.get_attribute("aria-sort") == "descending"
+    assert column(demo.page, 6) == values[::-1]
+    words = demo.page.locator("#bsp-table thead th").filter(has_text="segment")
+    words.locator("button").click()
+    assert heading.get_attribute("aria-sort") is None
+    names = demo.page.locator("#bsp-table tbody th").all_text_contents()
+    assert names == sorted(names)
+
+
+def test_page_fits_a_phone(browser, demo_run):
+    report = Opened(browser, demo_run[1] / "simultaneous" / "report.html", PHONE)
+    assert report.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    wide = report.page.locator(".plot").evaluate_all(
+        "plots => plots.filter(plot => plot.querySelector('.main-svg').clientWidth > plot.clientWidth + 1).length"
+    )
+    assert wide == 0
+    lefts = panel_places(report.page)
+    assert len(set(lefts)) == 1
+    report.page.set_viewport_size(DESKTOP)
+    report.page.wait_for_timeout(1500)
+    assert len(panel_places(report.page)) == 6
+    assert len(set(panel_places(report.page))) == 3
+    assert report.errors == []
+    report.page.close()
+
+
+def panel_places(page):
+    """Left edge of the title of each panel of the residuals, in steps of 20 px."""
+    return page.locator("#trial1-residuals .annotation").evaluate_all(
+        "notes => notes.map(note => Math.round(note.getBoundingClientRect().left / 20))"
+    )
+
+
+def test_print_draws_everything_in_the_width_of_the_paper(demo, tmp_path):
+    demo.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    widths = demo.page.locator(".plot .main-svg").evaluate_all("drawn => drawn.map(svg => svg.clientWidth)")
+    assert set(widths) == {960}
+    assert demo.page.locator("details:not([open])").count() == 0
+    demo.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert len(demo.page.pdf(format="A4")) > 100_000

@@ -1,0 +1,65 @@
+import base64
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.report.skeleton_view import packed, scene
+
+
+@pytest.fixture(scope="module")
+def fit(demo_run):
+    """The demo's simultaneous fit."""
+    return demo_run[0].simultaneous
+
+
+def test_scene_has_everything_where_it_is(fit):
+    trial = fit.trials[0]
+    shown = scene(fit, trial, 1000)
+    pose = fit.skeleton.pose(trial.motion.q)
+    torso = fit.skeleton.segments.index("torso")
+    com = fit.estimate.com_m[fit.estimate.segments.index("torso")]
+    np.testing.assert_allclose(
+        shown.com[:, fit.estimate.segments.index("torso")],
+        pose.rotation[:, torso] @ com + pose.translation[:, torso],
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        shown.com_radius_m**3 / shown.com_radius_m[0] ** 3, fit.estimate.mass_kg / fit.estimate.mass_kg[0]
+    )
+    distance = np.linalg.norm(shown.measured - shown.modelled, axis=2)
+    np.testing.assert_allclose(
+        np.sqrt(np.nanmean(distance**2)), np.sqrt(np.nanmean(trial.marker_errors_m["final"] ** 2)), rtol=1e-9
+    )
+    assert shown.bones.max() < shown.points.shape[1]
+    assert len(shown.sides) == len(shown.bones)
+    assert set(shown.sides) == {"r", "l", ""}
+
+
+def test_arrows_stand_in_the_centre_of_pressure_and_show_the_force(fit):
+    trial = fit.trials[0]
+    arrows, loads = scene(fit, trial, 1000).arrows, trial.kinematics.foot_loads
+    loaded = loads[:, :, 1] > 20
+    assert (np.isfinite(arrows).all(axis=(2, 3)) == loaded).all()
+    at, force = arrows[:, :, 0][loaded], loads[..., :3][loaded]
+    np.testing.assert_allclose(np.cross(at, force)[:, [0, 2]], loads[..., 3:][loaded][:, [0, 2]], atol=1e-9)
+    np.testing.assert_allclose(arrows[:, :, 1][loaded] - at, 1e-3 * force, atol=1e-12)
+
+
+def test_the_page_carries_the_scene_to_half_a_millimetre(fit):
+    shown = scene(fit, fit.trials[0], 1000)
+    hidden = shown.measured.copy()
+    hidden[3, 1] = np.nan
+    told = packed(replace(shown, measured=hidden))
+    back = {
+        name: np.frombuffer(base64.b64decode(text), "<i2").reshape(len(told["time"]), told["count"][name], 3)
+        for name, text in told["data"].items()
+    }
+    place = np.nanmean(shown.points, axis=(0, 1)) * [1, 0, 1]
+    np.testing.assert_allclose(back["points"] / 1e3 + place, shown.points, atol=0.0011)
+    assert (back["measured"][3, 1] == -32768).all()
+    assert (back["measured"] == -32768).sum() == np.isnan(hidden).sum()
+
+
+def test_long_trials_are_thinned(fit):
+    assert len(scene(fit, fit.trials[0], 30).time) <= 30
