@@ -34,9 +34,8 @@ class Provenance:
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     """The command with the hashes of all files that the subject file names."""
-    paths = [wanted.model.static]
-    if isinstance(wanted.model.markers, Path):
-        paths.append(wanted.model.markers)
+    model = wanted.model
+    paths = [path for path in (model.static, model.osim, model.markers) if isinstance(path, Path)]
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
     return Provenance(command, {str(path): _sha256(path) for path in dict.fromkeys(paths)})
