@@ -6,8 +6,10 @@ import pytest
 from kinertia.bsp_prior import MASS_SD, OTHER_MASS_SD
 from kinertia.config import Settings, Subject
 from kinertia.errors import OsimError, SubjectError, TrialError
+from kinertia.ik import solve_ik
 from kinertia.io.osim import OsimModel, read_osim
 from kinertia.io.recording import read_recording
+from kinertia.io.trc import read_trc
 from kinertia.osim_prepare import at_mass, centre_offsets, kind_of, parted, prepare_osim, with_centre_offsets
 from kinertia.prepare import TrialInput
 
@@ -146,6 +148,18 @@ def test_offsets_move_a_joint_along_its_parents_axes(rajagopal):
     np.testing.assert_allclose(after.translation[:, torso], before.translation[:, torso])
     np.testing.assert_allclose(centre_offsets(moved)["acromial_r"], shift)
     np.testing.assert_array_equal(centre_offsets(moved)["hip_l"], 0.0)
+
+
+def test_arms_do_not_turn_over(shared_data):
+    """With the arm turned by half a turn and the elbow bent backwards, its markers fit nearly as well."""
+    folder = shared_data / "subject4"
+    skeleton = read_osim(folder / "addbiomechanics_scaled.osim").skeleton
+    ik = solve_ik(skeleton.lock({"mtp_angle_r": 0.0, "mtp_angle_l": 0.0}), read_trc(folder / "squats1.trc"))
+    elbows = ik.q[:, [ik.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
+    assert elbows.min() > 0.0
+    assert elbows.max() < 2.7
+    assert np.abs(np.diff(ik.q, axis=0)).max() < 0.2
+    assert ik.marker_rms_m < 0.011
 
 
 def test_a_model_without_markers(shared_data, walk):
