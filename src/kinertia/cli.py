@@ -14,6 +14,7 @@ from rich.text import Text
 from kinertia import __version__
 from kinertia.cli_check import check
 from kinertia.cli_options import Force, Output, Quiet, Verbose, results_folder
+from kinertia.cli_plan import crossval, plan
 from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
@@ -40,6 +41,8 @@ kinertia demo                 see it work, on a person who does not exist
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
+kinertia crossval subject.toml   do they hold on a trial that was held out?
+kinertia plan                 which motions to record, by their error bars
 
 Every command says more with --help, and has an example there.
 
@@ -155,10 +158,7 @@ def fit(
     if trial.suffix.lower() == ".toml":
         given = [name for name, value in options.items() if value is not None]
         if given:
-            raise FileError(
-                trial,
-                f"a subject file says it all; put {', '.join(given)} into it instead of the command line",
-            )
+            raise FileError(trial, f"a subject file says it all; put {', '.join(given)} into it instead")
         wanted = read_subject(trial)
     else:
         wanted = _from_options(trial, options)
@@ -171,8 +171,7 @@ def fit(
     _report(result)
     _report_verdicts(judged, result, verbose)
     out.print(f"results in {folder}", soft_wrap=True)
-    if stands_against(judged):
-        raise typer.Exit(1)
+    raise typer.Exit(int(stands_against(judged)))
 
 
 def init(
@@ -310,6 +309,6 @@ def _bsp_table(fit: Fit) -> Table:
     return table
 
 
-for _entry in (demo, init, check, fit):
+for _entry in (demo, init, check, fit, crossval, plan):
     app.command()(_entry)
 app.add_typer(study, name="study")
