@@ -9,6 +9,7 @@ from kinertia.skeleton import Marker
 from kinertia.trial import FootLoads, Markers, Trial
 
 UPPER = ("torso", "upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l")
+HELD = dict.fromkeys(ARM_COORDINATES, 0.0)
 ARM = ("R.Bicep", "R.Elbow", "R.Wrist.Lat", "R.Wrist.Med")
 
 
@@ -107,7 +108,7 @@ def test_sampling_takes_at_most_sixty_frames_a_tenth_of_a_second_apart():
 
 def test_arms_without_markers_are_held_and_named(skeleton):
     markers = dropped(walk(skeleton), ARM)
-    held_skeleton, held = hold_uninformed(skeleton, [trial(markers)], ARM_COORDINATES)
+    held_skeleton, held = hold_uninformed(skeleton, [trial(markers)], HELD)
     assert held == ("arm_flex_r", "arm_add_r", "elbow_flex_r")
     assert {name: held_skeleton.locked[name] for name in held} == dict.fromkeys(held, 0.0)
     assert len(held_skeleton.coordinates) == 24
@@ -115,17 +116,17 @@ def test_arms_without_markers_are_held_and_named(skeleton):
 
 def test_a_forearm_without_markers_holds_the_elbow_alone(skeleton):
     markers = dropped(walk(skeleton), ["L.Wrist.Lat", "L.Wrist.Med"])
-    assert hold_uninformed(skeleton, [trial(markers)], ARM_COORDINATES)[1] == ("elbow_flex_l",)
-    assert hold_uninformed(skeleton, [trial(walk(skeleton))], ARM_COORDINATES) == (skeleton, ())
+    assert hold_uninformed(skeleton, [trial(markers)], HELD)[1] == ("elbow_flex_l",)
+    assert hold_uninformed(skeleton, [trial(walk(skeleton))], HELD) == (skeleton, ())
 
 
 def test_a_leg_without_markers_is_an_error(skeleton):
     foot = [m.label for m in skeleton.markers if m.segment == "foot_l"]
     with pytest.raises(TrialError, match=r"trial 'walk': in no frame .*ankle_angle_l.*L\.Heel"):
-        hold_uninformed(skeleton, [trial(dropped(walk(skeleton), foot))], ARM_COORDINATES)
+        hold_uninformed(skeleton, [trial(dropped(walk(skeleton), foot))], HELD)
 
 
 def test_arm_markers_in_one_trial_only_are_an_error_that_names_the_other(skeleton):
     trials = [trial(walk(skeleton), "with"), trial(dropped(walk(skeleton), ARM), "bare")]
     with pytest.raises(TrialError, match=r"trial 'bare': in no frame .*arm_flex_r"):
-        hold_uninformed(skeleton, trials, ARM_COORDINATES)
+        hold_uninformed(skeleton, trials, HELD)

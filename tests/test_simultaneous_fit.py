@@ -10,11 +10,12 @@ from accuracy import kinematics_of
 from kinertia.bsp_prior import literature_prior
 from kinertia.config import Settings, Subject
 from kinertia.fit import Fit, estimate_bsp
+from kinertia.freedom import JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.noise import camera_noise
 from kinertia.prepare import TrialInput
 from kinertia.results import save_fit
-from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, JOINT_CENTRE_SD_M, PLATE_SD_M, fit_simultaneous
+from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, PLATE_SD_M, fit_simultaneous
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
 
 

@@ -19,12 +19,15 @@ and right differ less than either from the literature: a person is nearly symmet
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from kinertia.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, block_diagonal, second_moments
 from kinertia.errors import PriorError
+from kinertia.log_cholesky import nearest_consistent
 
 MASS_SD = {
     "pelvis": 0.14,
@@ -36,6 +39,8 @@ MASS_SD = {
     "forearm": 0.10,
 }
 """Relative deviation of the mass, by segment."""
+OTHER_MASS_SD = 0.15
+"""Of a segment that is none of these."""
 COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M, MIDLINE_SD_M = 0.035, 0.05, 0.008, 0.010
 SECOND_MOMENT_SD, COMMON_SHARE = 0.20, 0.5
 """Relative deviation of second moments, and the share of its variance that all directions have in common (size)."""
@@ -109,29 +114,35 @@ class BspPrior:
                 return person
 
 
-def literature_prior(literature: BodySegmentParameters) -> BspPrior:
-    """The prior around literature values of the 27-DOF model's segments, whose total mass is the scale's."""
+def literature_prior(literature: BodySegmentParameters, kinds: Sequence[str] | None = None) -> BspPrior:
+    """The prior around literature values, or those of a scaled model, whose total mass is the scale's.
+
+    Args:
+        literature: the mean.
+        kinds: per segment, a key of MASS_SD; a segment of any other kind gets OTHER_MASS_SD, and 5 % of its length in
+            all directions. The segments' own names if None.
+    """
     table = literature.table()
     sd = np.zeros_like(table)
     names = [segment.removesuffix("_r").removesuffix("_l") for segment in literature.segments]
-    sd[:, 0] = table[:, 0] * [MASS_SD[name] for name in names]
+    names = names if kinds is None else list(kinds)
+    sd[:, 0] = table[:, 0] * [MASS_SD.get(name, OTHER_MASS_SD) for name in names]
     for row, name in enumerate(names):
         along = 0 if name == "foot" else 1
-        length = 2.0 * abs(table[row, 1 + along])
+        length = 2.0 * (abs(table[row, 1 + along]) if name in MASS_SD else np.abs(table[row, 1:4]).max())
         sd[row, 1:4] = np.maximum(COM_ACROSS_SD * length, SMALLEST_COM_SD_M)
-        sd[row, 1 + along] = max(COM_ALONG_SD * length, SMALLEST_COM_SD_M)
+        if name in MASS_SD:
+            sd[row, 1 + along] = max(COM_ALONG_SD * length, SMALLEST_COM_SD_M)
         if not literature.segments[row].endswith(("_r", "_l")):
             sd[row, 3] = MIDLINE_SD_M
     blocks = np.zeros((len(names), 10, 10))
     blocks[:, range(4), range(4)] = np.square(sd[:, :4])
-    blocks[:, 4:, 4:] = _inertia_covariance(literature)
+    blocks[:, 4:, 4:] = _inertia_covariance(nearest_consistent(literature))
     covariance = with_symmetry(block_diagonal(blocks), literature.segments, SIDES_CORRELATION)
-    mass = {name: 10 * i for i, name in enumerate(literature.segments)}
-    for side in "rl":
-        for trunk in ("pelvis", "torso"):
-            i, j = mass[f"thigh_{side}"], mass[trunk]
-            shared = THIGH_TRUNK_CORRELATION * np.sqrt(covariance[i, i] * covariance[j, j])
-            covariance[i, j] = covariance[j, i] = shared
+    for i, j in product(range(len(names)), repeat=2):
+        if names[i] == "thigh" and names[j] in ("pelvis", "torso"):
+            shared = THIGH_TRUNK_CORRELATION * np.sqrt(covariance[10 * i, 10 * i] * covariance[10 * j, 10 * j])
+            covariance[10 * i, 10 * j] = covariance[10 * j, 10 * i] = shared
     total = literature.total_mass_kg
     return BspPrior(literature, covariance, total, SCALE_SD * total)
 

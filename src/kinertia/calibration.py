@@ -9,7 +9,7 @@ linearly with their number.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,14 +93,14 @@ def adapt(
 
 
 def hold_uninformed(
-    skeleton: Skeleton, trials: Sequence[Trial], may_hold: Collection[str]
+    skeleton: Skeleton, trials: Sequence[Trial], may_hold: Mapping[str, float]
 ) -> tuple[Skeleton, tuple[str, ...]]:
-    """The skeleton with those coordinates held at zero that no marker shows, and their names.
+    """The skeleton with those coordinates held that no marker shows, and their names.
 
     Args:
         skeleton: from the static trial.
         trials: the trials it will be used for.
-        may_hold: the coordinates that need not be shown.
+        may_hold: the coordinates that need not be shown, and the values at which they are held.
 
     Raises:
         TrialError: a trial never shows another coordinate, or one that another trial shows.
@@ -115,7 +115,7 @@ def hold_uninformed(
         lost = [name for name in names if name not in held]
         if lost:
             raise TrialError(trial.name, _not_shown(skeleton, trial.markers, lost))
-    return skeleton.lock(dict.fromkeys(held, 0.0)), tuple(held)
+    return skeleton.lock({name: may_hold[name] for name in held}), tuple(held)
 
 
 def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from kinertia.two_level import TwoLevelResult
 if TYPE_CHECKING:
     from kinertia.fit import TrialFit
 
+T = TypeVar("T")
+
 FORCE_MASS_TOLERANCE = 0.02
 """Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
 CONTRADICTING_MASS = 0.10
@@ -34,15 +36,21 @@ CONTRADICTING_COM_M = 0.1
 """A centre of mass this far from the literature contradicts it."""
 
 
-def known(value: float | None) -> float:
-    """The value of a field that `complete_subject` has filled in."""
+def known(value: T | None) -> T:
+    """The value of a field that the subject file or `complete_subject` has filled in."""
     if value is None:
         raise ValueError("complete_subject must come first")
     return value
 
 
-def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple[Subject, list[str]]:
+def complete_subject(
+    subject: Subject, recordings: Sequence[Recording], mass_only: bool = False
+) -> tuple[Subject, list[str]]:
     """Mass and height from the files where the user gave none; warnings where both are given and disagree.
+
+    Args:
+        subject, recordings: what the user says, and the files.
+        mass_only: height and sex may stay unknown.
 
     Raises:
         SubjectError: neither the user nor a file gives mass or height, or the value cannot be true.
@@ -53,6 +61,8 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple
         told = [(r.name, getattr(r, quantity)) for r in recordings if getattr(r, quantity) is not None]
         given = getattr(subject, quantity)
         if given is None and not told:
+            if mass_only and quantity == "height_m":
+                continue
             raise SubjectError(
                 quantity, None, f"no file carries it; give it with {option} or as {quantity} under [subject]"
             )
@@ -60,7 +70,7 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording]) -> tuple
         for name, value in told:
             if abs(value - found[quantity]) > 0.01 * found[quantity]:
                 warnings.append(f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}")
-    check_subject(found["mass_kg"], found["height_m"], subject.sex)
+    check_subject(found["mass_kg"], found.get("height_m", 1.7), subject.sex or "male")
     return subject.model_copy(update=found), warnings
 
 
@@ -168,9 +178,16 @@ def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
 
 
 def fit_warnings(
-    mass_kg: float, literature: BodySegmentParameters, estimate: BodySegmentParameters, trials: Sequence[TrialFit]
+    mass_kg: float,
+    literature: BodySegmentParameters,
+    estimate: BodySegmentParameters,
+    trials: Sequence[TrialFit],
+    source: str = "the literature",
 ) -> list[str]:
-    """What the user should know before using the numbers, whatever the estimator."""
+    """What the user should know before using the numbers, whatever the estimator.
+
+    `source` says where the parameters before the estimate come from.
+    """
     found = []
     for trial in trials:
         by_force = mass_from_force_kg(literature, trial)
@@ -189,7 +206,7 @@ def fit_warnings(
     worst = int(np.argmax(moved))
     if moved[worst] > CONTRADICTING_COM_M:
         found.append(
-            f"the estimate contradicts the literature: the centre of mass of {estimate.segments[worst]} "
+            f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
             f"moved by {moved[worst] * 1e3:.0f} mm"
         )
     return found

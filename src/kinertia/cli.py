@@ -18,9 +18,10 @@ from kinertia.cli_plan import crossval, plan
 from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
-from kinertia.fit import Fit, estimate_bsp
+from kinertia.fit import Fit, estimate_bsp, estimate_bsp_of_model
 from kinertia.identifiability import evidence
-from kinertia.inputs import read_inputs
+from kinertia.inputs import read_inputs, read_trials
+from kinertia.io.osim import read_osim
 from kinertia.io.sto import write_then_rename
 from kinertia.provenance import provenance_of
 from kinertia.results import save_fit, summary
@@ -49,6 +50,7 @@ Every command says more with --help, and has an example there.
 
 A static trial (the person standing; C3D or TRC), one or more gait trials with
 force plates (C3D, or TRC with MOT or STO), body mass, stature and sex.
+Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 
 [bold]Exit status[/]
 
@@ -117,6 +119,12 @@ def fit(
         str | None,
         typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
     ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="Scaled OpenSim model (.osim), in place of --static, --sex and --height.")
+    ] = None,
+    calibrate: Annotated[
+        bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
+    ] = False,
     method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -134,6 +142,8 @@ def fit(
     kinertia fit walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male -o out
 
     kinertia fit walk.trc --forces walk_grf.mot --static static.trc --mass 72.6 --height 1.803 --sex male -o out
+
+    kinertia fit walk.trc --forces walk_grf.mot --loads loads.xml --model scaled.osim --mass 72.6 -o out
     """
     options = {
         "--static": static,
@@ -143,6 +153,8 @@ def fit(
         "--height": height,
         "--sex": sex,
         "--markers": markers,
+        "--model": model,
+        "--calibrate": calibrate or None,
     }
     if trial.suffix.lower() == ".toml":
         given = [name for name, value in options.items() if value is not None]
@@ -183,7 +195,12 @@ def init(
 def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
     """The command line that repeats this run."""
     given = {**options, "--method": method, "-o": output}
-    words = [str(word) for name, value in given.items() if value is not None for word in (name, value)]
+    words = [
+        str(word)
+        for name, value in given.items()
+        if value is not None
+        for word in ([name] if value is True else [name, value])
+    ]
     return shlex.join(["kinertia", "fit", str(trial), *words])
 
 
@@ -193,11 +210,14 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
         key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }
     for name in ("--static", "--sex"):
-        if name not in given:
-            raise FileError(trial, f"a trial on its own needs {name}; or write a subject file (kinertia init FOLDER)")
+        if name not in given and "--model" not in given:
+            hint = " (or --model)" if name == "--static" else ""
+            raise FileError(
+                trial, f"a trial on its own needs {name}{hint}; or write a subject file (kinertia init FOLDER)"
+            )
     names = {
         "subject": {"--mass": "mass_kg", "--height": "height_m", "--sex": "sex"},
-        "model": {"--static": "static", "--markers": "markers"},
+        "model": {"--static": "static", "--markers": "markers", "--model": "osim", "--calibrate": "calibrate"},
         "trial": {"--forces": "forces", "--loads": "loads"},
     }
     tables = {
@@ -212,6 +232,10 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
 
 def _run(wanted: SubjectFile) -> Fit:
     with shown_progress() as progress:
+        if wanted.model.osim is not None:
+            own = read_osim(wanted.model.osim)
+            trials, calibrate = read_trials(wanted, progress), wanted.model.calibrate
+            return estimate_bsp_of_model(wanted.subject, own, trials, wanted.settings, calibrate, progress)
         static, inputs, marker_set = read_inputs(wanted, progress)
         return estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
 
@@ -219,15 +243,14 @@ def _run(wanted: SubjectFile) -> Fit:
 def _report(fit: Fit) -> None:
     told = summary(fit)
     subject, mass = told["subject"], told["total_mass_kg"]
-    out.print(
-        f"\n{subject['name']}: {subject['mass_kg']:g} kg, {subject['height_m']:g} m, {subject['sex']}; "
-        f"method {told['method']}; {fit.notes[0]}"
-    )
+    height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
+    person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
+    out.print(f"\n{subject['name']}: {person}; method {told['method']}; {fit.notes[0]}")
     for trial in told["trials"]:
         _report_trial(trial)
     out.print(_bsp_table(fit))
     if fit.posterior is not None:
-        out.print("** measured by the data, * informed by them, no mark: assumed, the literature's; sd: error bar\n")
+        out.print("** measured by the data, * informed by them, no mark: assumed, the first guess; sd: error bar\n")
     out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
         out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
@@ -268,7 +291,8 @@ def _bsp_table(fit: Fit) -> Table:
     for i, segment in enumerate(fit.literature.segments):
         if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
             continue
-        for source, bsp in (("literature", fit.literature), ("estimate", fit.estimate)):
+        before = "literature" if fit.file is None else "model"
+        for source, bsp in ((before, fit.literature), ("estimate", fit.estimate)):
             com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
             cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]

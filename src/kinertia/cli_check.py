@@ -205,7 +205,8 @@ def _of_subject(subject: SubjectFile) -> tuple[list[_Files], MarkerSet | None, f
     named = subject.model.markers
     trials = [_Files(trial.markers, trial.forces, trial.loads, trial.window_s) for trial in subject.trials]
     marker_set = None if named is None else read_marker_set(named)
-    return [_Files(subject.model.static), *trials], marker_set, subject.subject.mass_kg
+    static = [] if subject.model.static is None else [_Files(subject.model.static)]
+    return [*static, *trials], marker_set, subject.subject.mass_kg
 
 
 def _read(wanted: Sequence[_Files]) -> tuple[list[tuple[_Files, Recording]], list[str]]:

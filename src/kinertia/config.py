@@ -8,6 +8,7 @@
     [model]
     static = "static.c3d"          # paths are relative to this file
     markers = "plug-in-gait"       # a preset or a TOML file of your own; left out: found from the labels
+    # or, in place of both: osim = "scaled.osim"; with calibrate = true its markers and joint centres may move
 
     [[trial]]                      # as many as there are
     markers = "walk1.trc"          # a C3D file needs no `forces`
@@ -110,10 +111,15 @@ class Table(BaseModel):
 
 
 class Subject(Table):
-    """Who walked. Mass (kg) and height (m) are None where the file leaves them to the C3D files."""
+    """Who walked. Mass (kg) and height (m) are None where the file leaves them to the C3D files.
+
+    With an OpenSim model neither sex nor height is needed.
+    """
 
     name: str = Field(min_length=1, description="name in files and report; left out: the folder's name")
-    sex: Literal["male", "female"] = Field(description='"male" or "female": which table of the literature')
+    sex: Literal["male", "female"] | None = Field(
+        default=None, description='"male" or "female": which table of the literature'
+    )
     mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
     height_m: float | None = Field(default=None, description="stature, m")
 
@@ -124,10 +130,15 @@ class Subject(Table):
 
 
 class Model(Table):
-    """What the skeleton is built from. `markers` is a preset's name, an absolute path, or None: detect it."""
+    """What the skeleton is built from: a static trial, or an OpenSim model.
 
-    static: File = Field(description="static trial, .c3d or .trc")
+    `markers` is a preset's name, an absolute path, or None: detect it.
+    """
+
+    static: File | None = Field(default=None, description="static trial, .c3d or .trc")
     markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
+    osim: File | None = Field(default=None, description="scaled OpenSim model, .osim, in place of a static trial")
+    calibrate: bool = Field(default=False, description="OpenSim model only; true: markers and joint centres may move")
 
 
 class TrialFiles(Table):
@@ -191,11 +202,14 @@ def read_subject(path: str | Path) -> SubjectFile:
         errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
         line, sentence = min((_line(lines, one["loc"]) or end, _sentence(one)) for one in errors)
         raise FileError(path, sentence, line) from None
+    if lack := _incomplete(result):
+        place, sentence = lack
+        raise FileError(path, sentence, _line(lines, place) or text.count("\n") + 1)
     subject, names = result.subject, [trial.name for trial in result.trials]
     mass_kg = 70.0 if subject.mass_kg is None else subject.mass_kg  # left open: any plausible value
     height_m = 1.7 if subject.height_m is None else subject.height_m
     try:
-        check_subject(mass_kg, height_m, subject.sex)
+        check_subject(mass_kg, height_m, subject.sex or "male")
     except SubjectError as error:
         raise FileError(path, str(error), _line(lines, ("subject", error.field))) from error
     for index, name in enumerate(names):
@@ -215,7 +229,27 @@ def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
     except ValidationError as error:
         raise SettingsError(_sentence(error.errors()[0])) from None
+    if problem := _incomplete(result):
+        raise SettingsError(problem[1])
     return result
+
+
+def _incomplete(wanted: SubjectFile) -> tuple[Location, str] | None:
+    """Where and what the entries lack, or have too much of, for the kind of model."""
+    model = wanted.model
+    for table, key, value in (("model", "static", model.static), ("subject", "sex", wanted.subject.sex)):
+        if value is None and model.osim is None:
+            return (table, key), _sentence({"loc": (table, key), "type": "missing"})
+    if model.osim is not None:
+        for key, given in (("static", model.static), ("markers", model.markers)):
+            if given is not None:
+                return ("model", key), f"[model] has both osim and {key}; the OpenSim model says it all, remove {key}"
+        if wanted.settings.method == "two-level":
+            problem = 'method = "two-level" works on the built-in model only; remove it, or give a static trial'
+            return ("settings", "method"), problem
+    elif model.calibrate:
+        return ("model", "calibrate"), "[model] calibrate goes with osim; the built-in model is always calibrated"
+    return None
 
 
 def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
@@ -229,7 +263,10 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
     except ValidationError as error:
         detail = error.errors()[0]
         raise SettingsError(_sentence({**detail, "loc": ("settings", *detail["loc"])})) from None
-    return wanted.model_copy(update={"settings": settings})
+    changed = wanted.model_copy(update={"settings": settings})
+    if problem := _incomplete(changed):
+        raise SettingsError(problem[1])
+    return changed
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from kinertia.freedom import JOINT_CENTRE_SD_M, MARKER_SD_M
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.kinematics import Kinematics, solve_kinematics
 from kinertia.noise import camera_noise, soft_tissue_artefact, study_noise
-from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, JOINT_CENTRE_SD_M, MARKER_SD_M, PLATE_SD_M
+from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, PLATE_SD_M
 from kinertia.skeleton import GRAVITY_M_S2, Marker, Skeleton
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial

@@ -19,8 +19,10 @@ from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg,
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.identifiability import evidence
+from kinertia.io.osim import OsimModel
 from kinertia.kinematics import Kinematics
 from kinertia.marker_set import MarkerSet
+from kinertia.osim_prepare import prepare_osim
 from kinertia.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.simultaneous_fit import Posterior, fit_simultaneous
 from kinertia.skeleton import Skeleton
@@ -79,12 +81,13 @@ class Fit:
         subject: with mass and height filled in.
         settings: as used.
         skeleton: calibrated model.
-        literature, estimate: body segment parameters before and after.
+        literature, estimate: body segment parameters before and after; before, those of an OpenSim model are its own.
         trials: one entry per trial.
         converged: whether the estimator met its criterion.
         posterior: error bars and calibration; None after two-level, which has none.
         warnings: what the user should know before using the numbers; one sentence each.
         notes: assumptions made on the way; one sentence each.
+        file: the OpenSim model that the skeleton is from, if it is.
     """
 
     subject: Subject
@@ -97,6 +100,7 @@ class Fit:
     posterior: Posterior | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+    file: OsimModel | None = None
 
     @cached_property
     def bsp(self) -> pd.DataFrame:
@@ -176,13 +180,41 @@ def estimate_bsp(
         return _estimate(ready if prior is None else replace(ready, prior=prior), settings or Settings(), progress)
 
 
+def estimate_bsp_of_model(
+    subject: Subject,
+    model: OsimModel,
+    inputs: Sequence[TrialInput],
+    settings: Settings | None = None,
+    calibrate: bool = False,
+    progress: Progress = lambda stage, share: None,
+) -> Fit:
+    """Body segment parameters of a person whose scaled OpenSim model is known, by the simultaneous estimate.
+
+    Args:
+        subject: mass may be None where a recording carries it.
+        model: as `kinertia.io.osim.read_osim` reads it.
+        inputs: the trials.
+        settings: defaults if None.
+        calibrate: let markers and joint centres move; else they stay where the model has them.
+        progress: called as the work goes on.
+
+    Raises:
+        KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
+    """
+    settings = settings or Settings()
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
+
+
 def _estimate(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     warnings = (
         *ready.warnings,
         *outcome.warnings,
-        *fit_warnings(known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials),
+        *fit_warnings(
+            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.freedom.source
+        ),
     )
     return Fit(
         subject=ready.subject,
@@ -195,6 +227,7 @@ def _estimate(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
         posterior=outcome.posterior,
         warnings=tuple(dict.fromkeys(warnings)),
         notes=ready.notes,
+        file=ready.file,
     )
 
 
@@ -236,8 +269,8 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
         by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
     check_masses(known(ready.subject.mass_kg), by_force)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz)
-    bsp, skeleton = fitted.result.bsp, fitted.result.skeleton
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz, ready.freedom)
+    bsp, skeleton = fitted.bsp, fitted.skeleton
     estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
     trials = _trial_fits(ready, skeleton, bsp, estimates, fitted.result.moment_sd, started)
     return _Outcome(skeleton, bsp, trials, fitted.result.converged, fitted.posterior, fitted.warnings)

@@ -21,6 +21,8 @@ from kinertia.skeleton import Pose, Skeleton
 from kinertia.trial import Markers
 
 _WARM_START_EVERY = 10
+_FAR = 1.0
+"""Rad or m between frames a tenth of a second apart: more than a person moves."""
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
@@ -86,7 +88,7 @@ def solve_ik(
     used = [m for m in skeleton.markers if m.label in markers.labels]
     model = skeleton.with_markers(used)
     measured = markers.positions[:, [markers.labels.index(m.label) for m in used]]
-    q = np.zeros((len(measured), len(model.coordinates)))
+    q = np.tile([model.start.get(name, 0.0) for name in model.coordinates], (len(measured), 1))
     q[:, :6], placed = _place_root(model, measured, name)
     if not placed.any():
         raise TrialError(
@@ -97,6 +99,7 @@ def solve_ik(
     if consecutive and len(fine) > 1:
         coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
         q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], gain_tolerance_m2)
+        _carry_on(model, measured[coarse], q_coarse, gain_tolerance_m2)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
@@ -134,6 +137,24 @@ def _best_fit(
         kept = doubtful[better]
         q[kept], converged[kept], normal[kept] = anew[better], settled[better], shown[better]
     return q, converged, normal
+
+
+def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float) -> None:
+    """Start frames that lie far from their neighbour again from there; they keep what fits better.
+
+    An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
+    """
+    count = len(q)
+    for order, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
+        for k in order:
+            change = q[k] - q[k + step]
+            change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
+            if np.abs(change).max() < _FAR:
+                continue
+            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], gain_tolerance_m2)
+            old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
+            if new < old:
+                q[k] = again[0]
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> None:

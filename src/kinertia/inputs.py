@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from pathlib import Path
 
 from kinertia.config import SubjectFile
+from kinertia.errors import SettingsError
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import MarkerSet, read_marker_set
 from kinertia.prepare import Progress, TrialInput
@@ -20,15 +22,34 @@ def read_inputs(
     Raises:
         KinertiaError: a file is missing or broken.
     """
-    started = time.perf_counter()
-    progress("reading", 0.0)
-    static = read_recording(wanted.model.static)
+    static = read_recording(_static(wanted))
+    marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
+    return static, read_trials(wanted, progress), marker_set
+
+
+def _static(wanted: SubjectFile) -> Path:
+    if wanted.model.static is None:
+        raise SettingsError("[model] names an OpenSim model; this needs a static trial (static = ...)")
+    return wanted.model.static
+
+
+def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> list[TrialInput]:
+    """The trials by their names in the subject file.
+
+    Columns of the same name in the force files of two trials need not come from the same plate (laboratories sort steps
+    into such files), so each trial's are plates of their own; the plates of C3D files are those of the laboratory.
+
+    Raises:
+        KinertiaError: a file is missing or broken.
+    """
     inputs = []
     for k, files in enumerate(wanted.trials):
         progress("reading", k / len(wanted.trials))
+        started = time.perf_counter()
         recording = read_recording(files.markers, files.forces, files.loads)
         seconds = time.perf_counter() - started
-        inputs.append(TrialInput(replace(recording, name=files.name), files.window_s, seconds))
-        started = time.perf_counter()
-    marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
-    return static, inputs, marker_set
+        plates = recording.plates
+        if plates is not None and files.forces is not None and len(wanted.trials) > 1:
+            plates = replace(plates, names=tuple(f"{name} ({files.name})" for name in plates.names))
+        inputs.append(TrialInput(replace(recording, name=files.name, plates=plates), files.window_s, seconds))
+    return inputs

@@ -14,15 +14,18 @@ from kinertia.checks import check_same_person, check_visible, complete_subject, 
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
+from kinertia.io.osim import OsimModel
 from kinertia.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.labels import check_labels
 from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording, Trial
 
-_LOWER_BODY_SD_M = 0.01
-_UPPER_BODY_SD_M = 0.04
+LOWER_BODY_SD_M = 0.01
+UPPER_BODY_SD_M = 0.04
+"""How far markers may sit from where the model has them."""
 _ARM_ROTATION_SD_RAD = 1.0
 
 Progress = Callable[[str, float], None]
@@ -45,8 +48,10 @@ class Prepared:
     Attributes:
         subject: with mass and height filled in.
         skeleton: calibrated model.
-        literature: body segment parameters of its geometry.
+        literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
         prior: how far the person's may be from them.
+        freedom: what else the simultaneous estimate may move.
+        file: the OpenSim model that the skeleton is from, if it is.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
         warnings, notes: one sentence each.
@@ -56,6 +61,8 @@ class Prepared:
     skeleton: Skeleton
     literature: BodySegmentParameters
     prior: BspPrior
+    freedom: Freedom
+    file: OsimModel | None
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
     warnings: tuple[str, ...]
@@ -74,16 +81,16 @@ def calibrate(
     Returns the model as the static trial gives it, the adapted skeleton, and notes. Markers of pelvis, legs and feet
     are held to the static trial by a deviation of 10 mm, those of torso and arms and the shoulder centres by 40 mm.
     """
-    model = build_gait27(static, marker_set, known(subject.height_m), subject.sex, hip_centre)
+    model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
     check_same_person(model.skeleton, trials)
-    skeleton, held = hold_uninformed(model.skeleton, trials, ARM_COORDINATES)
+    skeleton, held = hold_uninformed(model.skeleton, trials, dict.fromkeys(ARM_COORDINATES, 0.0))
     for trial in trials:
         check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
     upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
-    marker_sd = {s: _UPPER_BODY_SD_M if s in upper else _LOWER_BODY_SD_M for s in model.skeleton.segments}
-    coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, _UPPER_BODY_SD_M) | dict.fromkeys(
+    marker_sd = {s: UPPER_BODY_SD_M if s in upper else LOWER_BODY_SD_M for s in model.skeleton.segments}
+    coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
     adapted = adapt(skeleton, [trial.markers for trial in trials], marker_sd, coordinate_sd)
@@ -122,7 +129,7 @@ def prepare(
     turned = [_turned(item, marker_set) for item in inputs]
     model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
     literature = literature_bsp(
-        known(subject.mass_kg), known(subject.height_m), subject.sex, model.geometry, settings.bsp
+        known(subject.mass_kg), known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
     )
     calibration_s = (time.perf_counter() - started) / len(inputs)
 
@@ -145,6 +152,8 @@ def prepare(
         skeleton=skeleton,
         literature=literature,
         prior=literature_prior(literature),
+        freedom=GAIT27_FREEDOM,
+        file=None,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
         warnings=tuple(warnings),

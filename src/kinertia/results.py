@@ -20,7 +20,10 @@ from kinertia.checks import mass_from_force_kg
 from kinertia.fit import Fit, TrialFit
 from kinertia.identifiability import BaseParameters
 from kinertia.io.folder import complete_folder
+from kinertia.io.osim_export import export_osim
+from kinertia.io.osim_write import write_osim
 from kinertia.io.sto import write_sto
+from kinertia.osim_prepare import centre_offsets
 from kinertia.provenance import Provenance
 from kinertia.report.page import render
 
@@ -40,6 +43,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
         fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
+        _write_model(fit, work)
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
             into.mkdir(exist_ok=True)
@@ -47,11 +51,21 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     return Path(folder)
 
 
+def _write_model(fit: Fit, folder: Path) -> None:
+    """The model with the estimate; of the user's own OpenSim model a list of what changed, too."""
+    if fit.file is None:
+        export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
+        return
+    positions = {marker.label: marker.position for marker in fit.skeleton.markers}
+    shifts = centre_offsets(fit.skeleton)
+    changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
+    changes.to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
+
+
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     names = list(fit.skeleton.coordinates)
     rotational = fit.skeleton.rotational
-    degrees = np.where(rotational, np.degrees(trial.motion.q), trial.motion.q)
-    write_sto(folder / "kinematics.mot", _table(trial, names, degrees), True, "kinematics")
+    write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics")
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
     for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
         write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage]), False, file)
@@ -62,6 +76,17 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     columns = [f"{stage}_{name}" for stage in trial.residuals for name in _RESIDUALS]
     residuals = np.hstack(list(trial.residuals.values()))
     write_sto(folder / "residuals.sto", _table(trial, columns, residuals), False, "residuals")
+
+
+def _coordinates(fit: Fit, trial: TrialFit) -> pd.DataFrame:
+    """Coordinates over time, in degrees and m; of an OpenSim model all that it has."""
+    if fit.file is None:
+        names, angles, q = fit.skeleton.coordinates, fit.skeleton.rotational, trial.motion.q
+    else:
+        names = tuple(coordinate.name for coordinate in fit.file.coordinates)
+        angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
+        q = fit.file.all_coordinates(fit.skeleton, trial.motion.q)
+    return _table(trial, names, np.where(angles, np.degrees(q), q))
 
 
 def _table(trial: TrialFit, columns: Sequence[str], values: np.ndarray) -> pd.DataFrame:

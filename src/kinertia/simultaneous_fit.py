@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.bsp import PARAMETERS
+from kinertia.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
-from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import BaseParameters, base_parameters
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
@@ -18,13 +18,12 @@ from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
 
-JOINT_CENTRE_SD_M = 0.010
-MARKER_SD_M = 0.005
-"""The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
 PLATE_SD_M = 0.010
 GAIN_SD = 0.02
 """Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
 CLOCK_SD_S = 0.005
+_STAYING_SD_M = 1e-6
+"""Of markers that stay where they are."""
 _NOTABLE = 2.0
 CONTRADICTION_SD = 3.0
 """A parameter this many prior deviations from the literature contradicts the model."""
@@ -54,7 +53,8 @@ class Posterior:
     @property
     def information(self) -> np.ndarray:
         """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything."""
-        return 1.0 - np.square(self.sd / self.prior_sd)
+        known = self.prior_sd > 0  # segments that are held have no deviation
+        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,8 @@ class SimultaneousFit:
 
     Attributes:
         result: of the estimator.
+        bsp: all segments, those that are held included.
+        skeleton: with the estimated marker positions and static coordinates.
         posterior: deviations and calibration.
         motions: per trial, at the frames of its measured window.
         foot_loads: per trial (w, 2, 6) at the corrected place and time.
@@ -70,6 +72,8 @@ class SimultaneousFit:
     """
 
     result: SimultaneousResult
+    bsp: BodySegmentParameters
+    skeleton: Skeleton
     posterior: Posterior
     motions: tuple[Motion, ...]
     foot_loads: tuple[np.ndarray, ...]
@@ -81,48 +85,61 @@ def fit_simultaneous(
     prior: BspPrior,
     trials: Sequence[Kinematics],
     cutoff_hz: float | str,
+    freedom: Freedom = GAIT27_FREEDOM,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
     Args:
         skeleton: calibrated.
-        prior: of the body segment parameters, and the total mass by the scale.
+        prior: of the body segment parameters, and the total mass of its segments by the scale.
         trials: kinematics of the trials.
         cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
+        freedom: what may move beside these segments.
     """
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    seen = [observe(used, k, prior.mass_kg, cutoff) for k in trials]
-    calibration = calibration_prior(used)
+    used = used.carrying(freedom.held)
+    seen = [observe(used, k, prior.mass_kg + freedom.held_kg, cutoff) for k in trials]
+    calibration = calibration_prior(used, freedom)
     result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
+    found = result.skeleton.carrying(None)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
     loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
+    covariance, before = (freedom.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
-        prior.sd,
-        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
-        result.bsp_covariance,
-        _calibration(used, result),
+        np.sqrt(np.diag(before)).reshape(-1, 10),
+        np.sqrt(np.diag(covariance)).reshape(-1, 10),
+        covariance,
+        _calibration(used, freedom, result),
         tuple(noise for _, noise in seen),
         result.iterations,
         base_parameters(
             result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o, _ in seen]
         ),
     )
-    return SimultaneousFit(result, posterior, motions, loads, tuple(_warnings(prior, result, posterior, trials)))
+    return SimultaneousFit(
+        result,
+        freedom.whole(result.bsp),
+        found.with_markers(used.markers) if freedom.marker_sd_m is None else found,
+        posterior,
+        motions,
+        loads,
+        tuple(_warnings(prior, freedom, result, posterior, trials)),
+    )
 
 
-def calibration_prior(skeleton: Skeleton) -> CalibrationPrior:
+def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
     """How far a calibrated skeleton with these markers, plates and clock may be off."""
-    centres = dict.fromkeys((*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS), JOINT_CENTRE_SD_M)
-    return CalibrationPrior(centres, np.full(len(skeleton.markers), MARKER_SD_M), PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
+    return CalibrationPrior(freedom.centres, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
 
 
-def _calibration(skeleton: Skeleton, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
+def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
-        found[name] = {"value": change, "prior_sd": JOINT_CENTRE_SD_M, "sd": sd, "unit": "m"}
+        found[name] = {"value": change, "prior_sd": freedom.centres[name], "sd": sd, "unit": "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for axis, value, deviation in zip("xz", values, sds, strict=False):
@@ -140,7 +157,11 @@ SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
 
 
 def _warnings(
-    prior: BspPrior, result: SimultaneousResult, posterior: Posterior, trials: Sequence[Kinematics]
+    prior: BspPrior,
+    freedom: Freedom,
+    result: SimultaneousResult,
+    posterior: Posterior,
+    trials: Sequence[Kinematics],
 ) -> list[str]:
     found = []
     if not result.converged:
@@ -162,6 +183,6 @@ def _warnings(
     for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD):
         found.append(
             f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
-            f"deviations from the literature; a wrong joint, plate or marker is likelier than an odd person"
+            f"deviations from {freedom.source}; a wrong joint, plate or marker is likelier than an odd person"
         )
     return found

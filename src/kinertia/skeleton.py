@@ -98,6 +98,9 @@ class Skeleton:
         markers: all markers, in order.
         locked: coordinates held at a constant value (rad or m).
         gravity_m_s2: downward, along -y.
+        feet: the segments that the ground acts on, right and left.
+        start: coordinates from which inverse kinematics starts elsewhere than from zero (rad or m).
+        carried: parameters of segments that are given once and for all; `model_with` adds others to them.
     """
 
     name: str
@@ -105,6 +108,9 @@ class Skeleton:
     markers: tuple[Marker, ...]
     locked: Mapping[str, float] = field(default_factory=dict)
     gravity_m_s2: float = GRAVITY_M_S2
+    feet: tuple[str, str] = ("foot_r", "foot_l")
+    start: Mapping[str, float] = field(default_factory=dict)
+    carried: BodySegmentParameters | None = None
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -167,6 +173,10 @@ class Skeleton:
     def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
         """The same skeleton with other markers."""
         return replace(self, markers=tuple(markers))
+
+    def carrying(self, bsp: BodySegmentParameters | None) -> Skeleton:
+        """The same skeleton with these parameters given once and for all."""
+        return replace(self, carried=bsp)
 
     def _check_names(self, names: Iterable[str]) -> None:
         unknown = set(names) - {axis.coordinate for axis in self._axes}
@@ -248,14 +258,16 @@ class Skeleton:
         return turned[..., 0] + pose.translation[:, self.marker_segments]
 
     def model_with(self, bsp: BodySegmentParameters) -> pin.Model:
-        """A Pinocchio model that carries these body segment parameters."""
+        """A Pinocchio model that carries these body segment parameters, and those of `carried`."""
         model = self.model.copy()
-        joints, place = self.placement_of_parameters(bsp.segments)
-        moved = (place @ bsp.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
-        for j in set(joints.tolist()):
-            total = moved[joints == j].sum(axis=0)
-            if total[0] != 0.0:  # Pinocchio would divide by it
-                model.inertias[j] = pin.Inertia.FromDynamicParameters(total)
+        total = np.zeros((model.njoints, 10))
+        for part in (bsp, self.carried):
+            if part is not None:
+                joints, place = self.placement_of_parameters(part.segments)
+                np.add.at(total, joints, (place @ part.dynamic_parameters().reshape(-1, 10, 1))[..., 0])
+        for j, parameters in enumerate(total):
+            if parameters[0] != 0.0:  # Pinocchio would divide by it
+                model.inertias[j] = pin.Inertia.FromDynamicParameters(parameters)
         return model
 
     def placement_of_parameters(self, segments: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:

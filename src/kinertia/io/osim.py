@@ -32,6 +32,11 @@ from kinertia.skeleton import Axis, Joint, Marker, Skeleton
 
 NEWEST_VERSION = 40600
 """Of the formats known here; OpenSim 4.6 writes it."""
+_START = 0.2
+"""How far from its default to the middle of its range a coordinate starts.
+
+An elbow that starts straight may bend either way: turned by half a turn, the arm fits its markers nearly as well.
+"""
 _FORMAT_3, _FORMAT_4 = range(30000, 30501), range(40000, NEWEST_VERSION + 1)
 
 
@@ -286,6 +291,12 @@ def _skeleton(
         tuple(markers),
         locked,
         float(-gravity[1]),
+        start={
+            c.name: c.default + _START * (sum(c.range) / 2 - c.default)
+            for j in joints[1:]
+            for c in j.coordinates
+            if c.angle
+        },
     )
 
 
