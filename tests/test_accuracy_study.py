@@ -35,19 +35,19 @@ def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
 
 
 def test_draws_do_not_depend_on_the_number_of_processes():
-    one, two = (run_accuracy(["artefact"], 2, seed=4, workers=workers) for workers in (1, 2))
+    one, two = (run_accuracy({"artefact": PROOF["artefact"]}, 2, seed=4, workers=workers) for workers in (1, 2))
     assert one == two
 
 
 def test_people_are_the_same_in_every_scenario():
-    draws = [run_draw(1, (key, 3)) for key in ("study", "gain")]
+    draws = [run_draw(1, (SCENARIOS[key], 3)) for key in ("study", "gain")]
     np.testing.assert_array_equal(draws[0].literature_errors, draws[1].literature_errors)
     assert not np.allclose(draws[0].errors, draws[1].errors)
 
 
 def test_bars_hold_short_form():
     """Eight people: cover cannot be told better than to some percent."""
-    found = run_accuracy(["artefact"], 8)["artefact"]
+    found = run_accuracy({"artefact": PROOF["artefact"]}, 8)["artefact"]
     assert found.converged == 1.0
     for name in CLASSES:
         accuracy = found.classes[name]
@@ -61,7 +61,7 @@ def test_bars_hold_short_form():
 @pytest.mark.slow
 @pytest.mark.parametrize("key", PROOF)
 def test_bars_hold(key):
-    found = run_accuracy([key], 60)[key]
+    found = run_accuracy({key: PROOF[key]}, 60)[key]
     for name in CLASSES:
         assert 0.92 < found.classes[name].cover < 0.98
         assert 0.85 < found.classes[name].ratio < 1.15

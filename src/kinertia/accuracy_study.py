@@ -21,11 +21,12 @@ from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.parallel import in_parallel
 from kinertia.predicted import Information
 from kinertia.simultaneous import estimate_simultaneous
-from kinertia.simultaneous_fit import calibration_prior, fit_simultaneous
+from kinertia.simultaneous_fit import calibration_prior
 from kinertia.skeleton import Skeleton
 from kinertia.synthetic import walk, walking_subject
+from kinertia.synthetic_motions import squat
 
-DURATION_S = 2.5
+WALK_S = 2.5
 SPACING_S = 1.0 / (2.0 * CUTOFF_HZ)
 CLASSES = {
     "mass": slice(0, 1),
@@ -43,11 +44,13 @@ _HELD_SD_M = 1e-4
 
 @dataclass(frozen=True)
 class Scenario:
-    """One kind of laboratory: its faults, and whether the estimator calibrates."""
+    """One kind of laboratory: its faults, whether the estimator calibrates, and what was recorded."""
 
     title: str
     faults: Faults
     calibrated: bool = True
+    walk_s: float = WALK_S
+    squats: bool = False
 
 
 PROOF = {
@@ -128,49 +131,61 @@ class ScenarioAccuracy:
 
 
 def run_accuracy(
-    scenarios: Sequence[str],
+    scenarios: Mapping[str, Scenario],
     draws: int = 100,
     seed: int = 1,
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, ScenarioAccuracy]:
-    """Accuracy in these scenarios (keys of `SCENARIOS`), `draws` people each."""
-    cases = [(key, number) for key in scenarios for number in range(draws)]
+    """Accuracy in these scenarios, `draws` people each."""
+    found = run_draws(scenarios, draws, seed, workers, progress)
+    return {key: summarised(scenario.title, found[key]) for key, scenario in scenarios.items()}
+
+
+def run_draws(
+    scenarios: Mapping[str, Scenario],
+    draws: int,
+    seed: int,
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> dict[str, list[Draw]]:
+    """All draws of every scenario, in parallel."""
+    cases = [(scenario, number) for scenario in scenarios.values() for number in range(draws)]
     found = in_parallel(partial(run_draw, seed), cases, workers, progress)
-    return {
-        key: summarised(SCENARIOS[key].title, found[i * draws : (i + 1) * draws]) for i, key in enumerate(scenarios)
-    }
+    return {key: found[i * draws : (i + 1) * draws] for i, key in enumerate(scenarios)}
 
 
-def run_draw(seed: int, case: tuple[str, int]) -> Draw:
+def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     """One draw; people of one number are the same in every scenario."""
-    key, number = case
-    scenario = SCENARIOS[key]
+    scenario, number = case
     of_person, of_noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2))
     subject = walking_subject()
     prior = literature_prior(subject.literature)
-    trial = walk(replace(subject, bsp=prior.draw(of_person)), DURATION_S, trapezoid=False)
+    person = replace(subject, bsp=prior.draw(of_person))
+    trial = walk(person, scenario.walk_s, trapezoid=False)
     skeleton, kinematics = measured(trial, scenario.faults, of_noise)
-    seen, _ = observe(skeleton, kinematics, prior.mass_kg, CUTOFF_HZ)
+    recorded = [(trial, kinematics)]
+    if scenario.squats:
+        squats = squat(person)
+        recorded.append((squats, measured(squats, scenario.faults, of_noise)[1]))
+    seen = [observe(skeleton, k, prior.mass_kg, CUTOFF_HZ)[0] for _, k in recorded]
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
-    if scenario.calibrated:
-        fitted = fit_simultaneous(skeleton, prior, [kinematics], "gcv")
-        result, motion = fitted.result, fitted.motions[0]
-    else:
-        result = estimate_simultaneous(skeleton, prior, calibration, [seen], SPACING_S)
-        motion = result.motions[0].cut(np.flatnonzero(seen.dynamic))
-    at_truth = replace(seen, q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)])
-    there = replace(prior, mean=trial.bsp)
-    bound = Information.at(trial.skeleton, there, calibration, [at_truth], SPACING_S).sd([0])
+    result = estimate_simultaneous(skeleton, prior, calibration, seen, SPACING_S)
+    at_truth = [
+        replace(o, q=truth.motion.q[np.searchsorted(truth.time, o.time - 1e-9)])
+        for o, (truth, _) in zip(seen, recorded, strict=True)
+    ]
+    there = Information.at(trial.skeleton, replace(prior, mean=person.bsp), calibration, at_truth, SPACING_S)
     angles = np.flatnonzero(trial.skeleton.rotational)[3:]
-    inside = np.searchsorted(trial.time, kinematics.time - 1e-9)
-    off = [q[:, angles] - trial.motion.q[inside][:, angles] for q in (kinematics.ik.q[kinematics.frames], motion.q)]
+    inside = np.flatnonzero(seen[0].dynamic)
+    truth = trial.motion.q[np.searchsorted(trial.time, kinematics.time - 1e-9)]
+    off = [(q - truth)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]
     return Draw(
-        result.bsp.table() - trial.bsp.table(),
-        prior.mean.table() - trial.bsp.table(),
+        result.bsp.table() - person.bsp.table(),
+        prior.mean.table() - person.bsp.table(),
         prior.sd,
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
-        bound,
+        there.sd(range(len(seen))),
         (_rms(off[0]), _rms(off[1])),
         (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
         result.converged,

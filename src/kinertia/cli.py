@@ -14,6 +14,7 @@ from rich.text import Text
 from kinertia import __version__
 from kinertia.cli_check import check
 from kinertia.cli_options import Force, Output, Quiet, Verbose, results_folder
+from kinertia.cli_plan import crossval, plan
 from kinertia.cli_study import demo, study
 from kinertia.config import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.errors import FileError, KinertiaError
@@ -40,6 +41,8 @@ kinertia demo                 see it work, on a person who does not exist
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
+kinertia crossval subject.toml   do they hold on a trial that was held out?
+kinertia plan                 which motions to record, by their error bars
 
 Every command says more with --help, and has an example there.
 
@@ -305,6 +308,6 @@ def _bsp_table(fit: Fit) -> Table:
     return table
 
 
-for _entry in (demo, init, check, fit):
+for _entry in (demo, init, check, fit, crossval, plan):
     app.command()(_entry)
 app.add_typer(study, name="study")

@@ -1,4 +1,4 @@
-"""The commands on synthetic data: `kinertia demo`, `kinertia study table1`, `kinertia study accuracy`."""
+"""The commands on synthetic data: `kinertia demo`, `kinertia study ...`."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from kinertia.accuracy_study import SCENARIOS, run_accuracy
 from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.demo import Demo, run_demo
+from kinertia.sensitivity_report import save_sensitivity
+from kinertia.sensitivity_study import KINDS, run_sensitivity
 from kinertia.study import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress
@@ -197,7 +199,7 @@ def accuracy(
     """
     results_folder(output, force)
     with shown_progress() as progress:
-        found = run_accuracy(list(SCENARIOS), draws, seed, workers, lambda share: progress("people", share))
+        found = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
     for scenario in found.values():
         out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
         shown = plain_table(*HEADINGS)
@@ -207,3 +209,29 @@ def accuracy(
         out.print(angles_sentence(scenario))
     save_accuracy(found, seed, output)
     out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
+
+
+@study.command()
+def sensitivity(
+    draws: Annotated[int, typer.Option(min=2, help="People in each condition.")] = 24,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")] = 1,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")] = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Which BSPs are not highly sensitive to noisy kinematics? Errors against noise, strides and squats.
+
+    [bold]Example[/]
+
+    kinertia study sensitivity -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        found = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
+    for kind, title in KINDS.items():
+        listed = ", ".join(found.insensitive(kind)) or "none"
+        out.print(f"small errors up to twice the amplitude of {title}: {listed}")
+    out.print(f"shown by no condition: {', '.join(found.never()) or 'none'}")
+    save_sensitivity(found, output)
+    out.print(f"results in {output}: sensitivity.json, sensitivity.csv, sensitivity.png")

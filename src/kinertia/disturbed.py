@@ -35,6 +35,7 @@ class Faults:
 
     Attributes:
         noise: "study" (`noise.study_noise`) or "artefact" (`noise.soft_tissue_artefact` and 0.5 mm of camera noise).
+        amplitude: factor on that noise, but for the cameras'.
         calibration: joint centres, markers, plates and clock are off by errors drawn from the estimator's own prior.
         axes_rad: the axes of knees, ankles and elbows are tilted by this much, each in its own direction.
         hips_m: both hip centres are this far forward.
@@ -43,6 +44,7 @@ class Faults:
     """
 
     noise: Literal["study", "artefact"]
+    amplitude: float = 1.0
     calibration: bool = False
     axes_rad: float = 0.0
     hips_m: float = 0.0
@@ -52,11 +54,13 @@ class Faults:
 
 def measured(trial: SyntheticTrial, faults: Faults, rng: np.random.Generator) -> tuple[Skeleton, Kinematics]:
     """The skeleton that the laboratory believes in, and its kinematics by that skeleton."""
+    exact = trial.markers
     if faults.noise == "study":
-        markers = study_noise(trial.markers, rng)
+        moved, camera_sd_m = study_noise(exact, rng), 0.0
     else:
-        moved = soft_tissue_artefact(trial.markers, trial.skeleton, trial.motion.q, rng)
-        markers = camera_noise(moved, CAMERA_SD_M, rng)
+        moved, camera_sd_m = soft_tissue_artefact(exact, trial.skeleton, trial.motion.q, rng), CAMERA_SD_M
+    scaled = replace(exact, positions=exact.positions + faults.amplitude * (moved.positions - exact.positions))
+    markers = camera_noise(scaled, camera_sd_m, rng)
     loads = trial.foot_loads.copy()
     if faults.wobbling:
         loads += _wobbled(trial, faults.wobbling)

@@ -143,6 +143,7 @@ def walk(
     rate_hz: float = 100.0,
     start: float = 0.0,
     trapezoid: bool = True,
+    pace: float = 1.0,
 ) -> SyntheticTrial:
     """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same; without the markers `STATIC_ONLY`.
 
@@ -153,8 +154,10 @@ def walk(
         start: share of the stride at which the trial begins (0: shortly before the left heel strikes).
         trapezoid: integrate the pelvis by the trapezoid rule, as the study's pelvis correction does; False keeps
             position and velocity that are exact integrals of the acceleration.
+        pace: the same steps this many times as fast.
     """
     series = _WalkSeries.read()
+    series = replace(series, period_s=series.period_s / pace, speed_m_s=series.speed_m_s * pace)
     skeleton = subject.skeleton.with_markers([m for m in subject.skeleton.markers if m.label not in STATIC_ONLY])
     duration_s = series.period_s if duration_s is None else duration_s
     time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz

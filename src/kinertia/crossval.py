@@ -1,0 +1,114 @@
+"""Cross-validation: are body segment parameters from some trials better on another one than the literature's?
+
+Small residuals prove nothing on the trials that they were made small on. Here one trial after the other is held out;
+the parameters come from the rest, are frozen, and on the held-out trial only motion and calibration are estimated. The
+objective that remains (half the sum of squares of markers, root residuals and calibration over their deviations) is
+compared with that of the literature's parameters, frozen in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from kinertia.bsp import BodySegmentParameters
+from kinertia.bsp_prior import BspPrior
+from kinertia.config import Settings, Subject
+from kinertia.dynamics import residual
+from kinertia.errors import KinertiaError
+from kinertia.kinematics import Kinematics
+from kinertia.marker_set import MarkerSet
+from kinertia.prepare import Progress, TrialInput, prepare
+from kinertia.simultaneous_fit import fit_simultaneous
+from kinertia.skeleton import Skeleton
+from kinertia.trial import Recording
+
+_FROZEN = 1e-3
+"""Deviation that is left to frozen parameters, share of the prior's."""
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How well a trial is explained by frozen parameters.
+
+    Attributes:
+        objective: half the sum of squares that is left.
+        force_rms_n, moment_rms_nm: RMS length of the root residual.
+        marker_rms_m: RMS distance of the markers.
+    """
+
+    objective: float
+    force_rms_n: float
+    moment_rms_nm: float
+    marker_rms_m: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """One trial, explained by the literature's parameters and by those from the other trials."""
+
+    trial: str
+    others: tuple[str, ...]
+    literature: Explained
+    estimate: Explained
+
+
+def cross_validate(
+    subject: Subject,
+    static: Recording,
+    inputs: Sequence[TrialInput],
+    settings: Settings | None = None,
+    marker_set: MarkerSet | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> tuple[HeldOut, ...]:
+    """Hold out every trial in turn; the arguments are those of `estimate_bsp`.
+
+    The skeleton is calibrated on all trials at once, for both sets of parameters alike.
+
+    Raises:
+        KinertiaError: there are fewer than two trials, or something cannot be used.
+    """
+    if len(inputs) < 2:
+        raise KinertiaError(
+            f"cross-validation needs at least two trials, one to hold out; the subject has {len(inputs)}; add a "
+            "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
+        )
+    with threadpool_limits(limits=1, user_api="blas"):
+        ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress)
+        cutoff = (settings or Settings()).cutoff_hz
+        found = []
+        for k, held in enumerate(ready.kinematics):
+            progress("held out", k / len(ready.kinematics))
+            others = [other for other in ready.kinematics if other is not held]
+            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff).result.bsp
+            explained = (
+                _explained(ready.skeleton, ready.prior, bsp, held, cutoff) for bsp in (ready.prior.mean, estimate)
+            )
+            found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
+    return tuple(found)
+
+
+def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
+    """A prior that leaves these parameters where they are."""
+    return replace(prior, mean=bsp, covariance=_FROZEN**2 * prior.covariance, mass_kg=bsp.total_mass_kg)
+
+
+def _explained(
+    skeleton: Skeleton, prior: BspPrior, bsp: BodySegmentParameters, held: Kinematics, cutoff: float | str
+) -> Explained:
+    fitted = fit_simultaneous(skeleton, frozen(prior, bsp), [held], cutoff)
+    (motion,), (loads,) = fitted.motions, fitted.foot_loads
+    left = residual(fitted.result.skeleton, fitted.result.bsp, motion, loads.sum(axis=1))
+    model = fitted.result.skeleton
+    modelled = model.marker_positions(model.pose(motion.q))
+    away = held.trial.markers.arranged(model.labels)[held.frames] - modelled
+    force, moment = np.square(left).reshape(-1, 2, 3).sum(axis=2).T
+    return Explained(
+        fitted.result.cost[1],
+        float(np.sqrt(force.mean())),
+        float(np.sqrt(moment.mean())),
+        float(np.sqrt(np.nanmean(np.square(away).sum(axis=-1)))),
+    )

@@ -1,0 +1,107 @@
+"""What to record: the error bar that every body segment parameter would have after candidate motions.
+
+Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
+published size. Nothing is estimated: deviations follow from the information of each trial at the literature's
+parameters (`predicted.Information`), and those of several trials add up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from kinertia.bsp import PARAMETERS, UNITS
+from kinertia.bsp_prior import BspPrior, literature_prior
+from kinertia.disturbed import Faults, measured
+from kinertia.identifiability import evidence
+from kinertia.kinematics import Kinematics
+from kinertia.observation import CUTOFF_HZ, observe
+from kinertia.predicted import Information
+from kinertia.simultaneous_fit import calibration_prior
+from kinertia.skeleton import Skeleton
+from kinertia.synthetic import walking_subject
+from kinertia.synthetic_motions import MOTIONS
+
+_LARGEST_SET = 3
+_SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Predicted deviations.
+
+    Attributes:
+        segments: names.
+        prior_sd: (s, 10), in the order of `BodySegmentParameters.table`.
+        sd: set of candidates -> (s, 10) deviations after recording them; every candidate alone, and of each size up to
+            three the set that tells most.
+    """
+
+    segments: tuple[str, ...]
+    prior_sd: np.ndarray
+    sd: Mapping[tuple[str, ...], np.ndarray]
+
+    def information(self, candidates: tuple[str, ...]) -> np.ndarray:
+        """(s, 10): 1 - predicted variance / prior variance."""
+        return 1.0 - np.square(self.sd[candidates] / self.prior_sd)
+
+    def counts(self, candidates: tuple[str, ...]) -> dict[str, int]:
+        """How many parameters these candidates would leave measured, informed, assumed."""
+        words = [evidence(value) for value in self.information(candidates).ravel()]
+        return {word: words.count(word) for word in ("measured", "informed", "assumed")}
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row per parameter: segment, parameter, unit, prior_sd, and a column of deviations per set ("a + b")."""
+        s = len(self.segments)
+        columns = {" + ".join(names): sd.ravel() for names, sd in self.sd.items()}
+        return pd.DataFrame(
+            {
+                "segment": np.repeat(np.array(self.segments, dtype=object), len(PARAMETERS)),
+                "parameter": PARAMETERS * s,
+                "unit": UNITS * s,
+                "prior_sd": self.prior_sd.ravel(),
+                **columns,
+            }
+        )
+
+
+def plan_measured(skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], cutoff_hz: float | str) -> Plan:
+    """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
+    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    shown = {label for k in trials for label in k.ik.labels}
+    used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
+    with threadpool_limits(1):
+        seen = [observe(used, k, prior.mass_kg, cutoff)[0] for k in trials]
+        told = Information.at(used, prior, calibration_prior(used), seen, 1.0 / (2.0 * cutoff))
+        names = [k.trial.name for k in trials]
+        sets: list[tuple[int, ...]] = [(k,) for k in range(len(trials))]
+        sets += [
+            max(combinations(range(len(trials)), size), key=lambda chosen: _gain(told, prior, chosen))
+            for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
+        ]
+        found = {tuple(names[k] for k in chosen): told.sd(chosen) for chosen in sets}
+    return Plan(prior.mean.segments, prior.sd, found)
+
+
+def plan_synthetic() -> Plan:
+    """Predicted deviations from the package's motions, each 5 s."""
+    subject = walking_subject()
+    prior = literature_prior(subject.literature)
+    person = replace(subject, bsp=prior.mean)
+    trials = []
+    for name, made in MOTIONS.items():
+        trial = made(person)
+        _, kinematics = measured(trial, Faults("artefact"), np.random.default_rng(_SEED))
+        trials.append(replace(kinematics, trial=replace(kinematics.trial, name=name)))
+    return plan_measured(trial.skeleton, prior, trials, "gcv")
+
+
+def _gain(told: Information, prior: BspPrior, chosen: tuple[int, ...]) -> float:
+    """Information on all parameters, summed."""
+    return float((1.0 - np.square(told.sd(chosen) / prior.sd)).sum())
