@@ -40,7 +40,7 @@ def test_help_reads_like_a_manual():
     assert "no such option" in run("fit", "--nonsense").err.lower()
 
 
-@pytest.mark.parametrize("command", ["demo", "init", "check", "fit", "study table1"])
+@pytest.mark.parametrize("command", ["demo", "init", "check", "fit", "study table1", "study accuracy"])
 def test_every_command_has_an_example_and_every_example_can_be_parsed(command):
     shown = " ".join(run(*command.split(), "--help").out.split())
     assert re.search(rf"Examples? kinertia {command}", shown)
@@ -102,8 +102,9 @@ def test_progress_tells_the_time_left_of_the_stage(monkeypatch):
             time.sleep(0.15)
             progress("estimate", share)
         time.sleep(0.15)
-    last = re.findall(r"estimate .*?left (\S+)", screen.getvalue())
-    assert re.search(r"0:00:0[01]", last[-1])
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
+    assert re.search(r"estimate \S+ +0:00:0[01] 0:00:0[01] left", shown)
+    assert not re.search(r"reading \S+ +\S+ +\S* ?left", shown)
 
 
 @pytest.fixture

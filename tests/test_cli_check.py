@@ -181,6 +181,14 @@ def test_page_goes_only_where_it_may(lab):
     assert run("check", lab / "static.trc", "-o", lab / "foreign").status == 0  # its own is replaced
 
 
+def test_files_of_two_people_keep_their_masses(shared_data):
+    """The walk of A carries no mass, the others do: with A's static alone it is A's, with B's files it is nobody's."""
+    a, b = ([shared_data / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
+    alone, both = text(run("check", *a)), text(run("check", *a, *b))
+    assert alone.count("the scale says 41.5 kg") == 2
+    assert (both.count("the scale says 41.5 kg"), both.count("the scale says 47.5 kg")) == (1, 2)
+
+
 def test_model(shared_data, tmp_path):
     model = shared_data / "rajagopal_walk" / "scaled.osim"
     person = ["--mass", "85", "--height", "1.83", "--sex", "male"]

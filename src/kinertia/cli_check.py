@@ -135,11 +135,12 @@ def _check_recordings(
     recordings, mistakes = _read(wanted)
     if marker_set is None:
         marker_set = common_marker_set([recording for _, recording in recordings])
-    if mass_kg is None:
-        mass_kg = next((recording.mass_kg for _, recording in recordings if recording.mass_kg is not None), None)
-    found = [
-        (one.title, check_recording(recording, marker_set, mass_kg, one.window_s)) for one, recording in recordings
-    ]
+    told = {recording.mass_kg for _, recording in recordings if recording.mass_kg is not None}
+    shared = told.pop() if mass_kg is None and len(told) == 1 else mass_kg  # files of one person
+    found = []
+    for one, recording in recordings:
+        mass = shared if mass_kg is not None or recording.mass_kg is None else recording.mass_kg
+        found.append((one.title, check_recording(recording, marker_set, mass, one.window_s)))
     return found, mistakes
 
 

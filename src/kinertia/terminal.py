@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -37,6 +37,13 @@ def show_verdicts(verdicts: Iterable[Verdict]) -> None:
         out.print(Text(f"{level}: ", style=_COLOURS[level]).append(sentence, style="not bold default"))
 
 
+class _TimeLeftColumn(TimeRemainingColumn):
+    """The time left, said to be that; nothing as long as nobody knows."""
+
+    def render(self, task: Task) -> Text:
+        return super().render(task).append(" left") if task.time_remaining else Text()
+
+
 @contextmanager
 def shown_progress() -> Iterator[Callable[[str, float], None]]:
     """Progress of the stage at work: a bar with the time left on a terminal, a line per stage elsewhere.
@@ -56,21 +63,17 @@ def shown_progress() -> Iterator[Callable[[str, float], None]]:
 
         yield line
         return
-    columns = (
-        TextColumn("{task.description:>20}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
+    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn(), _TimeLeftColumn())
     with Progress(*columns, console=err, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
 
         def move(stage: str, share: float) -> None:
             if seen[-1:] != [stage]:
                 seen.append(stage)
-                bar.reset(task, description=stage)  # its own time, or the time left would be wrong
-            bar.update(task, completed=share)
+                for task in bar.task_ids:
+                    bar.remove_task(task)
+                bar.add_task(stage, total=None)  # a task of its own, or the time left would be that of all stages
+            if share > 0:
+                bar.update(bar.task_ids[-1], total=1.0, completed=share)
 
         yield move
 
