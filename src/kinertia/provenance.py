@@ -34,7 +34,7 @@ class Provenance:
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     """The command with the hashes of all files that the subject file names."""
-    paths = [wanted.model.static]
+    paths = [path for path in (wanted.model.static, wanted.model.osim) if path is not None]
     if isinstance(wanted.model.markers, Path):
         paths.append(wanted.model.markers)
     for trial in wanted.trials:
