@@ -11,9 +11,9 @@ from latex2mathml.converter import convert
 _EQUATION = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
 
-def on_page_content(page: str, **_: Any) -> str:
+def on_page_content(html_text: str, **_: Any) -> str:
     """Replace what the arithmatex extension has marked as LaTeX."""
-    return _EQUATION.sub(_mathml, page)
+    return _EQUATION.sub(_mathml, html_text)
 
 
 def _mathml(found: re.Match[str]) -> str:
