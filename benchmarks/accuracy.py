@@ -18,6 +18,8 @@ import numpy as np
 import pinocchio as pin
 from threadpoolctl import threadpool_limits
 
+from kinertia.accuracy_report import accuracy_markdown
+from kinertia.accuracy_study import SCENARIOS, run_accuracy
 from kinertia.bsp import BodySegmentParameters, ParameterVector
 from kinertia.bsp_prior import BspPrior, literature_prior, with_symmetry
 from kinertia.config import Settings, Subject
@@ -49,6 +51,7 @@ UNIFORM_SD = 0.29
 """Deviation of a uniform error of +/-50 %, share."""
 CAMERA_SD_M = 0.0001
 FIRST_SEED = 1
+PEOPLE = 100
 
 
 def study_walk(duration_s: float = STRIDE_S + 2 * MARGIN_S) -> SyntheticTrial:
@@ -421,6 +424,24 @@ anybody round. The whole walk leaves this as a residual (2.7 N m RMS about the v
 initial rates of turning and by CoMs moved to the side (1.4 N m). With the free moments taken out, the residual about
 the vertical is 0.2 N m. On synthetic data with correct deviations, halves and whole agree.
 
+## Error bars
+
+People drawn from the prior (masses, CoMs and inertias with all their correlations, physically possible, given the
+scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laboratory (`kinertia study accuracy`). *Cover*:
+parameters whose truth lies in the 95 % interval, and the standard error over people. *Error / sd*: RMS. *Bound*: the
+Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model. *Better*:
+people for whom the RMS error is below the literature's. *Measured*, *informed* and *assumed* parameters of all kinds,
+in prior deviations. What an error bar means is told in [error bars](error-bars.md).
+
+{sections["error_bars"]}
+
+In the laboratories that error bars are made for (the first four) they hold: cover and error / sd are within 92-98 % and
+0.85-1.15 for every class, and errors are at the bound. **Two demands are not met.** Masses are better than the
+literature's in some 80 % of people, not in 95 %: the bound itself is only a third below the literature, so that chance
+decides for many. And joint angles are not half as wrong as those of inverse kinematics. With an exact skeleton, inverse
+kinematics profits from knowing it; the estimate, which does not trust the skeleton, is off by constant angles. With
+calibration errors as they are in practice it is a quarter better, and what varies in time is 10-30 % better throughout.
+
 ## Speed
 
 The estimate from coordinates on (observation, optimisation, error bars), one thread, synthetic walk with skin motion at
@@ -437,7 +458,8 @@ def _in_parallel(task: Callable[[Any], Any], cases: Sequence[Any]) -> list[Any]:
 
 def main() -> None:
     """Run everything and write the page; what needs the measured trials is left out where they are absent."""
-    sections = {"speed": speed_section([timed(10.0), timed(20.0)])}
+    sections = {"speed": speed_section([timed(10.0), timed(20.0)]), "people": str(PEOPLE)}
+    sections["error_bars"] = accuracy_markdown(run_accuracy(SCENARIOS, PEOPLE))
     people = range(5)
     outcomes = _in_parallel(_calibrated, [(name, seed) for name in DISTURBANCES for seed in people])
     by_name = {name: outcomes[i * len(people) : (i + 1) * len(people)] for i, name in enumerate(DISTURBANCES)}

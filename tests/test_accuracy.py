@@ -34,6 +34,8 @@ def test_page():
             "measured": "",
             "pooling": accuracy.pooling_section(values, sds),
             "speed": accuracy.speed_section([timing]),
+            "people": "2",
+            "error_bars": "| mass (kg) |",
         }
     )
     mass, com, inertia = draw["simultaneous"]

@@ -76,7 +76,10 @@ def test_a_verdict_against_is_status_1(lab, options, words):
     ("arguments", "words"),
     [
         (["no.trc"], "no.trc: no such file"),
-        (["walk_grf.mot"], "goes with none of the marker files"),
+        (["walk_grf.mot"], "holds forces only"),
+        (["walk.trc", "static.trc", "walk_grf.mot", "more_grf.mot"], "goes with none of the marker files"),
+        (["walk.trc", "--mass", "-5"], "mass_kg = -5"),
+        (["walk.trc", "--mass", "0"], "mass_kg = 0"),
         (["walk.csv"], "a '.csv' file cannot be checked"),
         (["loads.xml"], "give ExternalLoads with --loads"),
         (["subject.toml", "walk.trc"], "give it alone"),
@@ -88,7 +91,8 @@ def test_a_verdict_against_is_status_1(lab, options, words):
         (["walk.trc", "--markers", "nobodys"], "no such marker set"),
         (["model.osim"], "model.osim, line 1: not XML"),
         (["empty.c3d"], "the file is empty"),
-        (["no.osim", "--height", "170"], "no.osim: no such file"),
+        (["no.osim"], "no.osim: no such file"),
+        (["walk.trc", "--height", "170"], "that looks like centimetres"),
     ],
 )
 def test_mistakes_are_one_line_and_status_2(lab, monkeypatch, arguments, words):

@@ -43,6 +43,7 @@ def without(markers: Markers, labels, frames=slice(None)) -> Markers:
 @given(seed=st.integers(0, 10**6), heading=st.floats(-3.0, 3.0))
 @example(seed=8912, heading=-1.40625)
 @example(seed=156, heading=0.25)
+@example(seed=878, heading=0.5)
 def test_perfect_markers_give_back_the_coordinates(seed, heading):
     skeleton = generic_model().skeleton
     q = random_coordinates(skeleton, 4, seed, spread=0.6)

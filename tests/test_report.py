@@ -2,13 +2,17 @@
 
 import hashlib
 import json
+import os
 import re
+import shlex
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from command_line import run
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject
 from kinertia.dynamics import Motion
@@ -25,13 +29,13 @@ PARTS = ["verdict", "bsp", "residuals", "kinematics", "moments", "markers", "vie
 
 @pytest.fixture(scope="module")
 def fit(demo_run):
-    """The demo's simultaneous fit."""
-    return demo_run[0].simultaneous
+    """The demo's fit, with error bars."""
+    return demo_run[0].fit
 
 
 @pytest.fixture(scope="module")
 def two_level(demo_run):
-    return demo_run[0].fit
+    return demo_run[0].two_level
 
 
 @pytest.fixture(scope="module")
@@ -215,6 +219,7 @@ def prolonged(trial, times):
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
         moments={stage: again(values) for stage, values in trial.moments.items()},
+        moment_sd=again(trial.moment_sd),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
     )
 
@@ -242,6 +247,20 @@ def test_command_and_hashes_are_in_the_report(demo_run):
     assert "neither command nor files" in render(demo.fit)
 
 
+def test_the_command_in_a_report_repeats_the_fit(demo_run, tmp_path):
+    lab, folder = demo_run[1] / "lab", tmp_path / "my results"
+    given = ("fit", lab / "walk.trc", "--forces", lab / "walk_grf.mot", "--static", lab / "static.trc")
+    given = (*given, "--mass", 72.6, "--height", 1.803, "--sex", "male", "-o", folder)
+    assert run(*given).status in (0, 1)
+    told = Elements((folder / "report.html").read_text()).text
+    command = next(line for line in told.splitlines() if "kinertia fit" in line)
+    again = shlex.split(command[command.index("kinertia fit") :])
+    assert sorted(again[1:]) == sorted(map(str, given))
+    results = (folder / "bsp.csv").read_text()
+    assert run(*again[1:]).status in (0, 1)
+    assert (folder / "bsp.csv").read_text() == results
+
+
 def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
     demo, _ = demo_run
     own = tmp_path / "mine.toml"
@@ -249,8 +268,10 @@ def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
     wanted = read_subject(demo.subject_file)
     wanted = wanted.model_copy(update={"model": wanted.model.model_copy(update={"markers": own})})
     files = provenance_of(wanted, "kinertia fit subject.toml").files
-    assert files[str(own)] == hashlib.sha256(b"x").hexdigest()
+    above = Path(os.path.commonpath([tmp_path, demo.subject_file.parent]))
+    assert files[str(own.relative_to(above))] == hashlib.sha256(b"x").hexdigest()
     assert len(files) == 4
+    assert set(provenance_of(read_subject(demo.subject_file), "").files) == {"static.trc", "walk.trc", "walk_grf.mot"}
 
 
 def test_fit_trial_and_parameters_show_themselves(fit, two_level):

@@ -54,7 +54,7 @@ class Opened:
 
 @pytest.fixture(scope="module")
 def demo(browser, demo_run):
-    opened = Opened(browser, demo_run[1] / "simultaneous" / "report.html")
+    opened = Opened(browser, demo_run[1] / "report.html")
     yield opened
     opened.page.close()
 
@@ -62,7 +62,7 @@ def demo(browser, demo_run):
 @pytest.fixture(scope="module", params=["demo", "demo, two-level", "gait2354"])
 def opened(request, browser, demo_run):
     """The reports that every check of drawing and silence goes over."""
-    folder = {"demo": demo_run[1] / "simultaneous", "demo, two-level": demo_run[1]}.get(request.param)
+    folder = {"demo": demo_run[1], "demo, two-level": demo_run[1] / "two-level"}.get(request.param)
     if folder is None:
         folder = request.getfixturevalue("fit_of")("gait2354").folder
     report = Opened(browser, folder / "report.html")
@@ -258,7 +258,7 @@ def test_table_sorts_by_pointer_and_keyboard(demo):
 
 
 def test_page_fits_a_phone(browser, demo_run):
-    report = Opened(browser, demo_run[1] / "simultaneous" / "report.html", PHONE)
+    report = Opened(browser, demo_run[1] / "report.html", PHONE)
     assert report.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     wide = report.page.locator(".plot").evaluate_all(
         "plots => plots.filter(plot => plot.querySelector('.main-svg').clientWidth > plot.clientWidth + 1).length"

@@ -9,8 +9,8 @@ from kinertia.report.skeleton_view import packed, scene
 
 @pytest.fixture(scope="module")
 def fit(demo_run):
-    """The demo's simultaneous fit."""
-    return demo_run[0].simultaneous
+    """The demo's fit."""
+    return demo_run[0].fit
 
 
 def test_scene_has_everything_where_it_is(fit):

@@ -158,10 +158,7 @@ def fit(
     if trial.suffix.lower() == ".toml":
         given = [name for name, value in options.items() if value is not None]
         if given:
-            raise FileError(
-                trial,
-                f"a subject file says it all; put {', '.join(given)} into it instead of the command line",
-            )
+            raise FileError(trial, f"a subject file says it all; put {', '.join(given)} into it instead")
         wanted = read_subject(trial)
     else:
         wanted = _from_options(trial, options)
@@ -174,8 +171,7 @@ def fit(
     _report(result)
     _report_verdicts(judged, result, verbose)
     out.print(f"results in {folder}", soft_wrap=True)
-    if stands_against(judged):
-        raise typer.Exit(1)
+    raise typer.Exit(int(stands_against(judged)))
 
 
 def init(

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from kinertia.anthropometry import check_subject
 from kinertia.check_page import save_check_page
 from kinertia.cli_options import Force, Quiet, Verbose, results_folder
 from kinertia.config import SubjectFile, read_subject
@@ -75,7 +76,6 @@ def check(
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.
-
     Exit status 1 if a verdict is against: no fit, or no simulation.
 
     [bold]Examples[/]
@@ -90,6 +90,7 @@ def check(
     """
     if output is not None:
         results_folder(output, force)
+    check_subject(70.0 if mass is None else mass, 1.7 if height is None else height, sex or "male")
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
     if subjects and (len(files) > 1 or any(given is not None for given in (loads, mass, height, sex, markers))):
         raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
@@ -97,6 +98,21 @@ def check(
     measured = [path for path in files if path.suffix.lower() != ".osim"]
     recordings, more = _check_recordings(measured, loads, None if markers is None else read_marker_set(markers), mass)
     mistakes += more
+    _show(recordings, models, mistakes, output, verbose)
+    if mistakes:
+        raise typer.Exit(2)
+    judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
+    raise typer.Exit(int(any(map(stands_against, judged))))
+
+
+def _show(
+    recordings: Sequence[tuple[str, RecordingCheck]],
+    models: Sequence[tuple[str, ModelCheck]],
+    mistakes: Sequence[str],
+    output: Path | None,
+    verbose: bool,
+) -> None:
+    """Everything on the terminal, and as a page if there is a folder for it."""
     for title, recording in recordings:
         _show_recording(title, recording, verbose)
     for title, model in models:
@@ -105,11 +121,6 @@ def check(
         out.print(f"page in {save_check_page(recordings, models, mistakes, output)}", soft_wrap=True)
     for mistake in mistakes:
         show_error(mistake)
-    if mistakes:
-        raise typer.Exit(2)
-    judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
-    if any(map(stands_against, judged)):
-        raise typer.Exit(1)
 
 
 def _check_models(
@@ -166,9 +177,8 @@ def _wanted(
     pairs = _matched(marked, forces)
     alone = [path for path in forces if path not in pairs.values()]
     if alone:
-        raise FileError(
-            alone[0], "goes with none of the marker files by its name; check it together with its markers alone"
-        )
+        goes = "goes with none of the marker files by its name" if marked else "holds forces only"
+        raise FileError(alone[0], f"{goes}; check it together with its markers (.trc, .c3d)")
     wanted = [_Files(path, pairs.get(path)) for path in marked]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))

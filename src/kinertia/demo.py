@@ -92,12 +92,12 @@ def run_demo(
         recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
         wanted = read_subject(write_lab(work / "lab", recordings))
         static, inputs, marker_set = read_inputs(wanted, progress)
-        where = provenance_of(wanted, shlex.join(["kinertia", "demo", "-o", str(folder)])).moved(work, folder)
+        provenance = provenance_of(wanted, shlex.join(["kinertia", "demo", "-o", str(folder)]))
         fits = []
         for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
             settings = with_settings(wanted, method=method).settings
             fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-            save_fit(fits[-1], results, where)
+            save_fit(fits[-1], results, provenance)
         demo = Demo(fits[0], fits[1], subject.bsp, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

@@ -26,8 +26,9 @@ _FAR = 1.0
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
-_ANEW_RAD = 1.0
-"""Frames that did not converge start anew with no joint farther than this from neutral."""
+_WOUND_RAD, _ANEW_RAD = 2.6, 1.0
+"""Frames that did not converge, or have a joint turned farther than the first (a foot upside down fits its markers
+nearly as well), start anew with no joint farther than the second from neutral."""
 _UNINFORMED_RAD_PER_M = 60.0
 """A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
 
@@ -97,20 +98,14 @@ def solve_ik(
     fine = np.flatnonzero(placed)
     if consecutive and len(fine) > 1:
         coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
-        q_coarse, _, _ = _gauss_newton(model, measured[coarse], q[coarse], gain_tolerance_m2)
+        q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], gain_tolerance_m2)
         _carry_on(model, measured[coarse], q_coarse, gain_tolerance_m2)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
-    q[fine], converged[fine], normal = _gauss_newton(model, measured[fine], q[fine], gain_tolerance_m2)
-    stuck = np.flatnonzero(~converged[fine])
-    if stuck.size:
-        # a joint may have gone beyond a right angle, where three angles describe the same pose twice
-        again = fine[stuck]
-        q[again, 6:] = np.clip(q[again, 6:], -_ANEW_RAD, _ANEW_RAD)
-        q[again], converged[again], normal[stuck] = _gauss_newton(model, measured[again], q[again], gain_tolerance_m2)
+    q[fine], converged[fine], normal = _best_fit(model, measured[fine], q[fine], gain_tolerance_m2)
     errors = np.full(measured.shape[:2], np.nan)
-    errors[fine] = _errors(model, measured[fine], q[fine])
+    errors[fine] = _misses(model, measured[fine], q[fine])
     q[~placed] = np.nan
     q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
     q[:, :6] = model.root.turned_back(q[:, :6])
@@ -132,14 +127,34 @@ def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_toleran
             if np.abs(change).max() < _FAR:
                 continue
             again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], gain_tolerance_m2)
-            old, new = (np.nansum(np.square(_errors(model, measured[[k]], at))) for at in (q[[k]], again))
+            old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
             if new < old:
                 q[k] = again[0]
 
 
-def _errors(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """(n, m) distances between measured and model markers."""
+def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """(n, m) m, distances between measured and model markers."""
     return np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
+
+
+def _best_fit(
+    model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`_gauss_newton`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
+    q, converged, normal = _gauss_newton(model, measured, q, gain_tolerance_m2)
+    joints = np.abs(q[:, 6:][:, model.rotational[6:]])
+    doubtful = np.flatnonzero(~converged | (joints.max(axis=1, initial=0.0) > _WOUND_RAD))
+    if doubtful.size:
+        anew = q[doubtful]
+        anew[:, 6:] = np.clip(anew[:, 6:], -_ANEW_RAD, _ANEW_RAD)
+        anew, settled, shown = _gauss_newton(model, measured[doubtful], anew, gain_tolerance_m2)
+        old, new = (
+            np.nansum(np.square(_misses(model, measured[doubtful], one)), axis=1) for one in (q[doubtful], anew)
+        )
+        better = new <= old * (1.0 + 1e-6) + 1e-12
+        kept = doubtful[better]
+        q[kept], converged[kept], normal[kept] = anew[better], settled[better], shown[better]
+    return q, converged, normal
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> None:

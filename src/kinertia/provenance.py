@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,16 +21,11 @@ class Provenance:
 
     Attributes:
         command: as typed on a command line.
-        files: SHA-256 of every input file, by its path.
+        files: SHA-256 of every input file, by its path from the folder that holds them all.
     """
 
     command: str
     files: Mapping[str, str]
-
-    def moved(self, before: Path, after: Path) -> Provenance:
-        """The same with files of one folder told to be in another."""
-        places = {Path(path): code for path, code in self.files.items()}
-        return Provenance(self.command, {str(after / path.relative_to(before)): code for path, code in places.items()})
 
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
@@ -39,7 +35,8 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
         paths.append(wanted.model.markers)
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
-    return Provenance(command, {str(path): _sha256(path) for path in dict.fromkeys(paths)})
+    above = os.path.commonpath([path.parent for path in paths])
+    return Provenance(command, {path.relative_to(above).as_posix(): _sha256(path) for path in paths})
 
 
 def _sha256(path: Path) -> str:

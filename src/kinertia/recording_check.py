@@ -56,7 +56,6 @@ class RecordingCheck:
         travel: what the person does.
         plates: one entry per plate; empty without forces.
         windows: stretches in which every foot on the ground stands on a plate, longest first.
-        n_measured: marker frames in the longest window.
         mass: by the vertical force, or None.
         scale_kg: body mass as given or as the file tells, or None.
         verdicts: what speaks for and against a fit with this recording.
@@ -69,7 +68,6 @@ class RecordingCheck:
     travel: Travel
     plates: tuple[PlateCheck, ...]
     windows: tuple[tuple[float, float], ...]
-    n_measured: int
     mass: ForceMass | None
     scale_kg: float | None
     verdicts: tuple[Verdict, ...]
@@ -141,10 +139,7 @@ def check_recording(
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
     found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
-    n_measured = len(within.time) if windows else 0
-    return RecordingCheck(
-        recording, match, seen, moves, plates, windows, n_measured, mass, scale, tuple(found), tuple(notes)
-    )
+    return RecordingCheck(recording, match, seen, moves, plates, windows, mass, scale, tuple(found), tuple(notes))
 
 
 def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:

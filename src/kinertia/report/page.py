@@ -115,7 +115,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "residuals": written(residual_figure(trial, frames)),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
         "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames)),
-        "bands": getattr(trial, "moment_sd", None) is not None,
+        "bands": trial.moment_sd is not None,
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering

@@ -100,7 +100,7 @@ def motion_change(trial: TrialFit) -> np.ndarray:
 def moment_figure(trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES) -> go.Figure:
     """Joint moments (N m/kg) with literature values on the measured motion, and as estimated, with its 95 % band."""
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
-    sd = getattr(trial, "moment_sd", None)
+    sd = trial.moment_sd
     panels = []
     for one in panels_of(skeleton):
         if min(one.columns.values()) < 6:
