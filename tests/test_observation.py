@@ -111,3 +111,16 @@ def test_markers_that_err_together_count_as_few(trial):
     assert np.median(ratios[0]) == pytest.approx(1.0, abs=0.1)
     on_thigh = trial.skeleton.marker_segments == trial.skeleton.segments.index("thigh_r")
     assert ratios[1][on_thigh] == pytest.approx(np.full(on_thigh.sum(), on_thigh.sum()), rel=0.4)
+
+
+def test_markers_off_their_places_are_not_noise(trial):
+    """A marker that sits 10 mm elsewhere in its segment all the time has no more noise than before."""
+    rng = np.random.default_rng(5)
+    noisy = camera_noise(trial.markers, 0.002, rng)
+    kinematics = kinematics_of(trial, noisy)
+    places = trial.skeleton.marker_locals + rng.normal(0.0, 0.01, trial.skeleton.marker_locals.shape)
+    moved = trial.skeleton.with_markers(
+        [replace(m, position=place) for m, place in zip(trial.skeleton.markers, places, strict=True)]
+    )
+    (right, _), (wrong, _) = (observe(skeleton, kinematics, MASS_KG, 10.0) for skeleton in (trial.skeleton, moved))
+    np.testing.assert_allclose(wrong.marker_sd, right.marker_sd, rtol=1e-6)

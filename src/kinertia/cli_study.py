@@ -234,4 +234,4 @@ def sensitivity(
         out.print(f"small errors up to twice the amplitude of {title}: {listed}")
     out.print(f"shown by no condition: {', '.join(found.never()) or 'none'}")
     save_sensitivity(found, output)
-    out.print(f"results in {output}: sensitivity.json, sensitivity.csv, sensitivity.png")
+    out.print(f"results in {output}: sensitivity.md, sensitivity.png, sensitivity.json, sensitivity.csv")

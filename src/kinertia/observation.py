@@ -64,8 +64,14 @@ def observe(
     q = kinematics.ik.q[frames]
     measured = kinematics.trial.markers.arranged(skeleton.labels)[frames]
     known = np.where(np.isfinite(q), q, kinematics.spline(time[frames]))
-    errors = measured - skeleton.marker_positions(skeleton.pose(known))
-    noise, effective = _noise(skeleton, errors, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
+    pose = skeleton.pose(known)
+    errors = measured - skeleton.marker_positions(pose)
+    # what a marker is off its place in the segment all the time is calibration, not noise
+    turned = pose.rotation[:, skeleton.marker_segments].transpose(0, 1, 3, 2)
+    local = (turned @ errors[..., None])[..., 0]
+    shown = np.isfinite(local).any(axis=0)
+    local -= np.nanmean(np.where(shown, local, 0.0), axis=0)
+    noise, effective = _noise(skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2

@@ -1,4 +1,4 @@
-"""The sensitivity study on paper: `sensitivity.json`, `sensitivity.csv`, and a picture."""
+"""The sensitivity study on paper: `sensitivity.md` with a picture, `sensitivity.json`, `sensitivity.csv`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ from matplotlib.figure import Figure
 
 from kinertia import __version__
 from kinertia.io.folder import complete_folder
-from kinertia.sensitivity_study import CONDITIONS, KINDS, SHOWN, Sensitivity
+from kinertia.sensitivity_study import (
+    AMPLITUDES,
+    CONDITIONS,
+    INSENSITIVE,
+    KINDS,
+    SHOWN,
+    STRIDES,
+    WITH_SQUATS,
+    Sensitivity,
+)
 
 
 def sensitivity_frame(found: Sensitivity) -> pd.DataFrame:
@@ -37,8 +46,69 @@ def sensitivity_figure(found: Sensitivity) -> Figure:
     return figure
 
 
+_COLUMNS = ("study x 0.25", "study x 1", "study x 2", "artefact x 0.25", "artefact x 1", "artefact x 2")
+_PAGE = """# Which body segment parameters survive noisy kinematics?
+
+The study that Kinertia starts from ended on this question. `kinertia study sensitivity` answers it for the simultaneous
+estimate: {draws} people drawn from the literature's prior walk two strides (2.5 s), are measured with noise, and are
+estimated, one thing changed at a time. Numbers are RMS errors over people as a share of the prior's deviation: 1 is the
+error of the literature itself, below 0.5 a parameter counts as measured. Left and right count as one. Page, picture and
+tables are written by the command.
+
+**Not highly sensitive** (error below 0.5 up to twice the noise): with the study's noise (8.2 mm RMS at twice) {study};
+with skin motion linear in the joint angles (up to 36 mm on the thigh at twice) {artefact}.
+
+**Sensitive**: below 0.5 at a quarter of the noise, above at twice: {sensitive}.
+
+**Shown by no condition**: {never} of {count} parameters have an error above 0.9 whatever is recorded here, among them
+{never_classes}. For these the literature's value stands; their error bars say so.
+
+How much a recording helps, mean over all {count} parameters, skin motion: {strides}.
+
+## Conditions and parameters
+
+{table}
+
+![RMS error over prior deviation of every parameter in every condition](sensitivity.png)
+"""
+
+
+def sensitivity_markdown(found: Sensitivity) -> str:
+    """The answer on a page."""
+    quarter, twice = (
+        np.max([found.errors[f"{kind} x {amplitude:g}"] for kind in KINDS], axis=0)
+        for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
+    )
+    sensitive = [found.parameters[i] for i in np.flatnonzero((quarter < INSENSITIVE) & (twice >= INSENSITIVE))]
+    never = found.never()
+    by_class = {
+        what: sum(name.rpartition(".")[2] in members for name in never)
+        for what, members in (("masses", SHOWN[:1]), ("CoM coordinates", SHOWN[1:4]), ("moments of inertia", SHOWN[4:]))
+    }
+    strides = [f"{count} strides {found.errors[_of_strides(count)].mean():.2f}" for count in STRIDES]
+    heads = ["parameter", *_COLUMNS]
+    rows = [heads, ["---", *["--:"] * len(_COLUMNS)]]
+    for i, name in enumerate(found.parameters):
+        rows.append([name, *(f"{found.errors[key][i]:.2f}" for key in _COLUMNS)])
+    return _PAGE.format(
+        draws=found.draws,
+        count=len(found.parameters),
+        study=", ".join(found.insensitive("study")) or "none",
+        artefact=", ".join(found.insensitive("artefact")) or "none",
+        sensitive=", ".join(sensitive) or "none",
+        never=len(never),
+        never_classes=", ".join(f"{count} {what}" for what, count in by_class.items() if count) or "none",
+        strides="; ".join([*strides, f"{WITH_SQUATS} {found.errors[WITH_SQUATS].mean():.2f}"]),
+        table="\n".join(f"| {' | '.join(cells)} |" for cells in rows),
+    )
+
+
+def _of_strides(count: int) -> str:
+    return f"strides {count}" if f"strides {count}" in CONDITIONS else "artefact x 1"
+
+
 def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
-    """Write the three files into a folder; returns the folder."""
+    """Write the files into a folder; returns the folder."""
     told = {
         "kinertia": __version__,
         "seed": found.seed,
@@ -51,6 +121,7 @@ def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
     }
     with complete_folder(folder) as work:
         (work / "sensitivity.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+        (work / "sensitivity.md").write_text(sensitivity_markdown(found), encoding="utf-8")
         sensitivity_frame(found).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")
         sensitivity_figure(found).savefig(work / "sensitivity.png", dpi=110)
     return Path(folder)
