@@ -71,7 +71,7 @@ def curved_problem(path: Path) -> MapProblem:
     knee = joint("CustomJoint", "knee", "/bodyset/pelvis", "leg", "ab", transform(list(axes)))
     path.write_text(model(root + knee))
     ours = read_osim(path)
-    skeleton = ours.skeleton
+    skeleton = replace(ours.skeleton, feet=("leg", "pelvis"))
     time, motion = smooth_motion(skeleton, 13, 50.0)
     rng = np.random.default_rng(0)
     markers = skeleton.marker_positions(skeleton.pose(motion.q))

@@ -358,3 +358,47 @@ def test_init_without_recordings(tmp_path):
         init_subject(tmp_path)
     with pytest.raises(FileError, match="no such folder"):
         init_subject(tmp_path / "nowhere")
+
+
+OWN = """\
+[subject]
+mass_kg = 61.5
+
+[model]
+osim = "scaled.osim"
+
+[[trial]]
+markers = "data/walk1.trc"
+"""
+
+
+def test_an_opensim_model_needs_neither_static_trial_nor_sex(folder):
+    (folder / "scaled.osim").touch()
+    result = read(folder, OWN)
+    assert result.model.osim == folder / "scaled.osim"
+    assert (result.model.static, result.subject.sex, result.model.calibrate) == (None, None, False)
+    assert read(folder, OWN.replace("[[trial]]", "calibrate = true\n[[trial]]")).model.calibrate
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("osim = ", 'static = "static.trc"\nosim = ', 5, "[model] has both osim and static"),
+        ("osim = ", 'markers = "plug-in-gait"\nosim = ', 5, "[model] has both osim and markers"),
+        ('osim = "scaled.osim"', "", 4, "[model] lacks 'static'"),
+        ('osim = "scaled.osim"', 'static = "static.trc"', 1, "[subject] lacks 'sex'"),
+        ("[[trial]]", '[settings]\nmethod = "two-level"\n[[trial]]', 8, "works on the built-in model only"),
+        ('osim = "scaled.osim"', 'osim = "scald.osim"', 5, "did you mean 'scaled.osim'?"),
+    ],
+)
+def test_what_does_not_go_with_an_opensim_model(folder, old, new, line, message):
+    (folder / "scaled.osim").touch()
+    with pytest.raises(FileError, match=re.escape(message)) as error:
+        read(folder, OWN.replace(old, new))
+    assert error.value.line == line
+
+
+def test_calibration_is_of_opensim_models(folder):
+    with pytest.raises(FileError, match="calibrate goes with osim") as error:
+        read(folder, changed('markers = "plug-in-gait"', "calibrate = true"))
+    assert error.value.line == 8

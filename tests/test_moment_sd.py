@@ -6,12 +6,14 @@ from kinertia.dynamics import Motion, inverse_dynamics
 from kinertia.moment_sd import joint_moment_sd, moment_derivatives
 from kinertia.normal_equations import reduced
 from kinertia.simultaneous import covariance_of
-from small_problem import point, small_problem
+from small_problem import curved_problem, point, small_problem
 
 
-@pytest.fixture(scope="module")
-def estimate():
-    problem = small_problem()
+@pytest.fixture(scope="module", params=["27 DOF", "curved axes"])
+def estimate(request, tmp_path_factory):
+    """Also of a model in which several axes follow one coordinate by curves."""
+    curved = request.param == "curved axes"
+    problem = curved_problem(tmp_path_factory.mktemp("curved") / "small.osim") if curved else small_problem()
     (coefficients,), static = point(problem)
     return problem, coefficients, static
 

@@ -194,7 +194,12 @@ def init(
 def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
     """The command line that repeats this run."""
     given = {**options, "--method": method, "-o": output}
-    words = [str(word) for name, value in given.items() if value is not None for word in (name, value)]
+    words = [
+        str(word)
+        for name, value in given.items()
+        if value is not None
+        for word in ([name] if value is True else [name, value])
+    ]
     return shlex.join(["kinertia", "fit", str(trial), *words])
 
 

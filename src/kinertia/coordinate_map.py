@@ -84,6 +84,13 @@ class CoordinateMap:
             return columns
         return (columns * slopes.reshape(len(slopes), *(1,) * (columns.ndim - 2), -1)) @ self._sum
 
+    def turned_forces(self, forces: np.ndarray, q: np.ndarray) -> np.ndarray | float:
+        """(n, c) derivative of the generalised forces by their own coordinates that is due to the map alone.
+
+        Forces (n, a) of the axes are taken as constant; 0 where every axis is its own coordinate.
+        """
+        return 0.0 if self.identity else (forces * self._evaluated(q, 2)) @ self._sum
+
     def derivatives_to_coordinates(
         self,
         by_axes: tuple[np.ndarray, np.ndarray, np.ndarray],

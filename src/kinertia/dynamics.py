@@ -118,20 +118,20 @@ def inverse_dynamics(
     bsp: BodySegmentParameters,
     motion: Motion,
     foot_loads: np.ndarray,
-    feet: Sequence[str] = ("foot_r", "foot_l"),
+    feet: Sequence[str] | None = None,
 ) -> np.ndarray:
     """Generalised forces (n, c) of all coordinates, N and N m, with the ground reactions acting on the feet.
 
     Args:
         skeleton, bsp, motion: as in `residual`.
         foot_loads: (n, f, 6) per foot: force (N), moment about the ground origin (N m), ground axes.
-        feet: the segments they act on.
+        feet: the segments they act on; the skeleton's feet if None.
     """
     model = skeleton.model_with(bsp)
     data = model.createData()
     tau = np.array([pin.rnea(model, data, x, v, a) for x, v, a in _axes(skeleton, motion)])
     pose = skeleton.pose(motion.q)
-    for i, foot in enumerate(feet):
+    for i, foot in enumerate(skeleton.feet if feet is None else feet):
         moves = skeleton.support[skeleton.segments.index(foot)]
         tau[:, moves] -= np.einsum("nic,ni->nc", pose.jacobian[:, :, moves], foot_loads[:, i])
     return skeleton.map.to_coordinates(tau, pose.slopes)

@@ -298,8 +298,8 @@ def _trial_fits(
             "estimate": residual(skeleton, bsp, motion, loads.sum(axis=1)),
         }
         moments = {
-            "literature": inverse_dynamics(before, literature, window.motion, k.foot_loads, ready.feet),
-            "estimate": inverse_dynamics(skeleton, bsp, motion, loads, ready.feet),
+            "literature": inverse_dynamics(before, literature, window.motion, k.foot_loads),
+            "estimate": inverse_dynamics(skeleton, bsp, motion, loads),
         }
         errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
         timing = {**seconds, "estimate": spent * len(k.time)}

@@ -114,24 +114,6 @@ def solve_ik(
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
 
 
-def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float) -> None:
-    """Start frames that lie far from their neighbour again from there; they keep what fits better.
-
-    An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
-    """
-    count = len(q)
-    for order, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
-        for k in order:
-            change = q[k] - q[k + step]
-            change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
-            if np.abs(change).max() < _FAR:
-                continue
-            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], gain_tolerance_m2)
-            old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
-            if new < old:
-                q[k] = again[0]
-
-
 def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
     """(n, m) m, distances between measured and model markers."""
     return np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
@@ -155,6 +137,24 @@ def _best_fit(
         kept = doubtful[better]
         q[kept], converged[kept], normal[kept] = anew[better], settled[better], shown[better]
     return q, converged, normal
+
+
+def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float) -> None:
+    """Start frames that lie far from their neighbour again from there; they keep what fits better.
+
+    An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
+    """
+    count = len(q)
+    for order, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
+        for k in order:
+            change = q[k] - q[k + step]
+            change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
+            if np.abs(change).max() < _FAR:
+                continue
+            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], gain_tolerance_m2)
+            old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
+            if new < old:
+                q[k] = again[0]
 
 
 def _unwrap(q: np.ndarray, model: Skeleton) -> None:

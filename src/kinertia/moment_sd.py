@@ -17,9 +17,6 @@ from kinertia.map_terms import MapProblem
 from kinertia.normal_equations import NormalEquations, reduced
 from kinertia.skeleton import Pose, Skeleton
 
-FEET = ("foot_r", "foot_l")
-"""Segments that the ground acts on, in the order of foot loads."""
-
 
 @dataclass(frozen=True)
 class MomentDerivatives:
@@ -72,40 +69,54 @@ def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, st
     q, qd, qdd = (part[frames] for part in problem.full(problem.bases[k].evaluate(coefficients), static))
     model = skeleton.model_with(problem.bsp(static))
     data = model.createData()
-    d, c = q.shape
-    dq, dv, da = np.empty((d, c, c)), np.empty((d, c, c)), np.empty((d, c, c))
+    x, v, a = skeleton.map.motion(q, qd, qdd)
+    d, axes = x.shape
+    dq, dv, da = np.empty((d, axes, axes)), np.empty((d, axes, axes)), np.empty((d, axes, axes))
     joints, place = skeleton.placement_of_parameters(problem.segments)
     columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
-    regressor = np.empty((d, c, len(columns)))
+    tau, regressor = np.empty((d, axes)), np.empty((d, axes, len(columns)))
     for i in range(d):
-        pin.computeRNEADerivatives(model, data, q[i], qd[i], qdd[i])
-        dq[i], dv[i], da[i] = data.dtau_dq, data.dtau_dv, data.M
-        regressor[i] = pin.computeJointTorqueRegressor(model, data, q[i], qd[i], qdd[i])[:, columns]
+        pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
+        tau[i], dq[i], dv[i], da[i] = data.tau, data.dtau_dq, data.dtau_dv, data.M
+        regressor[i] = pin.computeJointTorqueRegressor(model, data, x[i], v[i], a[i])[:, columns]
     da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
     loads, rates = (problem.foot_loads(k, static, order)[frames] for order in (0, 1))
     pose = skeleton.pose(q)
-    by_static = np.zeros((d, c, layout.in_root.stop))
-    by_segment = (regressor.reshape(d, c, len(joints), 1, 10) @ place)[..., 0, :]
+    by_static = np.zeros((d, axes, layout.in_root.stop))
+    by_segment = (regressor.reshape(d, axes, len(joints), 1, 10) @ place)[..., 0, :]
     chain = dynamic_jacobian(static[layout.theta])
-    by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, c, 10 * len(joints))
-    for foot, name in enumerate(FEET):
+    by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, axes, 10 * len(joints))
+    for foot, name in enumerate(skeleton.feet):
         moves = skeleton.support[skeleton.segments.index(name)]
         jacobian = (pose.jacobian * moves).transpose(0, 2, 1)
         only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
         by_plate = trial.ground.by_plate(only, problem.carriers[k][frames], problem.plate_values(static))
         by_static[:, :, layout.plates] -= jacobian @ by_plate
         by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]
-        dq -= _load_derivative(skeleton, pose, moves, loads[:, foot])
-    by_static[:, :, layout.coordinates] = dq[:, :, problem.still]
+        tau -= (jacobian @ loads[:, foot, :, None])[..., 0]
+        dq -= _load_derivative(pose, moves, loads[:, foot])
+    by_q, by_qd, by_qdd = (
+        _rows_to_coordinates(skeleton, pose, part)
+        for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+    )
+    each = np.arange(q.shape[1])
+    by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
+    by_static = _rows_to_coordinates(skeleton, pose, by_static)
+    by_static[:, :, layout.coordinates] = by_q[:, :, problem.still]
     rows = problem.moving[:, None]
-    by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (dq, dv, da))
+    by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (by_q, by_qd, by_qdd))
     return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving])
 
 
-def _load_derivative(skeleton: Skeleton, pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """(d, c, c) derivative of J^T load by the coordinates, for a load (d, 6) at the ground origin.
+def _rows_to_coordinates(skeleton: Skeleton, pose: Pose, by: np.ndarray) -> np.ndarray:
+    """(d, c, k) from (d, a, k): rows of axes to those of coordinates."""
+    return skeleton.map.to_coordinates(by.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
 
-    A coordinate turns the axes of all that come after it: column j of J changes by the motion product of i and j.
+
+def _load_derivative(pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """(d, a, a) derivative of J^T load by the axes' places, for a load (d, 6) at the ground origin.
+
+    An axis turns the axes of all that come after it: column j of J changes by the motion product of i and j.
     """
     columns = pose.jacobian.transpose(0, 2, 1) * moves[:, None]
     linear, angular = columns[..., :3], columns[..., 3:]

@@ -7,7 +7,7 @@ frame: the trial is not turned. The prior is around the model's own body segment
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from kinertia.errors import OsimError, TrialError
 from kinertia.freedom import JOINT_CENTRE_SD_M, MARKER_SD_M, Freedom
 from kinertia.io.osim import OsimModel
 from kinertia.kinematics import solve_kinematics
+from kinertia.model_segments import segment_of
 from kinertia.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.skeleton import Axis, Skeleton
 from kinertia.trial import Trial
@@ -29,18 +30,6 @@ from kinertia.trial import Trial
 LIGHT_KG = 0.5
 """Bodies that weigh less together than this move with their joints, but are not estimated."""
 _MASS_TOLERANCE = 0.002
-_KINDS = {
-    "femur": "thigh",
-    "tibia": "shank",
-    "calcn": "foot",
-    "humerus": "upper_arm",
-    "ulna": "forearm",
-    "radius": "forearm",
-    "hand": "forearm",
-}
-"""Names of OpenSim's bodies -> of the prior's table, where they differ."""
-_FEET = ("calcn", "foot")
-_BELOW_ANKLE = ("talus", "calcn", "foot", "toes")
 
 
 def prepare_osim(
@@ -59,12 +48,13 @@ def prepare_osim(
     subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
     if not model.skeleton.markers:
         raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
-    feet = foot_bodies(model)
+    feet = _feet(model)
     progress("calibration", 0.0)
     started = time.perf_counter()
     trials = [_trial(model, item, feet) for item in inputs]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
-    skeleton, idle = hold_uninformed(model.skeleton, trials, may_hold)
+    skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
+    skeleton, idle = hold_uninformed(skeleton, trials, may_hold)
     if calibrate:
         skeleton = adapt(
             with_centre_offsets(model, skeleton), [trial.markers for trial in trials], _marker_sd(skeleton), {}
@@ -98,7 +88,6 @@ def prepare_osim(
         literature=freedom.whole(prior.mean),
         prior=prior,
         freedom=freedom,
-        feet=feet,
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
@@ -107,28 +96,29 @@ def prepare_osim(
     )
 
 
-def foot_bodies(model: OsimModel) -> tuple[str, str]:
-    """The bodies that stand on the ground, right and left.
+def _feet(model: OsimModel) -> dict[str, list[str]]:
+    """The bodies of each foot by their names, the heaviest first: it carries the ground reactions.
 
     Raises:
-        OsimError: there is none by any of the usual names.
+        OsimError: there is none.
     """
-    found = []
-    for side in "rl":
-        named = [f"{stem}_{side}" for stem in _FEET if f"{stem}_{side}" in model.skeleton.segments]
-        if not named:
-            wanted = " or ".join(f"{stem}_{side}" for stem in _FEET)
-            raise OsimError(model.path, f"no body that stands on the ground; expected one named {wanted}")
-        found.append(named[0])
-    return found[0], found[1]
+    mass = dict(zip(model.bsp.segments, model.bsp.mass_kg.tolist(), strict=True))
+    feet = {}
+    for side, name in zip("rl", ("right", "left"), strict=True):
+        bodies = [body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"]
+        if not bodies:
+            raise OsimError(
+                model.path, f"no body of the {name} foot; expected one named calcn_{side}, foot_{side} or the like"
+            )
+        feet[side] = sorted(bodies, key=lambda body: -mass[body])
+    return feet
 
 
-def _trial(model: OsimModel, item: TrialInput, feet: tuple[str, str]) -> Trial:
+def _trial(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> Trial:
     """The trial with its loads sorted by foot."""
     recording = item.recording
     labels = {}
-    for side, name, foot in zip("rl", ("right", "left"), feet, strict=True):
-        bodies = {foot, *(f"{stem}_{side}" for stem in _BELOW_ANKLE)}
+    for (side, bodies), name in zip(feet.items(), ("right", "left"), strict=True):
         worn = [marker.label for marker in model.skeleton.markers if marker.segment in bodies]
         labels[side] = [label for label in worn if label in recording.markers.labels]
         if not labels[side]:
@@ -176,9 +166,8 @@ def _marker_sd(skeleton: Skeleton) -> dict[str, float]:
 
 
 def kind_of(body: str) -> str:
-    """The segment of the prior's table that a body is; its own name, without its side, where it is none."""
-    stem = body.removesuffix("_r").removesuffix("_l")
-    return _KINDS.get(stem, stem)
+    """The segment of the prior's table that a body is part of by its name, without its side; else its own name."""
+    return (segment_of(body) or body).removesuffix("_r").removesuffix("_l")
 
 
 def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentParameters, float]:

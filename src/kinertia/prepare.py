@@ -51,7 +51,6 @@ class Prepared:
         literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
         prior: how far the person's may be from them.
         freedom: what else the simultaneous estimate may move.
-        feet: the segments that the ground reactions act on, right and left.
         file: the OpenSim model that the skeleton is from, if it is.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
@@ -63,7 +62,6 @@ class Prepared:
     literature: BodySegmentParameters
     prior: BspPrior
     freedom: Freedom
-    feet: tuple[str, str]
     file: OsimModel | None
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
@@ -155,7 +153,6 @@ def prepare(
         literature=literature,
         prior=literature_prior(literature),
         freedom=GAIT27_FREEDOM,
-        feet=("foot_r", "foot_l"),
         file=None,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),

@@ -30,9 +30,8 @@ class Provenance:
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     """The command with the hashes of all files that the subject file names."""
-    paths = [path for path in (wanted.model.static, wanted.model.osim) if path is not None]
-    if isinstance(wanted.model.markers, Path):
-        paths.append(wanted.model.markers)
+    model = wanted.model
+    paths = [path for path in (model.static, model.osim, model.markers) if isinstance(path, Path)]
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
     above = os.path.commonpath([path.parent for path in paths])

@@ -98,6 +98,7 @@ class Skeleton:
         markers: all markers, in order.
         locked: coordinates held at a constant value (rad or m).
         gravity_m_s2: downward, along -y.
+        feet: the segments that the ground acts on, right and left.
         start: coordinates from which inverse kinematics starts elsewhere than from zero (rad or m).
         carried: parameters of segments that are given once and for all; `model_with` adds others to them.
     """
@@ -107,6 +108,7 @@ class Skeleton:
     markers: tuple[Marker, ...]
     locked: Mapping[str, float] = field(default_factory=dict)
     gravity_m_s2: float = GRAVITY_M_S2
+    feet: tuple[str, str] = ("foot_r", "foot_l")
     start: Mapping[str, float] = field(default_factory=dict)
     carried: BodySegmentParameters | None = None
 

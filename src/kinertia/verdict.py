@@ -93,7 +93,8 @@ def _literature(fit: Fit) -> Verdict:
         far = int((away > CONTRADICTION_SD).sum())
         what = f"parameters more than {CONTRADICTION_SD:g} prior deviations"
         told = f"{PARAMETERS[column]} of {fit.estimate.segments[row]}: {away[row, column]:.1f}"
-    said = f"{what} from the literature: {far or 'none'} (farthest, {told})"
+    source = "the literature" if fit.file is None else "the model's own"
+    said = f"{what} from {source}: {far or 'none'} (farthest, {told})"
     if not far:
         return Verdict("good", said)
     return Verdict("against", f"{said}: the data contradict the model")

@@ -291,7 +291,7 @@ def _skeleton(
         tuple(markers),
         locked,
         float(-gravity[1]),
-        {
+        start={
             c.name: c.default + _START * (sum(c.range) / 2 - c.default)
             for j in joints[1:]
             for c in j.coordinates

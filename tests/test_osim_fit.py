@@ -1,0 +1,170 @@
+"""`kinertia fit --model`: the files it leaves, opened by OpenSim, and what it finds on three users' models."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import osim_models
+from command_line import run
+from kinertia.io.sto import read_sto
+from kinertia.io.trc import read_trc
+
+CASES = [("gait2354", False), ("gait2354", True), ("rajagopal", True)]
+
+
+@pytest.fixture(scope="module")
+def fitted(shared_data, tmp_path_factory):
+    """Folder of results by person and calibration; run once."""
+    done: dict[tuple[str, bool], Path] = {}
+
+    def get(name: str, calibrate: bool) -> Path:
+        if (name, calibrate) not in done:
+            folder = tmp_path_factory.mktemp(name)
+            subject = folder / f"{name}.toml"
+            subject.write_text(osim_models.subject_file(shared_data, osim_models.PEOPLE[name], calibrate))
+            outcome = run("fit", subject, "-o", folder / "out")
+            assert outcome.status in (0, 1), outcome.err
+            done[name, calibrate] = folder / "out"
+        return done[name, calibrate]
+
+    return get
+
+
+def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndarray, np.ndarray]:
+    """Times and (n, m, 3) m markers of a model that OpenSim moves by a motion file."""
+    loaded = opensim.Model(str(model))
+    state = loaded.initSystem()
+    table = read_sto(motion)
+    found = loaded.getCoordinateSet()
+    coordinates = [found.get(i) for i in range(found.getSize())]
+    assert {c.getName() for c in coordinates} == set(table.columns)
+    turns = {c.getName() for c in coordinates if c.getMotionType() == opensim.Coordinate.Rotational}
+    for coordinate in coordinates:
+        coordinate.setLocked(state, False)
+    positions = []
+    for _, row in table.iterrows():
+        for coordinate in coordinates:
+            value = row[coordinate.getName()]
+            coordinate.setValue(state, float(np.radians(value) if coordinate.getName() in turns else value), False)
+        loaded.realizePosition(state)
+        markers = loaded.getMarkerSet()
+        positions.append([markers.get(label).getLocationInGround(state).to_numpy() for label in labels])
+    return table.index.to_numpy(), np.array(positions)
+
+
+@pytest.mark.parametrize(("name", "calibrate"), CASES)
+def test_opensim_sees_the_markers_where_the_fit_says(opensim, shared_data, fitted, name, calibrate):
+    """Model and motion as written: all coordinates, locked and coupled ones too, and calibrated markers and joints."""
+    folder = fitted(name, calibrate)
+    told = json.loads((folder / "fit.json").read_text())["trials"][0]
+    (markers_file,) = osim_models.PEOPLE[name].trials
+    measured = read_trc(shared_data / f"{markers_file}.trc")
+    labels = list(told_labels(folder))
+    time, modelled = opensim_markers(opensim, folder / "model.osim", folder / "kinematics.mot", labels)
+    frames = np.searchsorted(measured.time, time - 1e-6)
+    distance = np.linalg.norm(measured.select(labels).positions[frames] - modelled, axis=-1)
+    assert np.sqrt(np.nanmean(distance**2)) == pytest.approx(told["marker_rms_m"]["final"], abs=1e-6)
+
+
+def told_labels(folder: Path):
+    """Labels of the markers that the fit used."""
+    return json.loads((folder / "fit.json").read_text())["marker_noise"].popitem()[1]["sd_m"]
+
+
+@pytest.mark.parametrize(("name", "calibrate"), CASES)
+def test_the_written_model_carries_the_estimate(opensim, fitted, name, calibrate):
+    folder = fitted(name, calibrate)
+    estimate = pd.read_csv(folder / "bsp.csv").pivot(index="segment", columns="parameter", values="estimate")
+    loaded = opensim.Model(str(folder / "model.osim"))
+    loaded.initSystem()
+    for segment, row in estimate.iterrows():
+        body = loaded.getBodySet().get(segment)
+        assert body.getMass() == pytest.approx(row["mass"], rel=1e-12)
+        centre, moments = body.getMassCenter(), body.getInertia().getMoments()
+        np.testing.assert_allclose([centre.get(i) for i in range(3)], row[["com_x", "com_y", "com_z"]], atol=1e-12)
+        np.testing.assert_allclose([moments.get(i) for i in range(3)], row[["ixx", "iyy", "izz"]], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "calibrate"), CASES)
+def test_changes_are_what_was_asked_for(fitted, name, calibrate):
+    changes = pd.read_csv(fitted(name, calibrate) / "model_changes.csv")
+    mass = {"mass", "mass_center", "inertia"}
+    assert set(changes["property"]) == (mass | {"location", "translation"} if calibrate else mass)
+
+
+def assert_targets(folder: Path) -> None:
+    """Issue 5: residual RMS at most 5 N and 3 N m, markers at most 12 mm, no silent departure of a parameter."""
+    told = json.loads((folder / "fit.json").read_text())
+    assert told["converged"]
+    for trial in told["trials"]:
+        assert trial["residual_force_rms_N"]["estimate"] <= 5.0
+        assert trial["residual_moment_rms_Nm"]["estimate"] <= 3.0
+        assert trial["marker_rms_m"]["final"] <= 0.012
+    bsp = pd.read_csv(folder / "bsp.csv").query("prior_sd > 0")
+    far = bsp[(bsp["estimate"] - bsp["literature"]).abs() > 3 * bsp["prior_sd"]]
+    for _, row in far.iterrows():
+        named = f"{row['parameter']} of {row['segment']} is"
+        assert any("contradict" in warning and named in warning for warning in told["warnings"]), named
+
+
+@pytest.mark.parametrize("name", ["gait2354", "rajagopal"])
+def test_residuals_markers_and_parameters(fitted, name):
+    assert_targets(fitted(name, True))
+
+
+@pytest.mark.slow
+def test_walks_and_squats_pooled(fitted):
+    folder = fitted("subject4", True)
+    assert_targets(folder)
+    told = json.loads((folder / "fit.json").read_text())
+    assert [trial["name"] for trial in told["trials"]] == ["walking1", "walking2", "squats1"]
+    assert any("ForcePlate2" in note and "left foot" in note for note in told["notes"])
+    assert (folder / "walking2" / "kinematics.mot").is_file()
+
+
+def test_the_built_in_model_is_written_as_a_model_too(opensim, fit_of):
+    fit = fit_of("pig_a")
+    loaded = opensim.Model(str(fit.folder / "model.osim"))
+    state = loaded.initSystem()
+    assert loaded.getTotalMass(state) == pytest.approx(fit.summary["total_mass_kg"]["estimate"])
+    motion = read_sto(fit.folder / "kinematics.mot")
+    names = {loaded.getCoordinateSet().get(i).getName() for i in range(loaded.getCoordinateSet().getSize())}
+    assert set(motion.columns) == names
+
+
+def options(data: Path, **more: object) -> list[object]:
+    walk = data / "gait2354" / "subject01_walk1"
+    given = {"--forces": f"{walk}_grf.mot", "--loads": f"{walk}_grf.xml", "--mass": 72.6}
+    given["--model"] = data / "gait2354" / "subject01_scaled.osim"
+    given |= {f"--{name}": value for name, value in more.items()}
+    return [f"{walk}.trc", *(word for pair in given.items() for word in pair)]
+
+
+BAD = {
+    "no model": ({"model": "nowhere.osim"}, "no such file"),
+    "a model that is none": ({"model": "gait2354/subject01_walk1_grf.xml"}, "no Model in it"),
+    "a model without markers": ({"model": "gait2354/gait2354_simbody.osim"}, "no markers in it"),
+    "the study's method": ({"method": "two-level"}, "works on the built-in model only"),
+    "a static trial as well": ({"static": "gait2354/subject01_static.trc"}, "both osim and static"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line(shared_data, tmp_path, case):
+    given, message = BAD[case]
+    files = {key: shared_data / value if "." in value else value for key, value in given.items()}
+    outcome = run("fit", *options(shared_data, **files), "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert message in " ".join(outcome.err.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_calibrate_goes_with_a_model(shared_data, tmp_path):
+    static = shared_data / "gait2354" / "subject01_static.trc"
+    words = [*options(shared_data)[:1], "--static", static, "--sex", "male", "--height", 1.8, "--mass", 72.6]
+    outcome = run("fit", *words, "--calibrate", "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "calibrate goes with osim" in " ".join(outcome.err.split())
