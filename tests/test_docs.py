@@ -13,19 +13,17 @@ import typer
 
 import reference
 from command_line import run
-from documentation import PAGES, ROOT, blocks, column, difference
+from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
 from kinertia.cli import app
 from kinertia.config import read_subject
 from kinertia.marker_set import read_marker_set
-
-MEASURED = ("gait2354", "pig_c3d")
 
 
 def _examples():
     """Blocks that run, by page and folder: they run in order in a folder of their own."""
     groups = {}
     for page in PAGES:
-        for block in blocks(page):
+        for block in blocks(page.read_text(encoding="utf-8")):
             if block.language in ("console", "python"):
                 groups.setdefault((page, block.folder), []).append(block)
     return [
@@ -40,10 +38,8 @@ def workshop(tmp_path, monkeypatch, request):
 
     def make(name):
         if name in MEASURED:
-            for file in (request.getfixturevalue("shared_data") / name).iterdir():
-                # one person's files, as a user would have them in one folder
-                if file.is_file() and not file.name.startswith("subject_b"):
-                    (tmp_path / file.name).symlink_to(file)
+            request.getfixturevalue("shared_data")
+            link_measured(name, tmp_path)
         monkeypatch.chdir(tmp_path)
         return tmp_path
 
@@ -74,10 +70,16 @@ def test_differences_of_outputs_are_seen():
     assert difference("mass 10.3*", "mass 10.3") == "mass 10.3*"
 
 
+def test_numbers_on_pages_can_be_renewed():
+    assert renewed("a 1.0\n...\nb (2.5)\n", "x\n a  7.0 \nc\nb (-3)\n") == " a  7.0\n...\nb (-3)\n"
+    with pytest.raises(ValueError, match="b"):
+        renewed("b 1", "a 1")
+
+
 def test_subject_file_examples_are_valid(workshop):
     folder = workshop("gait2354")
     known = {}
-    for block in blocks(ROOT / "docs" / "subject-file.md"):
+    for block in blocks((ROOT / "docs" / "subject-file.md").read_text(encoding="utf-8")):
         assert block.language == "toml"
         path = folder / f"example{len(known)}.toml"
         path.write_text(block.text)
@@ -122,13 +124,20 @@ def test_links_and_files_named_exist(page):
         assert (ROOT / path).exists(), path
 
 
+def _column(page, heading):
+    """Words in code marks in the first column of the table that follows a text of the page."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    table = re.search(r"(?:^\|.*\n)+", text[text.index(heading) :], re.MULTILINE)
+    return [name for row in table[0].splitlines()[2:] for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
+
+
 def test_results_page_names_every_file_and_column(fit_of):
     fitted = fit_of("gait2354")
     written = {path.name for path in fitted.folder.iterdir()}
-    assert set(column("results.md", "<!-- files of kinertia fit -->")) == written
-    assert column("results.md", "## bsp.csv") == list(pd.read_csv(fitted.folder / "bsp.csv", nrows=1).columns)
-    assert set(column("results.md", "<!-- keys of fit.json -->")) == set(fitted.summary)
-    assert set(column("results.md", "<!-- keys of a trial -->")) == set(fitted.trial)
+    assert set(_column("results.md", "<!-- files of kinertia fit -->")) == written
+    assert _column("results.md", "## bsp.csv") == list(pd.read_csv(fitted.folder / "bsp.csv", nrows=1).columns)
+    assert set(_column("results.md", "<!-- keys of fit.json -->")) == set(fitted.summary)
+    assert set(_column("results.md", "<!-- keys of a trial -->")) == set(fitted.trial)
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +146,7 @@ def site(tmp_path_factory):
     for module in ("material", "mkdocstrings_handlers.python", "latex2mathml"):
         pytest.importorskip(module, reason='needs the documentation tools: pip install -e ".[docs]"')
     folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     done = subprocess.run(
         command, cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True
     )
