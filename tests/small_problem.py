@@ -21,7 +21,7 @@ from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
-LOCKED = HIP_OFFSETS[:3]
+LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
 
 
 def small_trial() -> SyntheticTrial:

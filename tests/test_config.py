@@ -83,6 +83,7 @@ def test_reads_everything(folder):
         "bsp": "deleva",
         "symmetry": False,
         "cutoff_hz": 6.0,
+        "joint_axes": False,
         "hip_centre": "harrington",
     }
 
@@ -99,6 +100,7 @@ def test_least_file_gets_defaults(folder):
         "bsp": "dumas",
         "symmetry": True,
         "cutoff_hz": "gcv",
+        "joint_axes": False,
         "hip_centre": "bell",
     }
 

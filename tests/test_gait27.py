@@ -7,6 +7,7 @@ from kinertia.errors import MarkerSetError
 from kinertia.gait27 import (
     ARM_COORDINATES,
     ARM_ROTATIONS,
+    AXIS_TILTS,
     HIP_OFFSETS,
     LUMBAR_OFFSETS,
     SHOULDER_OFFSETS,
@@ -36,7 +37,7 @@ def test_fourteen_segments_and_27_coordinates():
         "pelvis_list",
         "pelvis_rotation",
     )
-    assert set(skeleton.locked) == {*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS, *ARM_ROTATIONS}
+    assert set(skeleton.locked) == {*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS, *ARM_ROTATIONS, *AXIS_TILTS}
     assert set(ARM_COORDINATES) <= set(skeleton.coordinates)
 
 
@@ -169,3 +170,17 @@ def test_a_marker_that_the_static_trial_never_shows_is_left_out():
     positions = standing_positions()
     positions["R.Thigh.Rear"] = np.full(3, np.nan)
     assert "R.Thigh.Rear" not in built(positions).skeleton.labels
+
+
+def test_a_tilted_axis_leaves_the_straight_joint_alone():
+    skeleton = generic_model().skeleton
+    tilted = skeleton.lock({"knee_tilt_1_r": 0.1, "knee_tilt_2_r": -0.05})
+    knee, shank = skeleton.coordinates.index("knee_angle_r"), skeleton.segments.index("shank_r")
+    q = np.zeros((2, 27))
+    q[1, knee] = 1.0
+    before, after = skeleton.pose(q), tilted.pose(q)
+    np.testing.assert_allclose(after.rotation[0], before.rotation[0], atol=1e-12)
+    turned = Rotation.from_matrix(after.rotation[1, shank] @ after.rotation[0, shank].T).as_rotvec()
+    was = Rotation.from_matrix(before.rotation[1, shank] @ before.rotation[0, shank].T).as_rotvec()
+    assert np.linalg.norm(turned) == pytest.approx(1.0)
+    assert np.arccos(turned @ was) == pytest.approx(np.hypot(0.1, 0.05), rel=0.01)

@@ -10,7 +10,7 @@ from accuracy import kinematics_of
 from kinertia.bsp_prior import literature_prior
 from kinertia.config import Settings, Subject
 from kinertia.fit import Fit, estimate_bsp
-from kinertia.freedom import JOINT_CENTRE_SD_M
+from kinertia.freedom import GAIT27_FREEDOM, JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.noise import camera_noise
 from kinertia.prepare import TrialInput
@@ -78,6 +78,24 @@ def test_loads_and_motion_cover_the_window(trial, plain):
     assert loads.shape[1:] == (2, 6)
     window = trial.window.wrench[5 : 5 + len(loads)]
     np.testing.assert_allclose(loads.sum(axis=1)[10:-10], window[10:-10], atol=25.0)
+
+
+def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
+    wrong = {"knee_tilt_1_r": 0.12, "knee_tilt_2_r": 0.08}
+    off = replace(trial, skeleton=trial.skeleton.lock(wrong))
+    noisy = camera_noise(trial.markers, 0.002, np.random.default_rng(0))
+    prior = literature_prior(walking_subject().literature)
+    with threadpool_limits(1, user_api="blas"):
+        outcome = fit_simultaneous(
+            off.skeleton, prior, [kinematics_of(off, noisy, trial.foot_loads)], "gcv", GAIT27_FREEDOM.with_axes()
+        )
+    told = outcome.posterior.calibration
+    for name, put_in in wrong.items():
+        assert told[name]["unit"] == "rad"
+        assert told[name]["prior_sd"] == pytest.approx(np.radians(5.0))
+        assert told[name]["sd"] < 0.7 * told[name]["prior_sd"]
+        assert abs(told[name]["value"] + put_in) < 3.0 * told[name]["sd"]
+    assert "knee_tilt_1_r" not in fitted(trial).posterior.calibration
 
 
 def test_a_displaced_plate_is_named(trial):

@@ -170,6 +170,10 @@ class Settings(Table):
         default=True, description="two-level only; true: left mirrors right, 49 parameters; false: 84"
     )
     cutoff_hz: Cutoff = Field(default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz')
+    joint_axes: bool = Field(
+        default=False,
+        description="simultaneous, built-in model; true: axes of knees, ankles, elbows are calibrated too",
+    )
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
     )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from kinertia.bsp import BodySegmentParameters
-from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.gait27 import AXIS_TILTS, HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 
 JOINT_CENTRE_SD_M = 0.010
+JOINT_AXIS_SD_RAD = float(np.radians(5.0))
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
 
@@ -24,12 +25,23 @@ class Freedom:
         marker_sd_m: prior deviation of marker positions in their segments, each axis; None: they stay where they are.
         held: parameters of the segments that the prior does not have; None where it has all.
         source: where the prior's mean comes from, for messages.
+        axes: static coordinate that tilts a joint's axis -> prior deviation, rad.
     """
 
     centres: Mapping[str, float]
     marker_sd_m: float | None
     held: BodySegmentParameters | None
     source: str
+    axes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def coordinates(self) -> dict[str, float]:
+        """All static coordinates that may move -> prior deviation, m or rad."""
+        return {**self.centres, **self.axes}
+
+    def with_axes(self) -> Freedom:
+        """The same with the axes of knees, ankles and elbows of the 27-DOF model free."""
+        return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
 
     @property
     def held_kg(self) -> float:

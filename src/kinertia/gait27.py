@@ -5,9 +5,9 @@ between), back (3), shoulder (2), elbow (1). Twelve of the fourteen segments car
 (Rajagopal): flexion of hip, knee and elbow, dorsiflexion, adduction, internal rotation and inversion are positive; hip,
 knee and shoulder angles are zero when segments are aligned, the ankle's when foot and shank are square.
 
-More axes are locked unless they are calibrated: the centres of hips, lumbar joint and shoulders in their parents, and
-the axial rotation of the upper arm and of the forearm, which this model does not move but which differ between a
-T-pose and walking.
+More axes are locked unless they are calibrated: the centres of hips, lumbar joint and shoulders in their parents, the
+directions of the axes of knees, ankles and elbows, and the axial rotation of the upper arm and of the forearm, which
+this model does not move but which differ between a T-pose and walking.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from kinertia.trial import Recording
 SHOULDER_OFFSETS = tuple(f"shoulder_{axis}_{side}" for side in "rl" for axis in "xyz")
 HIP_OFFSETS = tuple(f"hip_{axis}_{side}" for side in "rl" for axis in "xyz")
 LUMBAR_OFFSETS = tuple(f"lumbar_{axis}" for axis in "xyz")
+AXIS_TILTS = tuple(f"{name}_tilt_{i}_{side}" for side in "rl" for name in ("knee", "ankle", "elbow") for i in "12")
 ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", "pro_sup"))
 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
@@ -84,7 +85,7 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     at = origin + pelvis @ lumbar
     torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
     frames["torso"] = (torso, at)
-    locked = dict.fromkeys((*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS), 0.0)
+    locked = dict.fromkeys((*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS, *AXIS_TILTS), 0.0)
     for side in "rl":
         joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, sex, side)
     mid_hip = (hips["r"] + hips["l"]) / 2
@@ -125,7 +126,20 @@ def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
 
 def _pin(parent: str, child: str, at: np.ndarray, relative: np.ndarray, axis: Axis, angle: float) -> Joint:
     """A pin joint that puts the child at orientation `relative` in the parent when its coordinate is `angle`."""
-    return Joint(parent, child, relative @ _turn(np.array(axis.direction), angle).T, at, (axis,))
+    return Joint(parent, child, relative @ _turn(np.array(axis.direction), angle).T, at, _tiltable(axis))
+
+
+def _tiltable(axis: Axis) -> tuple[Axis, ...]:
+    """The axis with its direction open to calibration: turned by two small angles before, and back after it.
+
+    At coordinate zero the child stands as it did: only what the axis does as it turns changes.
+    """
+    joint, _, side = axis.coordinate.split("_")
+    main = np.array(axis.direction)
+    first = np.cross(main, jc.mirrored_axis(np.eye(3)[int(np.argmin(np.abs(main)))], side))
+    turns = [_axis(f"{joint}_tilt_{i}_{side}", d) for i, d in zip("12", (first, np.cross(main, first)), strict=True)]
+    back = [Axis(turn.coordinate, "rotation", _triple(-np.array(turn.direction))) for turn in reversed(turns)]
+    return (*turns, axis, *back)
 
 
 def _axis(coordinate: str, direction: np.ndarray) -> Axis:
@@ -225,7 +239,7 @@ def _arm(
     twist = _axis(f"pro_sup_{side}", jc.mirrored_axis(np.array(_Y), side))
     return [
         Joint("torso", f"upper_arm_{side}", np.eye(3), torso.T @ (shoulder - torso_at), shoulder_axes),
-        Joint(elbow.parent, elbow.child, elbow.rotation, elbow.translation, (elbow_pin, twist)),
+        Joint(elbow.parent, elbow.child, elbow.rotation, elbow.translation, (*elbow.axes, twist)),
     ]
 
 

@@ -152,7 +152,7 @@ def prepare(
         skeleton=skeleton,
         literature=literature,
         prior=literature_prior(literature),
-        freedom=GAIT27_FREEDOM,
+        freedom=GAIT27_FREEDOM.with_axes() if settings.joint_axes else GAIT27_FREEDOM,
         file=None,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),

@@ -132,14 +132,15 @@ def fit_simultaneous(
 def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
     """How far a calibrated skeleton with these markers, plates and clock may be off."""
     places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
-    return CalibrationPrior(freedom.centres, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    return CalibrationPrior(freedom.coordinates, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
 
 
 def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
-        found[name] = {"value": change, "prior_sd": freedom.centres[name], "sd": sd, "unit": "m"}
+        told = {"value": change, "prior_sd": freedom.coordinates[name], "sd": sd}
+        found[name] = {**told, "unit": "rad" if name in freedom.axes else "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for axis, value, deviation in zip("xz", values, sds, strict=False):
@@ -152,7 +153,7 @@ def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResul
     return found
 
 
-SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%")}
+SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%"), "rad": (180.0 / np.pi, "degrees")}
 """Factor and unit in which people read a calibrated quantity."""
 
 

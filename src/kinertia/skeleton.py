@@ -194,7 +194,7 @@ class Skeleton:
             place = offset[joint.parent] * pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
             for axis in joint.axes:
                 if axis.coordinate in self.locked:
-                    place = place * _motion(axis, self.locked[axis.coordinate])
+                    place = place * placed_by(axis, self.locked[axis.coordinate])
                     continue
                 parent = model.addJoint(parent, _pinocchio_joint(axis), place, f"{axis.coordinate}:{model.njoints}")
                 place = pin.SE3.Identity()
@@ -286,7 +286,8 @@ class Skeleton:
         return joints, np.array([_moved_parameters(offset[segment]) for segment in self.segments])
 
 
-def _motion(axis: Axis, value: float) -> pin.SE3:
+def placed_by(axis: Axis, value: float) -> pin.SE3:
+    """Where an axis puts what follows it when its coordinate has this value (rad or m)."""
     direction = np.array(axis.direction)
     if axis.function is not None:
         value = float(axis.function(np.array([value]))[0])

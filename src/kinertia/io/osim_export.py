@@ -1,8 +1,8 @@
 """A skeleton built here (the 27-DOF model) as an OpenSim model file.
 
-Every joint becomes a CustomJoint (or a WeldJoint) with the skeleton's own coordinate names. Locked coordinates become
-constants: translations shift the joint's frame in its parent, rotations stay as axes that do not move. OpenSim 4.0 and
-later open it. There are no muscles and no geometry.
+Every joint becomes a CustomJoint (or a WeldJoint) with the skeleton's own coordinate names. Locked coordinates are
+constants: those at the beginning and end of a joint place its frames in parent and child, those between moving axes
+stay as axes that do not move. OpenSim 4.0 and later open it. There are no muscles and no geometry.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
+import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.io.sto import write_then_rename
-from kinertia.skeleton import Axis, Joint, Marker, Skeleton
+from kinertia.skeleton import Axis, Joint, Marker, Skeleton, placed_by
 
 _FORMAT = 40000
 """The oldest of the current formats: every OpenSim 4 reads it."""
@@ -74,18 +75,16 @@ def _marker(marker: Marker) -> str:
 
 
 def _joint(joint: Joint, skeleton: Skeleton) -> str:
+    joint = _folded(joint, skeleton)
     slides = [axis for axis in joint.axes if axis.kind == "translation"]
     turns = [axis for axis in joint.axes if axis.kind == "rotation"]
     if [*slides, *turns] != list(joint.axes) or any(axis.function is not None for axis in joint.axes):
         raise ValueError(f"the joint of {joint.child} has axes that a file of plain coordinates cannot hold")
-    moving = [axis for axis in slides if axis.coordinate not in skeleton.locked]
-    shift = sum((np.array(a.direction) * skeleton.locked[a.coordinate] for a in slides if a not in moving), np.zeros(3))
-    at = np.asarray(joint.translation) + np.asarray(joint.rotation) @ shift
     parent = "/ground" if joint.parent == "ground" else f"/bodyset/{joint.parent}"
     name = "ground_" + joint.child if joint.parent == "ground" else "to_" + joint.child
-    near = _frame(f"{joint.parent}_offset", parent, joint.rotation, at)
+    near = _frame(f"{joint.parent}_offset", parent, joint.rotation, joint.translation)
     far = _frame(f"{joint.child}_offset", f"/bodyset/{joint.child}", joint.child_rotation, joint.child_translation)
-    free = [axis for axis in (*turns, *moving) if axis.coordinate not in skeleton.locked]
+    free = [axis for axis in (*turns, *slides) if axis.coordinate not in skeleton.locked]
     kind = "CustomJoint" if joint.axes else "WeldJoint"
     inside = [
         f"<{kind} name={quoteattr(name)}>",
@@ -95,9 +94,25 @@ def _joint(joint: Joint, skeleton: Skeleton) -> str:
         f"<frames>{near}{far}</frames>",
     ]
     if joint.axes:
-        axes = [*_filled("rotation", turns, skeleton), *_filled("translation", moving, skeleton)]
+        axes = [*_filled("rotation", turns, skeleton), *_filled("translation", slides, skeleton)]
         inside += ["<SpatialTransform>", *axes, "</SpatialTransform>"]
     return "\n".join([*inside, f"</{kind}>"])
+
+
+def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
+    """The joint without axes locked at zero, and with its two frames where locked axes at its beginning and end put
+    them.
+    """
+    axes = [axis for axis in joint.axes if skeleton.locked.get(axis.coordinate) != 0.0 or axis.function is not None]
+    near = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
+    far = pin.SE3(np.asarray(joint.child_rotation), np.asarray(joint.child_translation))
+    while axes and axes[0].coordinate in skeleton.locked:
+        axis = axes.pop(0)
+        near = near * placed_by(axis, skeleton.locked[axis.coordinate])
+    while axes and axes[-1].coordinate in skeleton.locked:
+        axis = axes.pop()
+        far = far * placed_by(axis, skeleton.locked[axis.coordinate]).inverse()
+    return Joint(joint.parent, joint.child, near.rotation, near.translation, tuple(axes), far.rotation, far.translation)
 
 
 def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:
