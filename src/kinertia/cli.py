@@ -156,15 +156,7 @@ def fit(
         "--model": model,
         "--calibrate": calibrate or None,
     }
-    if trial.suffix.lower() == ".toml":
-        given = [name for name, value in options.items() if value is not None]
-        if given:
-            raise FileError(trial, f"a subject file says it all; put {', '.join(given)} into it instead")
-        wanted = read_subject(trial)
-    else:
-        wanted = _from_options(trial, options)
-    if method is not None:
-        wanted = with_settings(wanted, method=method)
+    wanted = _wanted(trial, options, method)
     results_folder(output, force)
     result = _run(wanted)
     folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
@@ -202,6 +194,18 @@ def _command(trial: Path, options: dict[str, Any], method: str | None, output: P
         for word in ([name] if value is True else [name, value])
     ]
     return shlex.join(["kinertia", "fit", str(trial), *words])
+
+
+def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
+    """What to estimate, by the subject file or by options."""
+    if trial.suffix.lower() == ".toml":
+        given = [name for name, value in options.items() if value is not None]
+        if given:
+            raise FileError(trial, f"a subject file says it all; put {', '.join(given)} into it instead")
+        wanted = read_subject(trial)
+    else:
+        wanted = _from_options(trial, options)
+    return wanted if method is None else with_settings(wanted, method=method)
 
 
 def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:

@@ -62,10 +62,8 @@ def prepare_osim(
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, known(subject.mass_kg))
     prior, held = parted(skeleton, own)
-    offsets = [name for name in skeleton.locked if "/offset_" in name]
-    freedom = Freedom(
-        dict.fromkeys(offsets, JOINT_CENTRE_SD_M), MARKER_SD_M if calibrate else None, held, "the model's own"
-    )
+    centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
+    freedom = Freedom(centres, MARKER_SD_M if calibrate else None, held, "the model's own")
 
     kinematics, seconds = [], []
     for k, trial in enumerate(trials):
