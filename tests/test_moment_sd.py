@@ -88,7 +88,7 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
     normal = problem.normal(0, coefficients, static)
     covariance = covariance_of(problem.prior_terms(static)[0] + reduced(normal, 0.0)[0])
     np.testing.assert_allclose(covariance, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
-    found = joint_moment_sd(problem, 0, coefficients, static, covariance)
+    found = joint_moment_sd(problem, 0, coefficients, static, normal, covariance)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
 
 

@@ -1,6 +1,7 @@
 """`kinertia fit --model`: the files it leaves, opened by OpenSim, and what it finds on three users' models."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +124,23 @@ def test_walks_and_squats_pooled(fitted):
     assert [trial["name"] for trial in told["trials"]] == ["walking1", "walking2", "squats1"]
     assert any("ForcePlate2" in note and "left foot" in note for note in told["notes"])
     assert (folder / "walking2" / "kinematics.mot").is_file()
+
+
+def test_page_of_the_benchmark(fitted):
+    runs = {}
+    for calibrate in (False, True):
+        folder = fitted("gait2354", calibrate)
+        bsp = pd.read_csv(folder / "bsp.csv")
+        runs["gait2354", calibrate] = {**json.loads((folder / "fit.json").read_text()), "bsp": bsp}
+    page = osim_models.document(runs)
+    for (_, calibrate), told in runs.items():
+        (trial,) = told["trials"]
+        title = f"gait2354, {'calibrated' if calibrate else 'as it is'}"
+        residual = trial["residual_force_rms_N"]["estimate"], trial["residual_moment_rms_Nm"]["estimate"]
+        cells = rf"\| {trial['marker_rms_m']['final'] * 1e3:.1f} \|.*\| {residual[0]:.1f} \|.*\| {residual[1]:.1f} \|"
+        assert re.search(rf"\| {title}: subject01_walk1 .*{cells}", page)
+        for warning in told["warnings"]:
+            assert f"- {title}: {warning}." in page
 
 
 def test_the_built_in_model_is_written_as_a_model_too(opensim, fit_of):

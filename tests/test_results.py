@@ -13,9 +13,10 @@ from kinertia.results import save_fit, summary
 
 STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {
-    "report.html", "fit.json",
+    "report.html", "fit.json", "model.osim",
     "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
 }  # fmt: skip
+FOR_ALL = {"report.html", "fit.json", "bsp.csv", "model.osim"}
 PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
 
 
@@ -140,9 +141,9 @@ def test_marker_rms_is_over_visible_markers(short_fit):
 
 def test_several_trials_have_a_folder_each(short_fit, tmp_path):
     folder = save_fit(short_fit, tmp_path / "out")
-    assert {path.name for path in folder.iterdir()} == {"report.html", "fit.json", "bsp.csv", "early", "late"}
+    assert {path.name for path in folder.iterdir()} == {*FOR_ALL, "early", "late"}
     for name in ("early", "late"):
-        assert {path.name for path in (folder / name).iterdir()} == RESULTS - {"report.html", "fit.json", "bsp.csv"}
+        assert {path.name for path in (folder / name).iterdir()} == RESULTS - FOR_ALL
     assert [trial["name"] for trial in json.loads((folder / "fit.json").read_text())["trials"]] == ["early", "late"]
 
 

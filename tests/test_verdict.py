@@ -25,7 +25,14 @@ def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, **changes):
     loads = np.zeros((FRAMES, 2, 6))
     loads[:, :, 1] = external_n / 2
     trial = SimpleNamespace(name="walk", residuals={"estimate": residual}, kinematics=SimpleNamespace(foot_loads=loads))
-    given = {"converged": True, "estimate": BODY, "literature": BODY, "posterior": None, "trials": (trial,)}
+    given = {
+        "converged": True,
+        "estimate": BODY,
+        "literature": BODY,
+        "posterior": None,
+        "trials": (trial,),
+        "file": None,
+    }
     return SimpleNamespace(**{**given, **changes})
 
 

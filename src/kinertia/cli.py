@@ -50,6 +50,7 @@ Every command says more with --help, and has an example there.
 
 A static trial (the person standing; C3D or TRC), one or more gait trials with
 force plates (C3D, or TRC with MOT or STO), body mass, stature and sex.
+Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 
 [bold]Exit status[/]
 

@@ -34,7 +34,12 @@ class MomentDerivatives:
 
 
 def joint_moment_sd(
-    problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray, covariance: np.ndarray
+    problem: MapProblem,
+    k: int,
+    coefficients: np.ndarray,
+    static: np.ndarray,
+    normal: NormalEquations,
+    covariance: np.ndarray,
 ) -> np.ndarray:
     """(d, c) posterior deviations of the generalised forces of trial k at its dynamic frames, N m and N.
 
@@ -42,11 +47,12 @@ def joint_moment_sd(
         problem: of the estimate.
         k: the trial.
         coefficients, static: the estimate.
+        normal: the trial's normal equations there.
         covariance: (S, S) posterior covariance of the static unknowns.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     by = moment_derivatives(problem, k, coefficients, static)
-    motion = _MotionCovariance.of(problem.normal(k, coefficients, static), covariance)
+    motion = _MotionCovariance.of(normal, covariance)
     root = problem.layout.in_root
     variance = np.empty(by.q.shape[:2])
     for first in np.unique(basis.first[frames]):

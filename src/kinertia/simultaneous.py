@@ -91,7 +91,12 @@ def estimate_simultaneous(
             values, coefficients, here = new_values, new_coefficients, there
         damping = max(damping * _change_of_damping(kept), 1e-9)
     information = here.information + sum(reduced(normal, 0.0)[0] for normal in here.normals)
-    return _result(problem, coefficients, values, covariance_of(information), converged, iterations, (begin, here.cost))
+    covariance = covariance_of(information)
+    moment_sd = tuple(
+        joint_moment_sd(problem, k, part, values, normal, covariance)
+        for k, (part, normal) in enumerate(zip(coefficients, here.normals, strict=True))
+    )
+    return _result(problem, coefficients, values, covariance, moment_sd, converged, iterations, (begin, here.cost))
 
 
 def _change_of_damping(kept: float) -> float:
@@ -136,6 +141,7 @@ def _result(
     coefficients: Sequence[np.ndarray],
     values: np.ndarray,
     covariance: np.ndarray,
+    moment_sd: tuple[np.ndarray, ...],
     converged: bool,
     iterations: int,
     cost: tuple[float, float],
@@ -161,7 +167,7 @@ def _result(
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, coefficients, strict=True)),
-        tuple(joint_moment_sd(problem, k, part, values, covariance) for k, part in enumerate(coefficients)),
+        moment_sd,
         converged,
         iterations,
         cost,
