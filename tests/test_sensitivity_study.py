@@ -54,8 +54,8 @@ def test_command(tmp_path, monkeypatch):
     assert told["shown_by_no_condition"] == ["pelvis.iyy"]
     assert (tmp_path / "out" / "sensitivity.png").stat().st_size > 10_000
     page = (tmp_path / "out" / "sensitivity.md").read_text()
-    assert "noise (8.2 mm RMS at twice) torso.com_z;" in page
-    assert "above at twice: thigh.mass." in page
-    assert "1 of 3 parameters have an error above 0.9" in page
+    assert "noise (8.2 mm RMS at twice): torso.com_z\n" in page
+    assert "not at twice): thigh.mass\n" in page
+    assert "1 of 3 parameters (moments of inertia: 1)" in page
     assert "| pelvis.iyy | 0.99 | 0.99 | 1.00 |" in page
     assert (tmp_path / "out" / "sensitivity.csv").read_text().startswith("parameter,study x 0.25")

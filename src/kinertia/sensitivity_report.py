@@ -24,7 +24,7 @@ from kinertia.sensitivity_study import (
 
 
 def sensitivity_frame(found: Sensitivity) -> pd.DataFrame:
-    """One row per parameter, one column per condition: RMS error in prior deviations."""
+    """One row per parameter, one column per condition: RMS error over the literature's."""
     return pd.DataFrame({"parameter": found.parameters, **found.errors})
 
 
@@ -42,7 +42,7 @@ def sensitivity_figure(found: Sensitivity) -> Figure:
     axis.set_yticks(range(len(found.parameters)), [name.replace("_", " ") for name in found.parameters], fontsize=7)
     for row in range(len(SHOWN), len(found.parameters), len(SHOWN)):
         axis.axhline(row - 0.5, color="white", linewidth=1.5)
-    figure.colorbar(picture, ax=axis, shrink=0.4, label="RMS error / prior deviation")
+    figure.colorbar(picture, ax=axis, shrink=0.4, label="RMS error / that of the literature")
     return figure
 
 
@@ -51,25 +51,27 @@ _PAGE = """# Which body segment parameters survive noisy kinematics?
 
 The study that Kinertia starts from ended on this question. `kinertia study sensitivity` answers it for the simultaneous
 estimate: {draws} people drawn from the literature's prior walk two strides (2.5 s), are measured with noise, and are
-estimated, one thing changed at a time. Numbers are RMS errors over people as a share of the prior's deviation: 1 is the
-error of the literature itself, below 0.5 a parameter counts as measured. Left and right count as one. Page, picture and
-tables are written by the command.
+estimated, one thing changed at a time. Numbers are RMS errors over people as a share of the literature's on the same
+people: 1 is no better than the literature, below 0.5 an error counts as small. Left and right count as one. With so
+many people a share is known to some {percent:.0f} % of its value. The command writes this page.
 
-**Not highly sensitive** (error below 0.5 up to twice the noise): with the study's noise (8.2 mm RMS at twice) {study};
-with skin motion linear in the joint angles (up to 36 mm on the thigh at twice) {artefact}.
+**Not highly sensitive** (small error up to twice the noise)
 
-**Sensitive**: below 0.5 at a quarter of the noise, above at twice: {sensitive}.
+- with the study's noise (8.2 mm RMS at twice): {study}
+- with skin motion linear in the joint angles (up to 36 mm on the thigh at twice): {artefact}
 
-**Shown by no condition**: {never} of {count} parameters have an error above 0.9 whatever is recorded here, among them
-{never_classes}. For these the literature's value stands; their error bars say so.
+**Sensitive** (small error at a quarter of either noise, not at twice): {sensitive}
 
-How much a recording helps, mean over all {count} parameters, skin motion: {strides}.
+**Shown by no condition** (error above 0.9 whatever is recorded here): {never} of {count} parameters ({never_classes}).
+For these the literature's value stands; their error bars say so.
+
+**Recording more**, mean over all {count} parameters, skin motion: {strides}.
 
 ## Conditions and parameters
 
 {table}
 
-![RMS error over prior deviation of every parameter in every condition](sensitivity.png)
+![RMS error of every parameter in every condition, over that of the literature](sensitivity.png)
 """
 
 
@@ -85,20 +87,21 @@ def sensitivity_markdown(found: Sensitivity) -> str:
         what: sum(name.rpartition(".")[2] in members for name in never)
         for what, members in (("masses", SHOWN[:1]), ("CoM coordinates", SHOWN[1:4]), ("moments of inertia", SHOWN[4:]))
     }
-    strides = [f"{count} strides {found.errors[_of_strides(count)].mean():.2f}" for count in STRIDES]
+    strides = [f"strides {count}: {found.errors[_of_strides(count)].mean():.2f}" for count in STRIDES]
     heads = ["parameter", *_COLUMNS]
     rows = [heads, ["---", *["--:"] * len(_COLUMNS)]]
     for i, name in enumerate(found.parameters):
         rows.append([name, *(f"{found.errors[key][i]:.2f}" for key in _COLUMNS)])
     return _PAGE.format(
         draws=found.draws,
+        percent=100.0 / np.sqrt(2.0 * found.draws),
         count=len(found.parameters),
         study=", ".join(found.insensitive("study")) or "none",
         artefact=", ".join(found.insensitive("artefact")) or "none",
         sensitive=", ".join(sensitive) or "none",
         never=len(never),
-        never_classes=", ".join(f"{count} {what}" for what, count in by_class.items() if count) or "none",
-        strides="; ".join([*strides, f"{WITH_SQUATS} {found.errors[WITH_SQUATS].mean():.2f}"]),
+        never_classes=", ".join(f"{what}: {count}" for what, count in by_class.items() if count),
+        strides="; ".join([*strides, f"{WITH_SQUATS}: {found.errors[WITH_SQUATS].mean():.2f}"]),
         table="\n".join(f"| {' | '.join(cells)} |" for cells in rows),
     )
 
@@ -115,7 +118,7 @@ def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
         "draws": found.draws,
         "small_errors_up_to_twice_the_noise": {kind: found.insensitive(kind) for kind in KINDS},
         "shown_by_no_condition": found.never(),
-        "rms_error_over_prior_sd": {
+        "rms_error_over_literature": {
             key: dict(zip(found.parameters, values.tolist(), strict=True)) for key, values in found.errors.items()
         },
     }

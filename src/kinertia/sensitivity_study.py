@@ -2,7 +2,7 @@
 
 People drawn from the literature's prior walk and are estimated, as in `accuracy_study`, with one thing changed at a
 time: amplitude and kind of the noise, number of strides, squats recorded besides. Per parameter the RMS error over
-people is told as a share of the prior's deviation: 1 is what the literature alone would give.
+people is told as a share of the literature's on the same people.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ CONDITIONS = {
 """Two strides (2.5 s) where not said otherwise."""
 SHOWN = PARAMETERS[:7]
 INSENSITIVE = 0.5
-"""Share of the prior's deviation below which an error counts as small: the parameter is measured."""
+"""Share of the literature's error below which an error counts as small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Sensitivity:
 
     Attributes:
         parameters: "segment.parameter"; left and right count as one.
-        errors: condition -> RMS error over people in prior deviations.
+        errors: condition -> RMS error over people, over that of the literature.
         draws, seed: of the study.
     """
 
@@ -82,8 +82,10 @@ def run_sensitivity(
 
 
 def _errors(draws: list[Draw], segments: tuple[str, ...], names: list[str]) -> np.ndarray:
-    """(len(names) * 7,) RMS over people and sides, in prior deviations."""
-    away = np.array([draw.errors / draw.prior_sd for draw in draws])[..., : len(SHOWN)]
-    square = np.square(away).mean(axis=0)
+    """(len(names) * 7,) RMS over people and sides, over that of the literature."""
+    found, before = (
+        np.square([getattr(draw, kind) / draw.prior_sd for draw in draws]).mean(axis=0)[:, : len(SHOWN)]
+        for kind in ("errors", "literature_errors")
+    )
     of_name = [[i for i, s in enumerate(segments) if s.removesuffix("_r").removesuffix("_l") == name] for name in names]
-    return np.sqrt(np.array([square[rows].mean(axis=0) for rows in of_name])).ravel()
+    return np.sqrt([found[rows].sum(axis=0) / before[rows].sum(axis=0) for rows in of_name]).ravel()
