@@ -27,7 +27,7 @@ _FRAME_M = 0.13
 
 def main() -> None:
     """Write all figures."""
-    mpl.rcParams.update({"svg.hashsalt": "kinertia", "font.size": 9, "font.family": "sans-serif"})
+    mpl.rcParams.update({"svg.hashsalt": "kinertia", "font.size": 11, "font.family": "sans-serif"})
     trial = walk(walking_subject())
     for name, draw in (("frames", frames), ("residual", residual), ("window", window)):
         figure = draw(trial)
@@ -37,7 +37,7 @@ def main() -> None:
 
 def frames(trial: SyntheticTrial) -> plt.Figure:
     """Ground axes and segment frames, from the side and from the front."""
-    figure, views = plt.subplots(1, 2, figsize=(7.4, 6.2), sharey=True, gridspec_kw={"width_ratios": [1, 1]})
+    figure, views = plt.subplots(1, 2, figsize=(6.4, 5.6), sharey=True, gridspec_kw={"width_ratios": [1, 1]})
     q = np.zeros((1, len(trial.skeleton.coordinates)))
     q[0, 1] -= trial.skeleton.marker_positions(trial.skeleton.pose(q))[..., 1].min() - 0.03
     pose = trial.skeleton.pose(q)
@@ -52,7 +52,7 @@ def frames(trial: SyntheticTrial) -> plt.Figure:
         axes.set_title(title)
         axes.axhline(0.0, color="#bbbbbb", linewidth=1.0, zorder=0)
         _plain(axes)
-    raised = {"forearm_r": 0.07, "torso": 0.05, "pelvis": -0.01, "thigh_r": -0.03}
+    raised = {"forearm_r": 0.09, "torso": 0.06, "pelvis": -0.01, "thigh_r": -0.03}
     for segment in ("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "upper_arm_r", "forearm_r"):
         at = _place(trial, pose, 0, trial.skeleton.segments.index(segment))[:3, 3]
         line = {"arrowstyle": "-", "color": "#cccccc", "linewidth": 0.7}
@@ -64,7 +64,7 @@ def frames(trial: SyntheticTrial) -> plt.Figure:
 
 def residual(trial: SyntheticTrial) -> plt.Figure:
     """One frame with ground reactions, weight and the residual."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.6))
+    figure, axes = plt.subplots(figsize=(5.6, 4.2))
     frame = int(np.argmin(np.abs(trial.foot_loads[:, 0, 1] - trial.foot_loads[:, 1, 1])))
     pose = trial.skeleton.pose(trial.motion.q)
     _bones(axes, trial, pose, frame, SIDE)
@@ -88,7 +88,7 @@ def residual(trial: SyntheticTrial) -> plt.Figure:
 
 def window(trial: SyntheticTrial) -> plt.Figure:
     """Which frames count: ground contact, contact on a plate, and what is left."""
-    figure, axes = plt.subplots(figsize=(7.4, 2.4))
+    figure, axes = plt.subplots(figsize=(6.2, 2.3))
     ground = {"right foot": [(0.268, 1.023), (1.412, 2.167)], "left foot": [(0.0, 0.47), (0.836, 1.589), (1.96, 2.37)]}
     plate = {"right foot": [(0.268, 1.023), (1.412, 2.167)], "left foot": [(0.836, 1.589)]}
     for row, name in enumerate(("right foot", "left foot")):
