@@ -10,6 +10,7 @@ from kinertia.observation import (
     FORCE_SD_OF_WEIGHT,
     MOMENT_ARM_M,
     SMALLEST_MARKER_SD_M,
+    _correlation_frames,
     observe,
 )
 from kinertia.skeleton import GRAVITY_M_S2
@@ -124,3 +125,13 @@ def test_markers_off_their_places_are_not_noise(trial):
     )
     (right, _), (wrong, _) = (observe(skeleton, kinematics, MASS_KG, 10.0) for skeleton in (trial.skeleton, moved))
     np.testing.assert_allclose(wrong.marker_sd, right.marker_sd, rtol=1e-6)
+
+
+def test_noise_that_comes_back_with_every_stride_says_nothing_new():
+    rng = np.random.default_rng(0)
+    stride = np.cumsum(rng.normal(size=(60, 30)), axis=0)
+    stride -= np.linspace(0, 1, 60)[:, None] * (stride[-1] - stride[0]) + stride.mean(axis=0)
+    once, often = (_correlation_frames(np.tile(stride, (count, 1))) for count in (2, 8))
+    assert often == pytest.approx(4.0 * once, rel=0.35)
+    white = rng.normal(size=(480, 30))
+    assert _correlation_frames(white) == pytest.approx(1.0, abs=0.1)

@@ -29,6 +29,8 @@ MOMENT_ARM_M = 0.3
 """Deviation of the root moment over that of the force."""
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0
+_UNLIKE, _REPEATING = 0.05, 0.3
+"""Autocorrelations below which errors count as unlike, and above which they count as coming back."""
 
 
 @dataclass(frozen=True)
@@ -134,12 +136,22 @@ def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
 
 
 def _correlation_frames(errors: np.ndarray) -> float:
-    """Integrated autocorrelation of the columns (n, k), in frames: 1 for white noise."""
+    """Over how many frames the columns (n, k) err alike, by their autocorrelation: 1 for white noise.
+
+    Errors near in time are alike, and those of gait come back with every stride: a tenth stride says no more than the
+    ones before it. The correlation length is multiplied by the number of strides that repeat one another.
+    """
     power = np.square(errors).sum()
-    total = 1.0
-    for lag in range(1, len(errors) // 2):
-        alike = float((errors[lag:] * errors[:-lag]).sum() / power) if power > 0 else 0.0
-        if alike < 0.05:
-            break
-        total += 2.0 * alike
-    return total
+    if not power > 0:
+        return 1.0
+    n = len(errors)
+    spectrum = np.square(np.abs(np.fft.rfft(errors, 2 * n, axis=0))).sum(axis=1)
+    alike = np.fft.irfft(spectrum)[:n] / power
+    apart = int(np.argmax(alike < _UNLIKE)) or n
+    near = 1.0 + 2.0 * float(alike[1 : min(apart, n // 2)].sum())
+    per_pair = alike * n / (n - np.arange(n))
+    later = np.arange(apart, 2 * n // 3)
+    if not later.size or per_pair[later].max() < _REPEATING:
+        return near
+    period = int(later[np.argmax(per_pair[later])])
+    return near * (1.0 + 2.0 * float(np.maximum(alike[period::period], 0.0).sum()))
