@@ -25,6 +25,8 @@ FRAME_SPACING_S = 0.1
 _MAX_FRAMES = 60
 _STEPS = 15
 _TOLERANCE_M = 1e-5
+_ENOUGH_M2 = 1e-6
+"""Which coordinates markers show does not ask for a pose better than a millimetre."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def hold_uninformed(
     """
     never = []
     for trial in trials:
-        ik = solve_ik(skeleton, sampled(trial.markers), trial.name)
+        ik = solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2)
         shown = np.isfinite(ik.q).any(axis=0)
         never.append([name for name, known in zip(ik.coordinates, shown, strict=True) if not known])
     held = [name for name in skeleton.coordinates if all(name in names for names in never) and name in may_hold]

@@ -16,7 +16,7 @@ from kinertia.ik import solve_ik
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Markers
 
-_FRAMES = 5
+_FRAMES = 3
 _ENOUGH_M2 = 1e-6
 """Errors of centimetres are compared: fits that would gain less than the square of a millimetre may stop."""
 _SUSPECT_M = 0.025
@@ -72,7 +72,7 @@ def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
 
 def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, tuple[str, ...], np.ndarray]:
     """The skeleton without coordinates that the trial never shows, labels, and (f, m, 3) markers of a few frames."""
-    ik = solve_ik(skeleton, markers, name)
+    ik = solve_ik(skeleton, markers, name, gain_tolerance_m2=_ENOUGH_M2)
     known = np.isfinite(ik.q)
     never = [c for c, shown in zip(ik.coordinates, known.any(axis=0), strict=True) if not shown]
     known = known[:, known.any(axis=0)]
