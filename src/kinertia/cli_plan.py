@@ -13,10 +13,9 @@ from kinertia import __version__
 from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.crossval import HeldOut, cross_validate
-from kinertia.inputs import read_inputs
+from kinertia.inputs import read_prepared
 from kinertia.io.folder import complete_folder
 from kinertia.plan import Plan, plan_measured, plan_synthetic
-from kinertia.prepare import prepare
 from kinertia.terminal import out, plain_table, shown_progress
 
 
@@ -44,9 +43,8 @@ def plan(
             found = plan_synthetic()
         else:
             wanted = read_subject(subject)
-            static, inputs, marker_set = read_inputs(wanted, progress)
-            ready = prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
-            found = plan_measured(ready.skeleton, ready.prior, ready.kinematics, wanted.settings.cutoff_hz)
+            ready, cutoff_hz = read_prepared(wanted, progress), wanted.settings.cutoff_hz
+            found = plan_measured(ready.skeleton, ready.prior, ready.kinematics, cutoff_hz, ready.freedom)
     _report_plan(found)
     with complete_folder(output) as work:
         found.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
@@ -86,8 +84,7 @@ def crossval(
     results_folder(output, force)
     wanted = read_subject(subject)
     with shown_progress() as progress:
-        static, inputs, marker_set = read_inputs(wanted, progress)
-        found = cross_validate(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
+        found = cross_validate(read_prepared(wanted, progress), wanted.settings.cutoff_hz, progress)
     _report_crossval(found)
     with complete_folder(output) as work:
         told = json.dumps({"kinertia": __version__, "held_out": [asdict(held) for held in found]}, indent=2)

@@ -8,7 +8,6 @@ compared with that of the literature's parameters, frozen in the same way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,15 +15,11 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
-from kinertia.config import Settings, Subject
 from kinertia.dynamics import residual
 from kinertia.errors import KinertiaError
 from kinertia.kinematics import Kinematics
-from kinertia.marker_set import MarkerSet
-from kinertia.prepare import Progress, TrialInput, prepare
+from kinertia.prepare import Prepared, Progress
 from kinertia.simultaneous_fit import fit_simultaneous
-from kinertia.skeleton import Skeleton
-from kinertia.trial import Recording
 
 _FROZEN = 1e-3
 """Deviation that is left to frozen parameters, share of the prior's."""
@@ -57,36 +52,33 @@ class HeldOut:
 
 
 def cross_validate(
-    subject: Subject,
-    static: Recording,
-    inputs: Sequence[TrialInput],
-    settings: Settings | None = None,
-    marker_set: MarkerSet | None = None,
-    progress: Progress = lambda stage, share: None,
+    ready: Prepared, cutoff_hz: float | str, progress: Progress = lambda stage, share: None
 ) -> tuple[HeldOut, ...]:
-    """Hold out every trial in turn; the arguments are those of `estimate_bsp`.
+    """Hold out every trial in turn.
 
     The skeleton is calibrated on all trials at once, for both sets of parameters alike.
 
+    Args:
+        ready: the person, with two trials or more.
+        cutoff_hz: as `fit_simultaneous` has it.
+        progress: called as the work goes on.
+
     Raises:
-        KinertiaError: there are fewer than two trials, or something cannot be used.
+        KinertiaError: there are fewer than two trials.
     """
-    if len(inputs) < 2:
+    trials = ready.kinematics
+    if len(trials) < 2:
         raise KinertiaError(
-            f"cross-validation needs at least two trials, one to hold out; the subject has {len(inputs)}; add a "
+            f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
             "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
         )
     with threadpool_limits(limits=1, user_api="blas"):
-        ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress)
-        cutoff = (settings or Settings()).cutoff_hz
         found = []
-        for k, held in enumerate(ready.kinematics):
-            progress("held out", k / len(ready.kinematics))
-            others = [other for other in ready.kinematics if other is not held]
-            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff).result.bsp
-            explained = (
-                _explained(ready.skeleton, ready.prior, bsp, held, cutoff) for bsp in (ready.prior.mean, estimate)
-            )
+        for k, held in enumerate(trials):
+            progress("held out", k / len(trials))
+            others = [other for other in trials if other is not held]
+            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff_hz, ready.freedom).result.bsp
+            explained = (_explained(ready, bsp, held, cutoff_hz) for bsp in (ready.prior.mean, estimate))
             found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(found)
 
@@ -96,13 +88,11 @@ def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
     return replace(prior, mean=bsp, covariance=_FROZEN**2 * prior.covariance, mass_kg=bsp.total_mass_kg)
 
 
-def _explained(
-    skeleton: Skeleton, prior: BspPrior, bsp: BodySegmentParameters, held: Kinematics, cutoff: float | str
-) -> Explained:
-    fitted = fit_simultaneous(skeleton, frozen(prior, bsp), [held], cutoff)
+def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, cutoff_hz: float | str) -> Explained:
+    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], cutoff_hz, ready.freedom)
     (motion,), (loads,) = fitted.motions, fitted.foot_loads
-    left = residual(fitted.result.skeleton, fitted.result.bsp, motion, loads.sum(axis=1))
-    model = fitted.result.skeleton
+    model = fitted.skeleton
+    left = residual(model, fitted.bsp, motion, loads.sum(axis=1))
     modelled = model.marker_positions(model.pose(motion.q))
     away = held.trial.markers.arranged(model.labels)[held.frames] - modelled
     force, moment = np.square(left).reshape(-1, 2, 3).sum(axis=2).T

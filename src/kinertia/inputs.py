@@ -8,9 +8,11 @@ from pathlib import Path
 
 from kinertia.config import SubjectFile
 from kinertia.errors import SettingsError
+from kinertia.io.osim import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import MarkerSet, read_marker_set
-from kinertia.prepare import Progress, TrialInput
+from kinertia.osim_prepare import prepare_osim
+from kinertia.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.trial import Recording
 
 
@@ -25,6 +27,19 @@ def read_inputs(
     static = read_recording(_static(wanted))
     marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
     return static, read_trials(wanted, progress), marker_set
+
+
+def read_prepared(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> Prepared:
+    """All that an estimator needs of the person: everything read, calibrated, solved and smoothed.
+
+    Raises:
+        KinertiaError: a file is missing or broken, or something in it cannot be used.
+    """
+    if wanted.model.osim is not None:
+        model, trials = read_osim(wanted.model.osim), read_trials(wanted, progress)
+        return prepare_osim(wanted.subject, model, trials, wanted.settings, wanted.model.calibrate, progress)
+    static, inputs, marker_set = read_inputs(wanted, progress)
+    return prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
 
 
 def _static(wanted: SubjectFile) -> Path:

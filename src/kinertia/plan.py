@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 from kinertia.bsp import PARAMETERS, UNITS
 from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.disturbed import Faults, measured
+from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import evidence
 from kinertia.kinematics import Kinematics
 from kinertia.observation import CUTOFF_HZ, observe
@@ -71,14 +72,21 @@ class Plan:
         )
 
 
-def plan_measured(skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], cutoff_hz: float | str) -> Plan:
+def plan_measured(
+    skeleton: Skeleton,
+    prior: BspPrior,
+    trials: Sequence[Kinematics],
+    cutoff_hz: float | str,
+    freedom: Freedom = GAIT27_FREEDOM,
+) -> Plan:
     """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
+    used = used.carrying(freedom.held)
     with threadpool_limits(1):
-        seen = [observe(used, k, prior.mass_kg, cutoff)[0] for k in trials]
-        told = Information.at(used, prior, calibration_prior(used), seen, 1.0 / (2.0 * cutoff))
+        seen = [observe(used, k, prior.mass_kg + freedom.held_kg, cutoff)[0] for k in trials]
+        told = Information.at(used, prior, calibration_prior(used, freedom), seen, 1.0 / (2.0 * cutoff))
         names = [k.trial.name for k in trials]
         sets: list[tuple[int, ...]] = [(k,) for k in range(len(trials))]
         sets += [
