@@ -1,7 +1,10 @@
 """`kinertia check` as a user runs it."""
 
+import os
 import re
 import shutil
+import subprocess
+import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -235,3 +238,54 @@ def test_every_measured_file_gets_an_answer(shared_data):
         else:
             assert ("against: " in outcome.out) == (outcome.status == 1)
     assert seen == {0, 1, 2}
+
+
+def test_subject_file_with_a_model(shared_data, tmp_path):
+    """The markers are the model's: as for `kinertia fit`, no preset is asked for."""
+    data = shared_data / "subject4"
+    (tmp_path / "subject.toml").write_text(
+        f'[subject]\nname = "four"\nmass_kg = 60.0\n[model]\nosim = "{data / "addbiomechanics_scaled.osim"}"\n'
+        f'[[trial]]\nmarkers = "{data / "walking1.trc"}"\nforces = "{data / "walking1_grf.mot"}"\n'
+        f'loads = "{data / "walking1_external_forces.xml"}"\n'
+    )
+    told = text(run("check", tmp_path / "subject.toml"))
+    assert re.search(r"marker set addbiomechanics_scaled\.osim: \d+ of its \d+ labels", told)
+    assert "no marker set fits" not in told
+    assert "unknown foot" not in told
+    assert "good: every foot on the ground stands on a plate from" in told
+
+
+def test_model_of_other_markers_in_a_subject_file(lab, shared_data):
+    """None shared is against; none in the model is a mistake, as it is to a fit."""
+    model = shared_data / "subject4" / "addbiomechanics_scaled.osim"
+    body = f'[[trial]]\nmarkers = "{lab / "other.trc"}"\nforces = "{lab / "walk_grf.mot"}"\n'
+    (lab / "s.toml").write_text(f'[subject]\nname = "s"\nmass_kg = 72.6\n[model]\nosim = "{model}"\n{body}')
+    labels = (lab / "walk.trc").read_text().splitlines(keepends=True)
+    head = labels[3].split("\t")
+    labels[3] = "\t".join([*head[:2], *(f"x{name}" if name.strip() else name for name in head[2:])])
+    (lab / "other.trc").write_text("".join(labels))
+    outcome = run("check", lab / "s.toml")
+    assert outcome.status == 1, outcome.err
+    assert "against: no label of the model addbiomechanics_scaled.osim is in the file" in text(outcome)
+    bare, count = re.subn(r"<MarkerSet.*?</MarkerSet>", "", model.read_text(), flags=re.DOTALL)
+    assert count == 1
+    (lab / "bare.osim").write_text(bare)
+    (lab / "s.toml").write_text((lab / "s.toml").read_text().replace(str(model), str(lab / "bare.osim")))
+    outcome = run("check", lab / "s.toml")
+    assert outcome.status == 2
+    assert "no markers in it" in outcome.err
+
+
+@pytest.mark.parametrize(("mass", "status"), [("72.6", 0), ("90", 1)])
+def test_nobody_reads_on(lab, mass, status):
+    """As with `| head`: the page is there, and the status is the check's."""
+    files = [str(lab / name) for name in ("walk.trc", "walk_grf.mot")]
+    command = [sys.executable, "-c", "from kinertia.cli import main; main()", "check", *files, "--mass", mass]
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        ended = subprocess.run([*command, "-o", str(lab / "out")], stdout=write, stderr=subprocess.PIPE, text=True)
+    finally:
+        os.close(write)
+    assert (ended.returncode, ended.stderr) == (status, "reading\n")
+    assert "the scale says" in (lab / "out" / "check.html").read_text()

@@ -6,10 +6,13 @@ import numpy as np
 
 from kinertia.anthropometry import BodyGeometry, literature_bsp, reference_lengths
 from kinertia.bsp import BodySegmentParameters
-from kinertia.skeleton import Axis, Joint, Skeleton
+from kinertia.joint_centres import lumbar_in_pelvis
+from kinertia.skeleton import Axis, Joint, Marker, Skeleton
 
 MASS_KG, HEIGHT_M, SEX = 75.0, 1.77, "male"
-LUMBAR, MID_HIP = (-0.10, 0.08, 0.0), (-0.065, -0.075, 0.0)
+WIDTH_M = (0.085 - 0.0073) / 0.33  # of a pelvis with the hips at 0.085 m, by Harrington
+MID_HIP = (-0.19 * WIDTH_M, -0.30 * WIDTH_M - 0.0109, 0.0)
+LUMBAR = tuple(lumbar_in_pelvis(WIDTH_M, SEX).tolist())
 BODIES = {
     **{"pelvis": "pelvis", "torso": "torso"},
     **{f"{part}_{side}": f"{body}_{side}" for side in "rl" for part, body in [
@@ -27,10 +30,10 @@ def literature(source: str = "dumas") -> BodySegmentParameters:
     return literature_bsp(MASS_KG, HEIGHT_M, SEX, geometry(), source)
 
 
-def skeleton(arms: bool = True, turned: np.ndarray | None = None) -> Skeleton:
-    """Upright at zero; `turned` (3, 3) sets the femurs' own frames askew, as models may have them."""
+def skeleton(arms: bool = True, turned: np.ndarray | None = None, lumbar_up_m: float = 0.0) -> Skeleton:
+    """Upright at zero; `turned` (3, 3) sets the femurs' own frames askew, `lumbar_up_m` the joint above L5/S1."""
     lengths = geometry().lengths_m
-    joints = [_joint("ground", "pelvis", (0, 0, 0)), _joint("pelvis", "torso", LUMBAR)]
+    joints = [_joint("ground", "pelvis", (0, 0, 0)), _joint("pelvis", "torso", np.add(LUMBAR, (0, lumbar_up_m, 0)))]
     for side, sign in (("r", 1), ("l", -1)):
         foot = lengths[f"foot_{side}"]
         hip = Joint("pelvis", f"femur_{side}", np.eye(3), np.add(MID_HIP, (0, 0, sign * 0.085)),
@@ -49,7 +52,7 @@ def skeleton(arms: bool = True, turned: np.ndarray | None = None) -> Skeleton:
                 _joint(f"humerus_{side}", f"ulna_{side}", (0, -lengths[f"upper_arm_{side}"], 0)),
                 _joint(f"ulna_{side}", f"hand_{side}", (0, -lengths[f"forearm_{side}"], 0)),
             ]
-    return Skeleton("upright", tuple(joints), ())
+    return Skeleton("upright", tuple(joints), (Marker("S", "pelvis", np.zeros(3)),))
 
 
 def _joint(parent: str, child: str, place: object, rotation: np.ndarray | None = None) -> Joint:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -19,7 +20,7 @@ from kinertia.io.osim import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.marker_set import MarkerSet, read_marker_set
 from kinertia.model_check import ModelCheck, check_model
-from kinertia.recording_check import RecordingCheck, check_recording, common_marker_set
+from kinertia.recording_check import RecordingCheck, check_recording, common_marker_set, markers_of_model
 from kinertia.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.terminal import out, plain_table, show_error, show_verdicts, shown_progress
 from kinertia.trial import Recording
@@ -98,7 +99,11 @@ def check(
     measured = [path for path in files if path.suffix.lower() != ".osim"]
     recordings, more = _check_recordings(measured, loads, None if markers is None else read_marker_set(markers), mass)
     mistakes += more
-    _show(recordings, models, mistakes, output, verbose)
+    page = None if output is None else save_check_page(recordings, models, mistakes, output)
+    with suppress(SystemExit):  # rich's, where nobody reads on (| head)
+        _show(recordings, models, page, verbose)
+    for mistake in mistakes:
+        show_error(mistake)
     if mistakes:
         raise typer.Exit(2)
     judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
@@ -108,19 +113,16 @@ def check(
 def _show(
     recordings: Sequence[tuple[str, RecordingCheck]],
     models: Sequence[tuple[str, ModelCheck]],
-    mistakes: Sequence[str],
-    output: Path | None,
+    page: Path | None,
     verbose: bool,
 ) -> None:
-    """Everything on the terminal, and as a page if there is a folder for it."""
+    """Everything on the terminal."""
     for title, recording in recordings:
         _show_recording(title, recording, verbose)
     for title, model in models:
         _show_model(title, model)
-    if output is not None:
-        out.print(f"page in {save_check_page(recordings, models, mistakes, output)}", soft_wrap=True)
-    for mistake in mistakes:
-        show_error(mistake)
+    if page is not None:
+        out.print(f"page in {page}", soft_wrap=True)
 
 
 def _check_models(
@@ -205,6 +207,8 @@ def _of_subject(subject: SubjectFile) -> tuple[list[_Files], MarkerSet | None, f
     named = subject.model.markers
     trials = [_Files(trial.markers, trial.forces, trial.loads, trial.window_s) for trial in subject.trials]
     marker_set = None if named is None else read_marker_set(named)
+    if subject.model.osim is not None:
+        marker_set = markers_of_model(read_osim(subject.model.osim))
     static = [] if subject.model.static is None else [_Files(subject.model.static)]
     return [*static, *trials], marker_set, subject.subject.mass_kg
 

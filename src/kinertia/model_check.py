@@ -131,8 +131,17 @@ def check_model(
         _symmetry(odd),
         *_arms_in_torso(segments),
         *outliers,
+        *_markers(skeleton),
     ]
     return ModelCheck(skeleton.name, bsp, segments, literature, not odd, tuple(found), tuple(left_out))
+
+
+def _markers(skeleton: Skeleton) -> list[Verdict]:
+    """A fit needs the model's markers, a simulation does not."""
+    if skeleton.markers:
+        return []
+    advice = "kinertia fit refuses it; scale the model with OpenSim's Scale tool, which places them"
+    return [Verdict("okay", f"no markers in the model: {advice}")]
 
 
 def _has_arms(segments: ModelSegments) -> bool:
@@ -142,8 +151,13 @@ def _has_arms(segments: ModelSegments) -> bool:
 def _cells(row: np.ndarray) -> tuple[str, ...]:
     """Mass, CoM (mm) and moments of a row of the table of body segment parameters."""
     com = (f"{round(value * 1e3)}" if np.isfinite(value) else "-" for value in row[1:4])
-    told = [f"{row[0]:.2f}", *com, *(f"{value:.4f}" for value in row[4:7])]
+    told = [f"{row[0]:.2f}", *com, *map(_moment, row[4:7])]
     return tuple("-" if np.isnan(value) else text for text, value in zip(told, row, strict=False))
+
+
+def _moment(value: float) -> str:
+    """A moment of inertia (kg m2), those of small bodies to two digits."""
+    return f"{value:.4f}" if abs(value) >= 1e-3 else f"{value:.2g}"
 
 
 def _literature(
@@ -185,10 +199,13 @@ def _outliers(
 
 def _against_literature(k: int, value: float, low: float, high: float) -> str:
     name = PARAMETERS[k]
-    unit, factor, form = ("mm", 1e3, ".0f") if name.startswith("com") else ("kg m2", 1.0, ".4f")
     if name == "mass":
-        unit, form = "kg", ".2f"
-    return f"{name} {value * factor:{form}} {unit} (literature {low * factor:{form}} to {high * factor:{form}})"
+        unit, told = "kg", [f"{one:.2f}" for one in (value, low, high)]
+    elif name.startswith("com"):
+        unit, told = "mm", [f"{one * 1e3:.0f}" for one in (value, low, high)]
+    else:
+        unit, told = "kg m2", [_moment(one) for one in (value, low, high)]
+    return f"{name} {told[0]} {unit} (literature {told[1]} to {told[2]})"
 
 
 def _possible(bsp: BodySegmentParameters) -> list[Verdict]:

@@ -1,7 +1,8 @@
 """A model's bodies put together as the segments of the anthropometric tables, in ISB axes, so that both compare.
 
 Bodies are told by their names (femur, tibia, ...; sides by `_r` and `_l`), segments are cut at the model's joint
-centres, in its pose at zero, which is upright in the models that OpenSim users have.
+centres, in its pose at zero, which is upright in the models that OpenSim users have. Pelvis and torso meet where the
+tables mean it, at L5/S1; the joint between them stands centimetres higher in many models.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from kinertia.anthropometry import SEGMENTS, BodyGeometry, reference_lengths
 from kinertia.bsp import BodySegmentParameters, FloatArray, combine
-from kinertia.joint_centres import frame
+from kinertia.joint_centres import frame, hip_in_pelvis, lumbar_in_pelvis
 from kinertia.skeleton import Joint, Skeleton
 
 _WORDS = {
@@ -67,11 +68,14 @@ def model_segments(
 
     Args:
         skeleton, bsp: of the model.
-        height_m, sex: for lengths that the model's joints do not tell (the torso's up to the neck, the foot's).
+        height_m, sex: for lengths that the model's joints do not tell (the torso's up to the neck, the foot's);
+            sex also for L5/S1.
     """
     pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
     place = {name: (pose.rotation[0, i], pose.translation[0, i]) for i, name in enumerate(skeleton.segments)}
     centres, main = _joint_centres(skeleton, place)
+    if "lumbar" in centres and {"hip_r", "hip_l"} <= set(centres):
+        centres["lumbar"] = _l5s1(centres["hip_r"], centres["hip_l"], _pelvis_rotation(place), sex)
     masses = dict(zip(bsp.segments, bsp.mass_kg, strict=True))
     bodies: dict[str, tuple[str, ...]] = {}
     tables = []
@@ -118,6 +122,24 @@ def _joint_centres(skeleton: Skeleton, place: Mapping[str, Place]) -> tuple[dict
         elif joint.child.lower().startswith("hand"):
             centres.setdefault("wrist" + side, _centre(joint, place))
     return centres, main
+
+
+def _pelvis_rotation(place: Mapping[str, Place]) -> FloatArray:
+    return next((rotation for body, (rotation, _) in place.items() if segment_of(body) == "pelvis"), np.eye(3))
+
+
+def _l5s1(hip_r: FloatArray, hip_l: FloatArray, pelvis: FloatArray, sex: str) -> FloatArray:
+    """L5/S1 in ground over the mid hip, as the 27-DOF model has it for a pelvis with hips this far apart.
+
+    Pelvis width and height by Harrington et al. (2007); fore and aft by Bell et al. (1990), as Harrington's needs the
+    depth of the pelvis, which a model does not tell.
+    """
+    at_zero, at_one = (hip_in_pelvis(width, 0.0, "harrington", "r")[2] for width in (0.0, 1.0))
+    width = (float(np.linalg.norm(hip_r - hip_l)) / 2 - at_zero) / (at_one - at_zero)
+    x = hip_in_pelvis(width, 0.0, "bell", "r")[0]
+    y = hip_in_pelvis(width, 0.0, "harrington", "r")[1]
+    rise = lumbar_in_pelvis(width, sex) - np.array([x, y, 0.0])
+    return np.asarray((hip_r + hip_l) / 2 + pelvis @ rise)
 
 
 def _centre(joint: Joint, place: Mapping[str, Place]) -> FloatArray:

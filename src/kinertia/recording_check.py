@@ -10,12 +10,14 @@ import numpy as np
 
 from kinertia.checks import CONTRADICTING_MASS, FORCE_MASS_TOLERANCE
 from kinertia.contacts import build_trial
-from kinertia.errors import KinertiaError, MarkerSetError, TrialError
+from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
 from kinertia.gait27 import build_gait27
 from kinertia.ground_contact import FootMarkers
+from kinertia.io.osim import OsimModel
 from kinertia.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
 from kinertia.marker_check import Travel, Visibility, axes_trouble, extent_m, travel, visibility
 from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set, nearest_labels, nearest_preset
+from kinertia.model_segments import segment_of
 from kinertia.plate_check import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.trial import Markers, Recording, Trial
 from kinertia.verdict import Verdict
@@ -36,6 +38,7 @@ class MarkerSetMatch:
         missing: labels of the set that the recording lacks, each with those of `others` that look most alike.
         n_labels: of the set.
         others: labels of the recording that are not in the set and stay unused.
+        of_model: whether the set is the markers of an OpenSim model.
     """
 
     name: str
@@ -43,6 +46,7 @@ class MarkerSetMatch:
     missing: dict[str, list[str]]
     n_labels: int
     others: tuple[str, ...]
+    of_model: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +121,7 @@ def check_recording(
 
     Args:
         recording: markers, and forces where there are any.
-        marker_set: the laboratory's; found among the presets if None.
+        marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
         mass_kg: by the scale; the file's own if None.
         window_s: the stretch that the user vouches for.
     """
@@ -130,8 +134,10 @@ def check_recording(
     found, feet = [*_axes(own), *_labels(match)], None
     if used is not None:
         feet, trouble = _feet(recording.markers.labels, used)
-        found += [*trouble, *_facing(recording.markers, used, moves)]
-        found += _static(recording, used) if standing else []
+        found += trouble
+        if used.landmarks:
+            found += _facing(recording.markers, used, moves)
+            found += _static(recording, used) if standing else []
     plates = check_plates(recording, feet)
     trial, notes, told = _trial(recording, feet, window_s, standing)
     windows = () if trial is None else tuple(trial.windows())
@@ -150,6 +156,21 @@ def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
     return None
 
 
+def markers_of_model(model: OsimModel) -> MarkerSet:
+    """The markers of an OpenSim model by segment, without landmarks: no model is built from them.
+
+    Raises:
+        OsimError: there are none.
+    """
+    markers = model.skeleton.markers
+    if not markers:
+        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
+    names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
+    segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}
+    return MarkerSet(model.path.name, {}, segments, {})
+
+
 def _match(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:
     """How the labels fit the set, or the nearest preset; and the set if it is theirs."""
     wanted = nearest_preset(labels) if marker_set is None else marker_set
@@ -157,13 +178,17 @@ def _match(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerS
     try:
         if marker_set is None:
             choose_marker_set(labels)
-        else:
+        elif marker_set.landmarks:
             check_marker_set(marker_set, labels)
+        elif not set(marker_set.labels) & set(labels):
+            used = None
     except MarkerSetError:
         used = None
     others = tuple(label for label in labels if label not in wanted.labels)
     missing = nearest_labels([label for label in wanted.labels if label not in labels], others)
-    return MarkerSetMatch(wanted.name, used is not None, missing, len(wanted.labels), others), used
+    return MarkerSetMatch(
+        wanted.name, used is not None, missing, len(wanted.labels), others, not wanted.landmarks
+    ), used
 
 
 def _axes(markers: Markers) -> list[Verdict]:
@@ -175,6 +200,8 @@ def _labels(match: MarkerSetMatch) -> list[Verdict]:
     had = match.n_labels - len(match.missing)
     if match.fits:
         return [Verdict("good", f"{had} of the {match.n_labels} labels of the marker set {match.name} are there")]
+    if match.of_model:
+        return [Verdict("against", f"no label of the model {match.name} is in the file; expected its markers' names")]
     nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are there"
     nearest = nearest if had else "no preset shares a label with the file"
     return [
@@ -223,10 +250,11 @@ def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | N
     """Labels on each foot, None unless both have one; and what else a fit would refuse for want of markers."""
     feet = {side: [label for label in own if label in labels] for side, own in marker_set.foot_labels().items()}
     arms = ("upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l")
+    needed = set(marker_set.segments) - set(arms) if marker_set.landmarks else {"foot_r", "foot_l"}
     bare = [
         segment
         for segment, own in marker_set.segments.items()
-        if segment not in arms and own and not set(own) & set(labels)
+        if segment in needed and (own or not marker_set.landmarks) and not set(own) & set(labels)
     ]
     found = []
     if bare:
