@@ -52,9 +52,9 @@ class Posterior:
 
     @property
     def information(self) -> np.ndarray:
-        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything."""
-        known = self.prior_sd > 0  # segments that are held have no deviation
-        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), 0.0)
+        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything; NaN for segments held."""
+        known = self.prior_sd > 0
+        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), np.nan)
 
 
 @dataclass(frozen=True, eq=False)
