@@ -107,7 +107,7 @@ def assert_targets(folder: Path) -> None:
     bsp = pd.read_csv(folder / "bsp.csv").query("prior_sd > 0")
     far = bsp[(bsp["estimate"] - bsp["literature"]).abs() > 3 * bsp["prior_sd"]]
     for _, row in far.iterrows():
-        named = f"{row['parameter']} of {row['segment']} is"
+        named = f"{row['parameter']} of {row['segment']} "
         assert any("contradict" in warning and named in warning for warning in told["warnings"]), named
 
 

@@ -99,13 +99,13 @@ def test_standing_feet_stay():
     assert np.abs(turned - turned[0]).max() < 0.35
 
 
-def test_fast_walk_shows_more_than_walking_and_squats_alone_little():
+def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
     found = plan_synthetic()
     mean = {names: found.information(names).mean() for names in found.sd}
-    assert mean["fast walk",] > mean["walk",] > mean["squat",]
+    assert min(mean["walk",], mean["fast walk",]) > mean["squat",]
     best = [names for names in found.sd if len(names) == 3]
     assert len(best) == 1
-    assert mean[best[0]] > mean["fast walk",]
+    assert mean[best[0]] > max(mean[name,] for name in best[0])
 
 
 def test_command(tmp_path):

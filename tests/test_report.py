@@ -7,6 +7,7 @@ import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -17,9 +18,10 @@ from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject
 from kinertia.dynamics import Motion
 from kinertia.provenance import provenance_of
-from kinertia.report.page import MOST_TRIALS, render
+from kinertia.report.page import MOST_TRIALS, bsp_rows, render
 from kinertia.report.verdict import words
-from kinertia.trial import FootLoads
+from kinertia.report.wording import fixed
+from kinertia.trial import FootLoads, Markers, PlateLoads, Recording
 from kinertia.verdict import verdicts
 from report_page import Elements, figures_of
 
@@ -81,14 +83,66 @@ def test_what_the_data_told_is_counted(fit, two_level):
     told = words(replace(fit, posterior=replace(fit.posterior, sd=sd))).knowledge
     assert "measured 10 " in told[0]
     assert "informed 10;" in told[0]
-    assert "100 are assumed" in told[0]
+    assert "100 are hardly informed" in told[0]
+    assert "from the literature" in told[0]
     assert told[1:4] == (
         "masses measured: pelvis",
         "masses informed by the data: torso",
-        "masses assumed, not to be read as this person's: thigh; shank; foot; upper arm; forearm",
+        "masses hardly informed by the data, not to be read as this person's: thigh; shank; foot; upper arm; forearm",
     )
+    assert told[4].startswith("17 combinations no motion ever shows")
     (only,) = words(two_level).knowledge
     assert "no error bars" in only
+
+
+@pytest.fixture(scope="module")
+def of_model(fit):
+    """The demo's fit as if its forearms were held and its start an OpenSim model's."""
+    rows = [fit.estimate.segments.index(name) for name in ("forearm_r", "forearm_l")]
+    prior_sd, sd = fit.posterior.prior_sd.copy(), fit.posterior.sd.copy()
+    prior_sd[rows] = sd[rows] = 0.0
+    table = fit.estimate.table().copy()
+    table[rows] = fit.literature.table()[rows]
+    estimate = BodySegmentParameters.from_table(fit.estimate.segments, table)
+    return replace(
+        fit, estimate=estimate, posterior=replace(fit.posterior, prior_sd=prior_sd, sd=sd), file=SimpleNamespace()
+    )
+
+
+def test_held_segments_are_named_and_not_counted(of_model):
+    told = words(of_model).knowledge
+    assert told[0].startswith("of 100 parameters")
+    assert "kept as the model has them, not estimated: forearm" in told
+    assert not any("forearm" in sentence for sentence in told if sentence.startswith("masses"))
+    page = render(of_model)
+    figures = figures_of(page)
+    for axis in ("yaxis", "yaxis2"):
+        assert not any("forearm" in name for name in figures["bsp-intervals"]["layout"][axis]["ticktext"])
+    assert len(figures["bsp-information"]["data"][0]["y"]) == 10
+    assert "Kept as the model has them" in Elements(page).text
+    held = [row for row in bsp_rows(of_model) if row["segment"].startswith("forearm")]
+    assert len(held) == 20
+    assert {row["evidence"] for row in held} == {"held"}
+
+
+def test_start_is_called_what_it_is(fit, of_model):
+    for one, word in ((fit, "literature values"), (of_model, "the model's own values")):
+        assert any(word in (trace.name or "") for trace in one.plot.residuals().data)
+        assert any(word in (trace.name or "") for trace in one.plot.moments().data)
+    assert "literature" not in Elements(render(replace(of_model, warnings=(), notes=()))).text.lower()
+
+
+def test_numbers_in_the_table_have_the_digits_of_their_unit(fit):
+    for row in bsp_rows(fit):
+        texts = [row[name]["text"] for name in ("before", "estimate", "prior_sd", "sd")]
+        assert not any("e" in text or (text.startswith("-") and float(text) == 0) for text in texts)
+        digits = {len(text.partition(".")[2]) for text in texts}
+        assert len(digits) == 1
+        assert digits <= ({2} if "(kg)" in row["parameter"] else {1} if "(mm)" in row["parameter"] else {4, 5, 6})
+        assert float(row["sd"]["text"]) == pytest.approx(row["sd"]["value"], rel=0.06, abs=0.051)
+    assert fixed(-0.04, 1) == fixed(-0.04, 1, sign=True) == "0.0"
+    assert (fixed(0.06, 1, sign=True), fixed(-0.06, 1)) == ("+0.1", "-0.1")
+    assert not re.search(r"(?<![\d.])[-+]0\.0+(?!\d)", Elements(render(fit)).text)
 
 
 def test_the_change_of_motion_is_told_against_inverse_kinematics(fit):
@@ -286,9 +340,30 @@ def test_fit_trial_and_parameters_show_themselves(fit, two_level):
     start, end = trial.windows()[0]
     assert f"{start:.3f} to {end:.3f} s" in told
     assert f"right foot {trial.loads.force[:, 0, 1].max():.0f} N" in told
+    fitted = fit.trials[0]
+    told = Elements(fitted._repr_html_())
+    assert fitted.name in told.text
+    assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in told.text
+    assert len(told.named("tr")) == 3
     table = Elements(fit.estimate._repr_html_())
     assert len(table.named("tr")) == 2 + 12
     assert f"{fit.estimate.mass_kg[1]:.4g}" in table.text
+
+
+def test_recording_shows_itself():
+    time = np.arange(4) / 100
+    positions = np.zeros((4, 2, 3))
+    positions[1, 1] = np.nan
+    markers = Markers(time, ("A", "<B>"), positions)
+    force = np.zeros((4, 1, 3))
+    force[2, 0, 1] = 812.0
+    plates = PlateLoads(time, ("FP1",), force, np.zeros((4, 1, 3)), (None,))
+    told = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
+    for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", "beware"):
+        assert text in told
+    still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
+    assert "1 frames" not in still
+    assert "no force plates" in still
 
 
 def test_pictures_are_those_of_the_report(fit, page):

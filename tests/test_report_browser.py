@@ -243,13 +243,13 @@ def test_table_sorts_by_pointer_and_keyboard(demo):
     heading = demo.page.locator("#bsp-table thead th").filter(has_text="estimate")
     heading.locator("button").click()
     assert heading.get_attribute("aria-sort") == "ascending"
-    values = column(demo.page, 6)
+    values = column(demo.page, 3)
     assert len(values) == 120
     assert values == sorted(values)
     heading.locator("button").focus()
     demo.page.keyboard.press("Enter")
     assert heading.get_attribute("aria-sort") == "descending"
-    assert column(demo.page, 6) == values[::-1]
+    assert column(demo.page, 3) == values[::-1]
     words = demo.page.locator("#bsp-table thead th").filter(has_text="segment")
     words.locator("button").click()
     assert heading.get_attribute("aria-sort") is None
@@ -271,6 +271,36 @@ def test_page_fits_a_phone(browser, demo_run):
     assert len(panel_places(report.page)) == 6
     assert len(set(panel_places(report.page))) == 3
     assert report.errors == []
+    report.page.close()
+
+
+@pytest.mark.parametrize(("width", "columns"), [(390, 4), (1200, 9)])
+def test_table_shows_its_first_columns_on_a_phone_and_all_on_a_desktop(browser, demo_run, width, columns):
+    report = Opened(browser, demo_run[1] / "report.html", {"width": width, "height": 844})
+    rights = report.page.locator("#bsp-table thead th").evaluate_all(
+        "cells => cells.map(cell => cell.getBoundingClientRect().right"
+        " - cell.closest('.scroll').getBoundingClientRect().right)"
+    )
+    assert len(rights) == 9
+    assert rights[columns - 1] <= 0
+    report.page.close()
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_nothing_lies_on_a_legend(browser, demo_run, width):
+    report = Opened(browser, demo_run[1] / "report.html", {"width": width, "height": 844})
+    assert report.page.locator(".modebar-btn").count() == 0
+    covered = report.page.locator(".plot").evaluate_all(
+        """plots => plots.flatMap(plot => {
+            const box = element => element.getBoundingClientRect();
+            const titles = [...plot.querySelectorAll(".annotation")].map(box);
+            const clash = text => titles.some(title => box(text).bottom > title.top + 4
+                && box(text).right > title.left && box(text).left < title.right);
+            return [...plot.querySelectorAll(".legendtext")].filter(
+                text => clash(text) || box(text).right > box(plot).right + 1).map(text => plot.id + text.textContent);
+        })"""
+    )
+    assert covered == []
     report.page.close()
 
 

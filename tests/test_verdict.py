@@ -15,7 +15,7 @@ BODY = BodySegmentParameters(
 )
 
 
-def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, **changes):
+def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes):
     """A fit whose residual has this length throughout; a pair is RMS-filling base and one frame's peak."""
     residual = np.zeros((FRAMES, 6))
     for column, told in ((0, force_n), (4, moment_nm)):
@@ -24,7 +24,12 @@ def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, **changes):
         residual[7, column] = -peak
     loads = np.zeros((FRAMES, 2, 6))
     loads[:, :, 1] = external_n / 2
-    trial = SimpleNamespace(name="walk", residuals={"estimate": residual}, kinematics=SimpleNamespace(foot_loads=loads))
+    trial = SimpleNamespace(
+        name="walk",
+        residuals={"estimate": residual},
+        kinematics=SimpleNamespace(foot_loads=loads),
+        marker_errors_m={"final": np.full((FRAMES, 3), markers_m)},
+    )
     given = {
         "converged": True,
         "estimate": BODY,
@@ -56,6 +61,15 @@ def test_force_by_the_guideline(force, expected):
     found = verdicts(fit(force))
     assert level(found, "walk: residual force") == expected
     assert stands_against(found) == (expected == "against")
+
+
+@pytest.mark.parametrize(("markers_m", "expected"), [(0.012, "good"), (0.013, "okay"), (0.021, "against")])
+def test_markers_by_the_guideline(markers_m, expected):
+    start = "walk: model and measured markers"
+    assert level(verdicts(fit(markers_m=markers_m)), start) == expected
+    of_model = verdicts(fit(markers_m=markers_m, file=object()))
+    (told,) = [one.sentence for one in of_model if one.sentence.startswith(start)]
+    assert ("--calibrate" in told) == (expected == "against")
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,7 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 
 Results go to standard output, progress and errors to standard error.
 """
-_MARKS = {"measured": "**", "informed": "*", "assumed": ""}
+_MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
 _STAGES = ("literature", "corrected", "estimate")
 
 app = typer.Typer(
@@ -254,7 +254,10 @@ def _report(fit: Fit) -> None:
         _report_trial(trial)
     out.print(_bsp_table(fit))
     if fit.posterior is not None:
-        out.print("** measured by the data, * informed by them, no mark: assumed, the first guess; sd: error bar\n")
+        out.print(
+            "** measured by the data, * informed by them, no mark: they say little, the first guess decides; "
+            "sd: error bar\n"
+        )
     out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
     for warning in fit.warnings:
         out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))

@@ -72,6 +72,12 @@ class TrialFit:
         names = list(self.kinematics.ik.coordinates)
         return pd.DataFrame(self.motion.q, index=pd.Index(self.time, name="time"), columns=names)
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: frames used, distances of the markers, residuals."""
+        from kinertia.report.notebook import trial_fit_html
+
+        return trial_fit_html(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:

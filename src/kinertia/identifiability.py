@@ -37,7 +37,11 @@ _PLURALS = {"foot": "feet", "calcn": "heels"}
 
 
 def evidence(information: float) -> str:
-    """ "measured", "informed" or "assumed": what stands behind an estimate of this information (0 to 1)."""
+    """What stands behind an estimate of this information (0 to 1): "measured", "informed" or "assumed"; "held" where it
+    is not a number, since the parameter was not estimated.
+    """
+    if np.isnan(information):
+        return "held"
     return "measured" if information > MEASURED else "informed" if information >= INFORMED else "assumed"
 
 

@@ -26,6 +26,7 @@ from kinertia.model_segments import segment_of
 from kinertia.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.skeleton import Axis, Skeleton
 from kinertia.trial import Trial
+from kinertia.verdict import impossible_segments
 
 LIGHT_KG = 0.5
 """Bodies that weigh less together than this move with their joints, but are not estimated."""
@@ -89,9 +90,19 @@ def prepare_osim(
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=tuple(warnings),
+        warnings=(*warnings, *_impossible_warning(model)),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _impossible_warning(model: OsimModel) -> list[str]:
+    impossible = impossible_segments(model.bsp)
+    if not impossible:
+        return []
+    return [
+        f"{model.path.name}: the model's own mass properties are physically impossible for {', '.join(impossible)}; "
+        f"the estimate starts from them, so correct them first (kinertia check {model.path.name} says what is wrong)"
+    ]
 
 
 def _feet(model: OsimModel) -> dict[str, list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
@@ -43,5 +44,9 @@ def in_parallel(
 
 
 def _one_thread() -> None:
-    """Matrices here are small: threads of the linear algebra library would only get into each other's way."""
+    """Matrices here are small: threads of the linear algebra library would only get into each other's way.
+
+    Ctrl-C is for the process that waits.
+    """
     threadpool_limits(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

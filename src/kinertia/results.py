@@ -26,6 +26,7 @@ from kinertia.io.sto import write_sto
 from kinertia.osim_prepare import centre_offsets
 from kinertia.provenance import Provenance
 from kinertia.report.page import render
+from kinertia.verdict import verdicts
 
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
@@ -108,6 +109,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         "converged": fit.converged,
         **_posterior_summary(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
+        "verdicts": [verdict._asdict() for verdict in verdicts(fit)],
         "warnings": list(fit.warnings),
         "notes": list(fit.notes),
     }

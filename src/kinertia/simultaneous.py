@@ -58,9 +58,9 @@ class SimultaneousResult:
     cost: tuple[float, float]
 
 
-CONVERGED = 0.05
-"""Stop after a step that promises to lower half the sum of squares by less: a third of one standard deviation, over
-all unknowns."""
+CONVERGED = 0.25
+"""Stop after a step that promises to lower half the sum of squares by less: it is shorter than 0.7 standard deviations
+over all unknowns together."""
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 40

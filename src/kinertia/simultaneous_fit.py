@@ -52,9 +52,9 @@ class Posterior:
 
     @property
     def information(self) -> np.ndarray:
-        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything."""
-        known = self.prior_sd > 0  # segments that are held have no deviation
-        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), 0.0)
+        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything; NaN for segments held."""
+        known = self.prior_sd > 0
+        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +181,13 @@ def _warnings(
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
-    for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD):
+    far = [
+        f"{PARAMETERS[k]} of {result.bsp.segments[i]} {away[i, k]:+.1f}"
+        for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD)
+    ]
+    if far:
         found.append(
-            f"the data contradict the model: {PARAMETERS[k]} of {result.bsp.segments[i]} is {away[i, k]:+.1f} prior "
-            f"deviations from {freedom.source}; a wrong joint, plate or marker is likelier than an odd person"
+            f"the data contradict the model: {', '.join(far)} prior deviations from {freedom.source}; a wrong joint, "
+            f"plate or marker is likelier than an odd person"
         )
     return found

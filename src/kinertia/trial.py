@@ -154,6 +154,12 @@ class Recording:
     length_unit: str = "m"
     vertical: str = "+Y"
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: frames, markers and their gaps, force plates, notes."""
+        from kinertia.report.notebook import recording_html
+
+        return recording_html(self)
+
 
 @dataclass(frozen=True, eq=False)
 class FootLoads:

@@ -28,6 +28,9 @@ GOOD_MOMENT_NM, OKAY_MOMENT_NM = (30.0, 50.0), (50.0, 75.0)
 PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 
+GOOD_MARKERS_M, OKAY_MARKERS_M = 0.012, 0.020
+"""RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
+
 _ROUNDING = 1e-6
 _NAMED = 4
 
@@ -40,10 +43,12 @@ class Verdict(NamedTuple):
 
 
 def verdicts(fit: Fit) -> list[Verdict]:
-    """What speaks for and against using a fit: convergence, physics, the literature, residuals of every trial."""
+    """What speaks for and against using a fit: convergence, physics, the literature, residuals and markers of every
+    trial.
+    """
     found = [_convergence(fit), _physics(fit.estimate), _literature(fit)]
     for trial in fit.trials:
-        found += _residuals(trial)
+        found += [*_residuals(trial), _markers(fit, trial)]
     return found
 
 
@@ -114,6 +119,18 @@ def _residuals(trial: TrialFit) -> list[Verdict]:
             f"({external:.0f} N); at most {100 * PEAK_FORCE_SHARE:g} % is acceptable",
         ),
     ]
+
+
+def _markers(fit: Fit, trial: TrialFit) -> Verdict:
+    """How far the model's markers are from the measured ones, at the motion that the forces go with."""
+    rms = float(np.sqrt(np.nanmean(np.square(trial.marker_errors_m["final"]))))
+    told = f"{trial.name}: model and measured markers are {rms * 1e3:.1f} mm apart (RMS)"
+    if rms <= GOOD_MARKERS_M:
+        return Verdict("good", f"{told}; at most {GOOD_MARKERS_M * 1e3:g} mm is good")
+    if rms <= OKAY_MARKERS_M:
+        return Verdict("okay", f"{told}; at most {OKAY_MARKERS_M * 1e3:g} mm is okay by OpenSim's guideline")
+    advice = "" if fit.file is None else "; let markers and joint centres move (--calibrate)"
+    return Verdict("against", f"{told}, beyond OpenSim's guideline ({OKAY_MARKERS_M * 1e3:g} mm){advice}")
 
 
 def _by_guideline(

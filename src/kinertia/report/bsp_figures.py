@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.bsp import PARAMETERS, UNITS
+from kinertia.bsp import PARAMETERS
 from kinertia.fit import Fit
 from kinertia.report import style
 from kinertia.report.panels import Panel, base_layout, compact, small_multiples
+from kinertia.report.wording import decimals, fixed, read_in, start_of
 from kinertia.simultaneous_fit import Posterior
 
 DEPARTURE_SD = 2.0
-"""Estimates further from the literature than this many of its deviations are pointed out."""
+"""Estimates further from where they started than this many prior deviations are pointed out."""
 NAMES = (
     "mass",
     "CoM forward",
@@ -30,13 +31,7 @@ NAMES = (
 """Of `PARAMETERS`, in words."""
 _INTERVAL_SD = 1.96
 _ESTIMATED_BY_TWO_LEVEL = 7
-"""The study's, first in `PARAMETERS`; products of inertia stay the literature's."""
-_READ_IN = {"m": ("mm", 1e3)}
-
-
-def read_in(k: int) -> tuple[str, float]:
-    """Unit in which people read parameter k of `PARAMETERS` (kg, mm, kg m2), and the factor to it."""
-    return _READ_IN.get(UNITS[k], (UNITS[k], 1.0))
+"""The study's, first in `PARAMETERS`; products of inertia stay as they were."""
 
 
 def segment_name(segment: str) -> str:
@@ -47,66 +42,76 @@ def segment_name(segment: str) -> str:
 
 
 def departures(fit: Fit) -> np.ndarray | None:
-    """(s, 10) estimate minus literature in the literature's deviations; None after two-level, which has none."""
+    """(s, 10) estimate minus start in prior deviations, 0 where held; None after two-level, which has none."""
     if fit.posterior is None:
         return None
     return (fit.estimate.table() - fit.literature.table()) / _scale(fit.posterior)
 
 
 def _scale(posterior: Posterior) -> np.ndarray:
-    """(s, 10) the literature's deviations; infinite where a parameter is fixed."""
+    """(s, 10) prior deviations; infinite where a parameter is held."""
     return np.where(posterior.prior_sd > 0, posterior.prior_sd, np.inf)
 
 
-def bsp_figure(fit: Fit) -> go.Figure:
-    """Estimate against literature: a panel per parameter, a row per segment.
+def estimated_rows(fit: Fit) -> np.ndarray:
+    """Rows of the segments that were estimated; those with a prior deviation of 0 stay as the model has them."""
+    if fit.posterior is None:
+        return np.arange(len(fit.estimate.segments))
+    return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
 
-    With error bars everything is in deviations of the literature, so that feet can be read beside the trunk; without
-    (two-level), it is the difference in the parameter's unit.
+
+def bsp_figure(fit: Fit) -> go.Figure:
+    """Estimate against start (literature, or OpenSim model): a panel per parameter, a row per segment.
+
+    With error bars everything is in prior deviations, so that feet can be read beside the trunk; without (two-level),
+    it is the difference in the parameter's unit. Segments that are held are left out.
     """
-    away, posterior = departures(fit), fit.posterior
-    segments = [segment_name(name) for name in fit.estimate.segments]
+    away, posterior, start = departures(fit), fit.posterior, start_of(fit)
+    shown = estimated_rows(fit)
+    segments = [segment_name(fit.estimate.segments[i]) for i in shown]
     rows = {"tickvals": list(range(len(segments))), "ticktext": segments, "range": [len(segments) - 0.4, -0.6]}
     if away is None or posterior is None:
         change = fit.estimate.table() - fit.literature.table()
-        panels = [_plain_panel(k, change[:, k], rows) for k in range(_ESTIMATED_BY_TWO_LEVEL)]
+        panels = [_plain_panel(k, change[:, k], rows, start.word) for k in range(_ESTIMATED_BY_TWO_LEVEL)]
         axis: dict[str, Any] = {"nticks": 5}
-        alt = "Differences between estimate and literature for every body segment parameter, without error bars."
+        alt = f"Differences between estimate and {start.word} for every body segment parameter, without error bars."
     else:
-        panels = [_panel(fit, posterior, away, k, rows) for k in range(len(PARAMETERS))]
-        half = _INTERVAL_SD * posterior.sd / _scale(posterior)
+        panels = [_panel(fit, posterior, shown, k, rows) for k in range(len(PARAMETERS))]
+        away, half = away[shown], (_INTERVAL_SD * posterior.sd / _scale(posterior))[shown]
         reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
-        title = {"text": "deviations of the literature", "font": {"size": 11}, "standoff": 2}
+        title = {"text": f"prior deviations from {start.of}", "font": {"size": 11}, "standoff": 2}
         axis = {"range": [-reach, reach], "title": title, "nticks": 7}
         far = int((np.abs(away) > DEPARTURE_SD).sum())
         alt = (
-            f"95 % intervals of every body segment parameter before and after the estimate; {far} of {away.size} "
-            f"estimates lie more than {DEPARTURE_SD:g} deviations from the literature."
+            f"95 % intervals of every body segment parameter before and after the estimate; {far} of "
+            f"{int((posterior.prior_sd > 0).sum())} estimates lie more than {DEPARTURE_SD:g} prior deviations from "
+            f"{start.of}."
         )
     return small_multiples(panels, alt, axis, row_px=230, left_px=112, linked=away is not None)
 
 
-def _panel(fit: Fit, posterior: Posterior, away: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
-    half = _INTERVAL_SD * (posterior.sd / _scale(posterior))[:, k]
-    place = np.arange(len(away))
-    before, after = fit.literature.table()[:, k], fit.estimate.table()[:, k]
-    unit, factor = read_in(k)
-    columns = (before, posterior.prior_sd[:, k], after, posterior.sd[:, k])
+def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
+    start = start_of(fit)
+    before, after = fit.literature.table()[shown, k], fit.estimate.table()[shown, k]
+    prior_sd, sd, scale = posterior.prior_sd[shown, k], posterior.sd[shown, k], _scale(posterior)[shown, k]
+    away, half = (after - before) / scale, _INTERVAL_SD * sd / scale
+    place = np.arange(len(shown))
     told = [
-        f"{segment_name(segment)}: literature {b:.4g} ± {p:.2g}, estimate {a:.4g} ± {s:.2g} {unit}"
-        for segment, b, p, a, s in zip(fit.estimate.segments, *(factor * column for column in columns), strict=True)
+        f"{segment_name(fit.estimate.segments[i])}: {start.word} {_interval(k, b, p)}, estimate {_interval(k, a, s)} "
+        f"{read_in(k)[0]}"
+        for i, b, p, a, s in zip(shown, before, prior_sd, after, sd, strict=True)
     ]
     prior = {
         "type": "scatter",
         "mode": "markers",
-        "x": compact(np.zeros(len(away))),
+        "x": compact(np.zeros(len(place))),
         "y": place,
         "marker": {"symbol": "line-ns-open", "size": 9, "color": style.GREY},
         "error_x": {"type": "constant", "value": _INTERVAL_SD, "thickness": 7, "width": 0, "color": style.PALE},
-        "name": "literature, 95 %",
+        "name": f"{start.word}, 95 %",
         "hoverinfo": "skip",
     }
-    far = np.abs(away[:, k]) > DEPARTURE_SD
+    far = np.abs(away) > DEPARTURE_SD
     traces = [prior]
     for chosen, name, colour, symbol in (
         (~far, "estimate, 95 %", style.BLUE, "circle"),
@@ -117,7 +122,7 @@ def _panel(fit: Fit, posterior: Posterior, away: np.ndarray, k: int, rows: dict[
                 {
                     "type": "scatter",
                     "mode": "markers",
-                    "x": compact(away[chosen, k]),
+                    "x": compact(away[chosen]),
                     "y": place[chosen],
                     "marker": {"symbol": symbol, "size": 8, "color": colour},
                     "error_x": {"array": compact(half[chosen]), "thickness": 2.2, "width": 0, "color": colour},
@@ -129,7 +134,12 @@ def _panel(fit: Fit, posterior: Posterior, away: np.ndarray, k: int, rows: dict[
     return Panel(NAMES[k], traces, (), rows)
 
 
-def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any]) -> Panel:
+def _interval(k: int, value: float, sd: float) -> str:
+    factor, digits = read_in(k)[1], decimals(k, sd)
+    return f"{fixed(factor * value, digits)} ± {fixed(factor * sd, digits)}"
+
+
+def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any], start: str) -> Panel:
     unit, factor = read_in(k)
     trace = {
         "type": "scatter",
@@ -137,18 +147,19 @@ def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any]) -> Panel:
         "x": compact(factor * change),
         "y": np.arange(len(change)),
         "marker": {"size": 8, "color": style.BLUE},
-        "name": "estimate minus literature",
+        "name": f"estimate minus {start}",
         "hovertemplate": f"%{{y}}: %{{x:.3g}} {unit}<extra></extra>",
     }
     return Panel(f"{NAMES[k]} ({unit})", [trace], (), rows)
 
 
 def information_figure(fit: Fit) -> go.Figure | None:
-    """Information on every parameter (100 % is everything), segments by parameters; None after two-level."""
+    """Information (100 % is everything) on every parameter of the estimated segments; None after two-level."""
     if fit.posterior is None:
         return None
-    told = 100 * np.clip(fit.posterior.information, 0.0, 1.0)
-    segments = [segment_name(name) for name in fit.estimate.segments]
+    shown = estimated_rows(fit)
+    told = 100 * np.clip(fit.posterior.information[shown], 0.0, 1.0)
+    segments = [segment_name(fit.estimate.segments[i]) for i in shown]
     best = np.unravel_index(int(np.argmax(told)), told.shape)
     alt = (
         f"Map of what the data told about each parameter, in percent; most about {NAMES[best[1]]} of "

@@ -1,13 +1,15 @@
-"""How a `Fit` and a `Trial` show themselves in a notebook."""
+"""How a `Fit` and its trials, a `Trial` and a `Recording` show themselves in a notebook."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from kinertia.fit import Fit
+from kinertia.fit import Fit, TrialFit
+from kinertia.ik import rms
 from kinertia.report.page import bsp_rows, rendered, residual_rows
 from kinertia.report.verdict import words
-from kinertia.trial import LOAD_THRESHOLD_N, Trial
+from kinertia.report.wording import start_of
+from kinertia.trial import LOAD_THRESHOLD_N, Markers, Recording, Trial
 
 
 def fit_html(fit: Fit) -> str:
@@ -16,7 +18,8 @@ def fit_html(fit: Fit) -> str:
         "notebook_fit.html.j2",
         fit=fit,
         words=words(fit),
-        residuals=residual_rows(fit),
+        residuals=residual_rows(fit.trials),
+        start=start_of(fit).word,
         rows=bsp_rows(fit),
         information=fit.posterior is not None,
     )
@@ -24,12 +27,40 @@ def fit_html(fit: Fit) -> str:
 
 def trial_html(trial: Trial) -> str:
     """Frames, markers and their gaps, measured windows, peak vertical force under each foot, notes."""
-    seen = np.asarray(np.isfinite(trial.markers.positions).all(axis=2)).mean(axis=0)
-    gappy = [(label, 100 * float(share)) for label, share in zip(trial.markers.labels, seen, strict=True) if share < 1]
     peaks = trial.loads.force[:, :, 1].max(axis=0, initial=0.0)
     return rendered(
         "notebook_trial.html.j2",
         trial=trial,
-        gappy=sorted(gappy, key=lambda item: item[1]),
+        gappy=_gappy(trial.markers),
         peaks=[float(peak) if peak > LOAD_THRESHOLD_N else None for peak in peaks],
     )
+
+
+def trial_fit_html(trial: TrialFit) -> str:
+    """Window, distances of the markers, residuals before and after, computing time."""
+    return rendered(
+        "notebook_trial_fit.html.j2",
+        trial=trial,
+        errors_mm={stage: 1e3 * rms(errors) for stage, errors in trial.marker_errors_m.items()},
+        residuals=residual_rows([trial]),
+        start="before",  # a trial does not know whether that was the literature or a model
+    )
+
+
+def recording_html(recording: Recording) -> str:
+    """Frames, markers and their gaps, plates and the largest vertical force on each, what is known of the person."""
+    plates = recording.plates
+    peaks = [] if plates is None else plates.force[:, :, 1].max(axis=0, initial=0.0)
+    return rendered(
+        "notebook_recording.html.j2",
+        recording=recording,
+        gappy=_gappy(recording.markers),
+        peaks=[] if plates is None else [(name, float(peak)) for name, peak in zip(plates.names, peaks, strict=True)],
+    )
+
+
+def _gappy(markers: Markers) -> list[tuple[str, float]]:
+    """Labels of markers that are not always seen, and the percentage of frames that show them; the least seen first."""
+    seen = np.asarray(np.isfinite(markers.positions).all(axis=2)).mean(axis=0)
+    found = [(label, 100 * float(share)) for label, share in zip(markers.labels, seen, strict=True) if share < 1]
+    return sorted(found, key=lambda item: item[1])

@@ -6,7 +6,7 @@ plotly.js is in the page once; its policy (Content-Security-Policy) forbids ever
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -21,7 +21,7 @@ from kinertia.bsp import PARAMETERS
 from kinertia.fit import Fit, TrialFit
 from kinertia.identifiability import evidence
 from kinertia.provenance import Provenance, versions
-from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, read_in, segment_name
+from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
 from kinertia.report.time_figures import (
@@ -32,7 +32,8 @@ from kinertia.report.time_figures import (
     residual_figure,
     rms_length,
 )
-from kinertia.report.verdict import words
+from kinertia.report.verdict import held_sentence, hidden_combinations, words
+from kinertia.report.wording import decimals, fixed, read_in, start_of
 from kinertia.simultaneous_fit import SHOWN_UNIT
 from kinertia.trial import runs
 
@@ -52,6 +53,7 @@ def _environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
     )
     environment.globals["asset"] = _asset
+    environment.filters["fixed"] = fixed
     return environment
 
 
@@ -73,10 +75,13 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         title=f"{fit.subject.name}: body segment parameters",
         fit=fit,
         words=words(fit),
+        start=start_of(fit),
+        held=held_sentence(fit),
+        hidden=hidden_combinations(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         bsp={"figure": written(bsp_figure(fit)), "rows": bsp_rows(fit)},
         information=None if information is None else written(information),
-        residuals=residual_rows(fit),
+        residuals=residual_rows(fit.trials),
         trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
@@ -112,9 +117,9 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "frames": len(trial.time),
         "every": -(-len(trial.time) // frames),
         "all_frames": len(trial.kinematics.trial.markers.time),
-        "residuals": written(residual_figure(trial, frames)),
+        "residuals": written(residual_figure(trial, frames, start_of(fit))),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
-        "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames)),
+        "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames, start_of(fit))),
         "bands": trial.moment_sd is not None,
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(
@@ -126,10 +131,10 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
     }
 
 
-def residual_rows(fit: Fit) -> list[dict[str, Any]]:
+def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
     """Per trial and stage: RMS and peak of force and of moment."""
     rows = []
-    for trial in fit.trials:
+    for trial in trials:
         row: dict[str, Any] = {"name": trial.name, "stages": {}}
         for stage, values in trial.residuals.items():
             parts = values[:, :3], values[:, 3:]
@@ -139,19 +144,26 @@ def residual_rows(fit: Fit) -> list[dict[str, Any]]:
 
 
 def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
-    """Table rows in the units people read: kg, mm, kg m2."""
+    """Table rows in the units people read: kg, mm, kg m2; each number as it is, to sort by, and as text."""
     away, posterior = departures(fit), fit.posterior
     before, after = fit.literature.table(), fit.estimate.table()
     rows = []
     for i, segment in enumerate(fit.estimate.segments):
         for k in range(len(PARAMETERS)):
             unit, factor = read_in(k)
-            row: dict[str, Any] = {"segment": segment_name(segment), "parameter": NAMES[k], "unit": unit}
-            row |= {"literature": before[i, k] * factor, "estimate": after[i, k] * factor}
+            values = {"before": before[i, k], "estimate": after[i, k]}
+            row: dict[str, Any] = {"segment": segment_name(segment), "parameter": f"{NAMES[k]} ({unit})"}
+            # without a deviation, inertias have about three digits
+            size = 0.1 * max(abs(before[i, k]), abs(after[i, k]))
             if posterior is not None and away is not None:
-                row |= {"prior_sd": posterior.prior_sd[i, k] * factor, "sd": posterior.sd[i, k] * factor}
+                held = not posterior.prior_sd[i, k] > 0
+                values |= {"prior_sd": posterior.prior_sd[i, k], "sd": posterior.sd[i, k]}
+                size = size if held else posterior.sd[i, k]
                 told = float(posterior.information[i, k])
-                row |= {"away": away[i, k], "information": max(100 * told, 0.0), "evidence": evidence(told)}
+                row |= {"away": away[i, k], "information": max(100 * told, 0.0), "held": held}
+                row["evidence"] = "held" if held else evidence(told)
+            for name, value in values.items():
+                row[name] = {"value": value * factor, "text": fixed(value * factor, decimals(k, size))}
             rows.append(row)
     return rows
 

@@ -11,6 +11,7 @@ from kinertia.report.bsp_figures import bsp_figure, information_figure
 from kinertia.report.marker_figures import gap_figure, marker_figure
 from kinertia.report.skeleton_view import skeleton_figure
 from kinertia.report.time_figures import coordinate_figure, moment_figure, residual_figure
+from kinertia.report.wording import start_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +26,16 @@ class FitPlots:
 
     def residuals(self, trial: str | None = None) -> go.Figure:
         """Root residual force and moment over time, stage by stage."""
-        return residual_figure(self._trial(trial))
+        return residual_figure(self._trial(trial), start=start_of(self.fit))
 
     def coordinates(self, trial: str | None = None) -> go.Figure:
         """Every coordinate by inverse kinematics and as estimated."""
         return coordinate_figure(self._trial(trial), self.fit.skeleton)
 
     def moments(self, trial: str | None = None) -> go.Figure:
-        """Joint moments per body mass, literature against estimate."""
-        return moment_figure(self._trial(trial), self.fit.skeleton, self.fit.literature.total_mass_kg)
+        """Joint moments per body mass, before against estimate."""
+        mass_kg = self.fit.literature.total_mass_kg
+        return moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start_of(self.fit))
 
     def markers(self, trial: str | None = None) -> go.Figure:
         """Distance between every measured and modelled marker."""

@@ -18,6 +18,7 @@ from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate, panels_of
 from kinertia.report.gait_events import GaitEvent, gait_events
 from kinertia.report.panels import Panel, compact, small_multiples
+from kinertia.report.wording import LITERATURE, Start
 from kinertia.skeleton import Skeleton
 
 MOST_FRAMES = 1600
@@ -30,7 +31,7 @@ _AXES = ("forward", "upward", "to the right")
 _BAND_SD = 1.96
 
 
-def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES) -> go.Figure:
+def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> go.Figure:
     """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage."""
     thin, axis = _thin(len(trial.time), most_frames), _time_axis(trial.kinematics)
     marks = _events(trial.kinematics)
@@ -40,7 +41,7 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES) -> go.Figur
         traces = [
             {
                 **_curve(trial.time, values[:, k], thin),
-                "name": _STAGE_NAMES[stage],
+                "name": stage_name(stage, start),
                 "line": style.STAGES[stage],
             }
             for stage, values in trial.residuals.items()
@@ -48,7 +49,7 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES) -> go.Figur
         title = f"{kind} {_AXES[k % 3]} (N)" if k < 3 else f"Moment about {_MOMENT_AXES[k - 3]} (N m)"
         panels.append(Panel(title, traces, [*_unused(trial.kinematics, axis), *marks]))
     told = "; ".join(
-        f"{_STAGE_NAMES[stage]} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
+        f"{stage_name(stage, start)} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
         for stage, values in trial.residuals.items()
     )
     alt = f"Residual force and moment at the pelvis of {trial.name} over time, RMS: {told}."
@@ -56,11 +57,11 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES) -> go.Figur
 
 
 _MOMENT_AXES = ("forward axis", "vertical", "right axis")
-_STAGE_NAMES = {
-    "literature": "literature values",
-    "corrected": "literature values, pelvis corrected",
-    "estimate": "estimate",
-}
+
+
+def stage_name(stage: str, start: Start) -> str:
+    """A stage of `TrialFit.residuals` or `.moments` in words."""
+    return {"literature": start.values, "corrected": f"{start.values}, pelvis corrected"}.get(stage, stage)
 
 
 def rms_length(vectors: np.ndarray) -> float:
@@ -97,8 +98,10 @@ def motion_change(trial: TrialFit) -> np.ndarray:
     return trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
 
 
-def moment_figure(trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES) -> go.Figure:
-    """Joint moments (N m/kg) with literature values on the measured motion, and as estimated, with its 95 % band."""
+def moment_figure(
+    trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES, start: Start = LITERATURE
+) -> go.Figure:
+    """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band."""
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
     sd = trial.moment_sd
     panels = []
@@ -107,13 +110,13 @@ def moment_figure(trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_fram
             continue
         traces = [] if sd is None else _bands(one, trial, sd / mass_kg, mass_kg, thin)
         for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
-            name = _STAGE_NAMES[stage]
+            name = stage_name(stage, start)
             traces += _sides(one, name, trial.time, trial.moments[stage] / mass_kg, thin, line)
         unit = "N m/kg" if one.rotational else "N/kg"
         title = f"{one.title.split(',')[0].removesuffix(' +')} moment ({unit})"
         panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))
     peak = np.abs(trial.moments["estimate"][:, 6:]).max() / mass_kg
-    alt = f"Joint moments of {trial.name} over time, literature against estimate; the largest is {peak:.2f} N m/kg."
+    alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
     return small_multiples(panels, alt, axis)
 
 

@@ -1,7 +1,7 @@
 """The report's first part: a fit in words, for somebody who reads nothing else.
 
 Whether numbers can be used is judged in `kinertia.verdict`; here that is put beside how far the motion was changed to
-get there, what the data told about the body, and where the estimate leaves the literature.
+get there, what the data told about the body, and where the estimate leaves what it started from.
 """
 
 from __future__ import annotations
@@ -13,13 +13,18 @@ import numpy as np
 from kinertia.fit import Fit, TrialFit
 from kinertia.identifiability import INFORMED, MEASURED, evidence
 from kinertia.ik import rms
-from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, read_in, segment_name
+from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
+from kinertia.report.wording import decimals, fixed, read_in, start_of
 from kinertia.verdict import Level, Verdict, verdicts
 
 _LISTED_FAR = 12
-_EVIDENCE = {"measured": "", "informed": " by the data", "assumed": ", not to be read as this person's"}
+_EVIDENCE = {
+    "measured": "measured",
+    "informed": "informed by the data",
+    "assumed": "hardly informed by the data, not to be read as this person's",
+}
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class Words:
         judgements: `kinertia.verdict.verdicts`.
         motion: how far the motion was changed.
         knowledge: what the data could and could not tell about the body segment parameters.
-        departures: estimates beyond two deviations of the literature.
+        departures: estimates more than two prior deviations from what they started from.
     """
 
     level: Level
@@ -83,20 +88,41 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
             "the two-level method has no error bars: it cannot tell which parameters the data show and which they do "
             "not. Small residuals alone prove nothing about single parameters; the simultaneous method tells",
         )
-    told = [[evidence(value) for value in row] for row in fit.posterior.information]
-    counts = {word: sum(row.count(word) for row in told) for word in _EVIDENCE}
+    posterior = fit.posterior
+    told = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
+    counts = {word: told.count(word) for word in _EVIDENCE}
     found = [
-        f"of {sum(counts.values())} parameters the data measured {counts['measured']} (information above "
-        f"{100 * MEASURED:g} %) and informed {counts['informed']}; {counts['assumed']} are assumed from the literature "
-        f"(below {100 * INFORMED:g} %)"
+        f"of {len(told)} parameters the data measured {counts['measured']} (information above {100 * MEASURED:g} %) "
+        f"and informed {counts['informed']}; {counts['assumed']} are hardly informed by the data (below "
+        f'{100 * INFORMED:g} %; "assumed" in the table): most of what they say is from {start_of(fit).of}'
     ]
+    masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
-        names = [name for name, row in zip(fit.estimate.segments, told, strict=True) if row[0] == word]
-        if names:
-            found.append(f"masses {word}{meaning}: {_segments(names)}")
-    if never := fit.posterior.base.never:
-        found.append(f"{len(never)} combinations no motion ever shows, such as {never[0]}: they stand with the table")
+        if names := [name for name, one in masses.items() if one == word]:
+            found.append(f"masses {meaning}: {_segments(names)}")
+    if kept := held_sentence(fit):
+        found.append(kept)
+    if never := posterior.base.never:
+        found.append(
+            f"{hidden_combinations(fit)} combinations no motion ever shows, such as {never[0]}: all stand "
+            "with the table"
+        )
     return tuple(found)
+
+
+def held_sentence(fit: Fit) -> str:
+    """Names the segments that were not estimated; empty where all were."""
+    estimated = set(estimated_rows(fit))
+    names = [name for i, name in enumerate(fit.estimate.segments) if i not in estimated]
+    return f"kept as the model has them, not estimated: {_segments(names)}" if names else ""
+
+
+def hidden_combinations(fit: Fit) -> int:
+    """How many independent combinations of the estimated parameters no motion shows: parameters minus rank."""
+    if fit.posterior is None:
+        return 0
+    base = fit.posterior.base
+    return len(base.best[0].weights) - base.count
 
 
 def _segments(names: list[str]) -> str:
@@ -108,17 +134,18 @@ def _segments(names: list[str]) -> str:
 
 def _departures(fit: Fit) -> tuple[str, ...]:
     away = departures(fit)
-    if away is None:
+    if away is None or fit.posterior is None:
         return ()
-    before, after = fit.literature.table(), fit.estimate.table()
+    scale = fit.posterior.prior_sd
+    before, after, start = fit.literature.table(), fit.estimate.table(), start_of(fit)
     far = [(int(i), int(k)) for i, k in np.argwhere(np.abs(away) > DEPARTURE_SD)]
     far.sort(key=lambda place: -abs(away[place]))
     told = []
     for i, k in far[:_LISTED_FAR]:
-        unit, factor = read_in(k)
+        (unit, factor), digits = read_in(k), decimals(k, scale[i, k])
         told.append(
-            f"{NAMES[k]} of {segment_name(fit.estimate.segments[i])}: {factor * after[i, k]:.3g} {unit}; literature "
-            f"{factor * before[i, k]:.3g}; {away[i, k]:+.1f} deviations apart"
+            f"{NAMES[k]} of {segment_name(fit.estimate.segments[i])}: {fixed(factor * after[i, k], digits)} {unit}; "
+            f"{start.word} {fixed(factor * before[i, k], digits)}; {away[i, k]:+.1f} deviations apart"
         )
     if len(far) > _LISTED_FAR:
         told.append(f"and {len(far) - _LISTED_FAR} more: sort the table by deviations to see them")

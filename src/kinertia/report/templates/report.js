@@ -2,7 +2,7 @@
 // Draws every figure of the page, one after the other so that reading is not held up, and again for another width.
 (() => {
   const PRINT_PX = 960; // report.css scales it to the paper
-  const config = { displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  const config = { displayModeBar: false }; // its icons would lie on the legends
   let printing = false;
   const columns = (px) => (px < 560 ? 1 : px < 860 ? 2 : 3);
 

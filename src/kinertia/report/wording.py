@@ -1,0 +1,56 @@
+"""Words and digits in which the report speaks: what the estimate started from, and numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from kinertia.bsp import UNITS
+from kinertia.fit import Fit
+
+_READ_IN = {"m": ("mm", 1e3)}
+_DECIMALS = {"kg": 2, "m": 1}
+_INERTIA_DECIMALS = (4, 6)
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the body segment parameters before the estimate are called.
+
+    Attributes:
+        word: in headings and legends.
+        of: in sentences.
+        values: of the stage of residuals and moments.
+    """
+
+    word: str
+    of: str
+    values: str
+
+
+LITERATURE = Start("literature", "the literature", "literature values")
+MODEL = Start("model", "the model", "the model's own values")
+
+
+def start_of(fit: Fit) -> Start:
+    """An OpenSim model brings its own parameters, the built-in one has the literature's."""
+    return LITERATURE if fit.file is None else MODEL
+
+
+def read_in(k: int) -> tuple[str, float]:
+    """Unit in which people read parameter k of `kinertia.bsp.PARAMETERS` (kg, mm, kg m2), and the factor to it."""
+    return _READ_IN.get(UNITS[k], (UNITS[k], 1.0))
+
+
+def decimals(k: int, size: float) -> int:
+    """Of parameter k: 2 for kg, 1 for mm; inertias have two digits of `size`, their deviation in kg m2, at least 4."""
+    if UNITS[k] in _DECIMALS:
+        return _DECIMALS[UNITS[k]]
+    least, most = _INERTIA_DECIMALS
+    return least if size <= 0 else min(max(1 - math.floor(math.log10(size)), least), most)
+
+
+def fixed(value: float, digits: int, sign: bool = False) -> str:
+    """A number with so many decimals; what rounds to zero has no sign."""
+    text = f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
+    return text if float(text) else text.lstrip("+-")
