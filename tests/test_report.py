@@ -123,6 +123,7 @@ def test_held_segments_are_named_and_not_counted(of_model):
     held = [row for row in bsp_rows(of_model) if row["segment"].startswith("forearm")]
     assert len(held) == 20
     assert {row["evidence"] for row in held} == {"held"}
+    assert "nan" not in re.findall(r'data-sort="([^"]*)"', page)
 
 
 def test_start_is_called_what_it_is(fit, of_model):

@@ -160,10 +160,10 @@ def information_figure(fit: Fit) -> go.Figure | None:
     shown = estimated_rows(fit)
     told = 100 * np.clip(fit.posterior.information[shown], 0.0, 1.0)
     segments = [segment_name(fit.estimate.segments[i]) for i in shown]
-    best = np.unravel_index(int(np.argmax(told)), told.shape)
+    best = np.unravel_index(int(np.nanargmax(told)), told.shape)
     alt = (
         f"Map of what the data told about each parameter, in percent; most about {NAMES[best[1]]} of "
-        f"{segments[best[0]]}, {told[best]:.0f} %; median {np.median(told):.0f} %."
+        f"{segments[best[0]]}, {told[best]:.0f} %; median {np.nanmedian(told):.0f} %."
     )
     heat = {
         "type": "heatmap",

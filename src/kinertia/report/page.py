@@ -160,8 +160,8 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
                 values |= {"prior_sd": posterior.prior_sd[i, k], "sd": posterior.sd[i, k]}
                 size = size if held else posterior.sd[i, k]
                 told = float(posterior.information[i, k])
-                row |= {"away": away[i, k], "information": max(100 * told, 0.0), "held": held}
-                row["evidence"] = "held" if held else evidence(told)
+                row |= {"away": away[i, k], "information": 0.0 if held else max(100 * told, 0.0), "held": held}
+                row["evidence"] = evidence(told)
             for name, value in values.items():
                 row[name] = {"value": value * factor, "text": fixed(value * factor, decimals(k, size))}
             rows.append(row)
