@@ -5,6 +5,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from hypothesis import settings
 
 from command_line import fitted
 from kinertia.config import Settings, Subject
@@ -14,6 +15,10 @@ from kinertia.io.recording import read_recording
 from kinertia.prepare import TrialInput
 from kinertia.two_level import TwoLevelResult, correct_pelvis
 from walks import fit_arguments
+
+# no test judges time: machines are busy
+settings.register_profile("kinertia", deadline=None)
+settings.load_profile("kinertia")
 
 FEW_EVALUATIONS = 30
 
