@@ -39,6 +39,7 @@ def test_draws_do_not_depend_on_the_number_of_processes():
     assert one == two
 
 
+@pytest.mark.slow
 def test_people_are_the_same_in_every_scenario():
     draws = [run_draw(1, (SCENARIOS[key], 3)) for key in ("study", "gain")]
     np.testing.assert_array_equal(draws[0].literature_errors, draws[1].literature_errors)
