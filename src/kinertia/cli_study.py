@@ -20,6 +20,8 @@ from kinertia.study_report import save_table1, table1_rows
 from kinertia.terminal import out, plain_table, shown_progress
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
 
 
 def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
@@ -185,8 +187,8 @@ def _report_table1(table: Table1, deviation: np.ndarray) -> None:
 @study.command()
 def accuracy(
     draws: Annotated[int, typer.Option(min=2, help="People in each scenario.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")] = 1,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")] = None,
+    seed: Seed = 1,
+    workers: Workers = None,
     output: Output = Path("out"),
     force: Force = False,
     quiet: Quiet = False,
@@ -214,8 +216,8 @@ def accuracy(
 @study.command()
 def sensitivity(
     draws: Annotated[int, typer.Option(min=2, help="People in each condition.")] = 24,
-    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")] = 1,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")] = None,
+    seed: Seed = 1,
+    workers: Workers = None,
     output: Output = Path("out"),
     force: Force = False,
     quiet: Quiet = False,
