@@ -84,3 +84,15 @@ def short_fit(shared_data):
     ]
     with mock.patch("kinertia.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
         return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
+
+
+@pytest.fixture(scope="session")
+def fit(demo_run):
+    """The demo's fit, with error bars."""
+    return demo_run[0].fit
+
+
+@pytest.fixture(scope="session")
+def two_level(demo_run):
+    """The demo's two-level fit, without error bars."""
+    return demo_run[0].two_level

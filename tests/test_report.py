@@ -30,17 +30,6 @@ PARTS = ["verdict", "bsp", "residuals", "kinematics", "moments", "markers", "vie
 
 
 @pytest.fixture(scope="module")
-def fit(demo_run):
-    """The demo's fit, with error bars."""
-    return demo_run[0].fit
-
-
-@pytest.fixture(scope="module")
-def two_level(demo_run):
-    return demo_run[0].two_level
-
-
-@pytest.fixture(scope="module")
 def page(fit):
     return render(fit)
 

@@ -20,17 +20,6 @@ from kinertia.trial import FootLoads, Markers, Trial
 from report_page import figures_of, numbers
 
 
-@pytest.fixture(scope="module")
-def fit(demo_run):
-    """The demo's fit, with error bars."""
-    return demo_run[0].fit
-
-
-@pytest.fixture(scope="module")
-def two_level(demo_run):
-    return demo_run[0].two_level
-
-
 def test_coordinates_are_drawn_in_degrees_by_side(fit):
     trial, figure = fit.trials[0], figures_of(render(fit))["trial1-coordinates"]
     titles = [note["text"] for note in figure["layout"]["annotations"]]

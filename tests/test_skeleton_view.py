@@ -2,15 +2,8 @@ import base64
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from kinertia.report.skeleton_view import packed, scene
-
-
-@pytest.fixture(scope="module")
-def fit(demo_run):
-    """The demo's fit."""
-    return demo_run[0].fit
 
 
 def test_scene_has_everything_where_it_is(fit):
