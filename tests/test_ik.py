@@ -62,7 +62,7 @@ def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
     measured = without(noisy(markers_of(skeleton, q), 0.02), ["R.Heel", "Top.Head"], slice(1, 2)).positions
     pose = skeleton.pose(q + 0.05)
     normal, gradient, cost = normal_equations(skeleton, ancestor_of(skeleton), measured, pose)
-    jacobian = marker_jacobian(skeleton, pose)
+    jacobian = marker_jacobian(skeleton, pose, skeleton.marker_positions(pose))
     difference = measured - skeleton.marker_positions(pose)
     for k in range(3):
         seen = np.isfinite(difference[k]).all(axis=-1)

@@ -83,8 +83,9 @@ def adapt(
     for _ in range(_STEPS):
         q = np.empty((len(moving), len(freed.coordinates)))
         q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
-        placed = freed.with_markers(_relocated(kept, static[len(still) :]))
-        step, moving_step = _step(placed, measured, q, moving_at, still_at, (prior - static) / deviation**2, deviation)
+        residual, jacobian = _in_segments(freed, measured, q, static[len(still) :].reshape(-1, 3))
+        by_moving, by_still = jacobian[..., moving_at], jacobian[..., still_at]
+        step, moving_step = _step(residual, by_moving, by_still, (prior - static) / deviation**2, deviation)
         static, moving = static + step, moving + moving_step
         if np.abs(step).max() < _TOLERANCE_M:
             break
@@ -146,46 +147,56 @@ def _relocated(markers: Sequence[Marker], positions: np.ndarray) -> list[Marker]
     ]
 
 
-def _step(
-    skeleton: Skeleton,
-    measured: np.ndarray,
-    q: np.ndarray,
-    moving_at: np.ndarray,
-    still_at: np.ndarray,
-    prior_pull: np.ndarray,
-    deviation: np.ndarray,
+def _in_segments(
+    skeleton: Skeleton, measured: np.ndarray, q: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One Gauss-Newton step of the static unknowns (k,) and of every frame's coordinates (n, c)."""
+    """Marker errors (n, m, 3) and their derivatives (n, m, 3, c) by the coordinates, in noise deviations.
+
+    Both are in the axes of the markers' segments, so that a marker's place (m, 3) in its segment moves it by itself.
+    What is not seen is NaN in the errors and zero in the derivatives.
+    """
     pose = skeleton.pose(q)
-    residual = (measured - skeleton.marker_positions(pose)) / MARKER_NOISE_M
-    jacobian = marker_jacobian(skeleton, pose) / MARKER_NOISE_M
-    seen = np.isfinite(residual)
-    residual = np.where(seen, residual, 0.0).reshape(len(q), -1)
-    jacobian = jacobian * seen[..., None]
-    local = np.zeros((len(q), len(skeleton.markers), 3, len(skeleton.markers), 3))
-    each = np.arange(len(skeleton.markers))
-    turned = pose.rotation[:, skeleton.marker_segments] / MARKER_NOISE_M * seen[..., None]
-    local[:, each, :, each, :] = turned.transpose(1, 0, 2, 3)
-    jacobian = jacobian.reshape(len(q), residual.shape[1], -1)
-    by_static = np.concatenate([jacobian[..., still_at], local.reshape(len(q), residual.shape[1], -1)], axis=-1)
-    by_moving = jacobian[..., moving_at]
+    turned = pose.rotation[:, skeleton.marker_segments]
+    positions = (turned @ places[..., None])[..., 0] + pose.translation[:, skeleton.marker_segments]
+    to_segment = turned.transpose(0, 1, 3, 2) / MARKER_NOISE_M
+    errors = (to_segment @ (measured - positions)[..., None])[..., 0]
+    seen = np.isfinite(errors)
+    return errors, to_segment @ marker_jacobian(skeleton, pose, positions) * seen[..., None]
+
+
+def _step(
+    residual: np.ndarray, by_moving: np.ndarray, by_still: np.ndarray, prior_pull: np.ndarray, deviation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """One Gauss-Newton step of the static unknowns (k,), still coordinates then places, and of the moving (n, c).
+
+    Takes what `_in_segments` gives.
+    """
+    n = len(residual)
+    seen = np.isfinite(residual).reshape(n, -1)
+    residual = np.nan_to_num(residual).reshape(n, -1)
+    by_moving, by_still = (part.reshape(n, residual.shape[1], -1) for part in (by_moving, by_still))
     transposed = by_moving.transpose(0, 2, 1)
-    normal = transposed @ by_moving + 1e-6 * np.eye(len(moving_at))
-    across = transposed @ by_static
-    gradient = (transposed @ residual[..., None])[..., 0]
-    solved = np.linalg.solve(normal, np.concatenate([across, gradient[..., None]], axis=-1))
-    # sum over frames of S^T S - (M^T S)^T (M^T M)^-1 (M^T S)
-    stacked = by_static.reshape(-1, by_static.shape[-1])
-    reduced = stacked.T @ stacked - np.einsum("nij,nik->jk", across, solved[..., :-1])
-    right = stacked.T @ residual.ravel() - np.einsum("nij,ni->j", across, solved[..., -1])
-    reduced[np.diag_indices_from(reduced)] += 1.0 / deviation**2
-    step = np.linalg.solve(reduced, right + prior_pull)
+    normal = transposed @ by_moving + 1e-6 * np.eye(by_moving.shape[-1])
+    across = np.concatenate([transposed @ by_still, transposed / MARKER_NOISE_M], axis=-1)
+    gradient = transposed @ residual[..., None]
+    solved = np.linalg.solve(normal, np.concatenate([across, gradient], axis=-1))
+    # S^T S and S^T r summed over frames; a place moves its own marker only
+    k = by_still.shape[-1]
+    square, right = np.diag(1.0 / deviation**2), prior_pull.copy()
+    square[:k, :k] += np.einsum("nri,nrj->ij", by_still, by_still)
+    square[:k, k:] += by_still.sum(axis=0).T / MARKER_NOISE_M
+    square[k:, :k] = square[:k, k:].T
+    square[range(k, len(square)), range(k, len(square))] += seen.sum(axis=0) / MARKER_NOISE_M**2
+    right[:k] += np.einsum("nri,nr->i", by_still, residual)
+    right[k:] += residual.sum(axis=0) / MARKER_NOISE_M
+    # (M^T S)^T (M^T M)^-1 (M^T S) is taken off: the moving coordinates follow
+    followed = across.reshape(-1, len(right)).T @ solved.reshape(-1, len(right) + 1)
+    step = np.linalg.solve(square - followed[:, :-1], right - followed[:, -1])
     return step, solved[..., -1] - solved[..., :-1] @ step
 
 
-def marker_jacobian(skeleton: Skeleton, pose: Pose) -> np.ndarray:
-    """(n, m, 3, c): velocity of every marker for each coordinate at unit rate."""
-    positions = skeleton.marker_positions(pose)
+def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
+    """(n, m, 3, c): velocity of every marker, at these positions (n, m, 3) m, for each coordinate at unit rate."""
     linear, angular = pose.jacobian[:, None, :3], pose.jacobian[:, None, 3:]
     turning = np.cross(angular, positions[..., None], axis=2)
     by_axes = (linear + turning) * skeleton.support[skeleton.marker_segments][:, None, :]

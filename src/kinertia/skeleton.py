@@ -19,7 +19,6 @@ from typing import Literal
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from kinertia.axis_functions import AxisFunction
 from kinertia.bsp import BodySegmentParameters
@@ -240,17 +239,17 @@ class Skeleton:
         data = model.createData()
         at = self.map.axes(q)
         n, s = len(q), len(self.segments)
-        joints = [carrier[segment] for segment in self.segments]
-        frames = [data.oMi[j] for j in joints]
-        place = np.empty((n, s, 4, 4))
-        jacobian = np.empty((n, 6, model.nv))
+        # these arrays are Pinocchio's own memory: every pass fills them anew
+        frames = [data.oMi[carrier[segment]] for segment in self.segments]
+        turns, places, columns = [f.rotation for f in frames], [f.translation for f in frames], data.J
+        rotation, translation, jacobian = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty((n, 6, model.nv))
         for k in range(n):
-            jacobian[k] = pin.computeJointJacobians(model, data, at[k])
-            for i, frame in enumerate(frames):
-                place[k, i] = frame.homogeneous
-        local = np.array([offset[segment].homogeneous for segment in self.segments])
-        place = place @ local
-        return Pose(place[..., :3, :3], place[..., :3, 3], jacobian, self.map.slopes(q))
+            pin.computeJointJacobians(model, data, at[k])
+            rotation[k], translation[k], jacobian[k] = turns, places, columns
+        turned = np.array([offset[segment].rotation for segment in self.segments])
+        moved = np.array([offset[segment].translation for segment in self.segments])
+        translation += (rotation @ moved[..., None])[..., 0]
+        return Pose(rotation @ turned, translation, jacobian, self.map.slopes(q))
 
     def marker_positions(self, pose: Pose) -> np.ndarray:
         """(n, m, 3) m, model markers in ground at this pose."""
@@ -283,7 +282,7 @@ class Skeleton:
     def _parameter_places(self) -> tuple[np.ndarray, np.ndarray]:
         _, carrier, offset = self._built
         joints = np.array([carrier[segment] for segment in self.segments], dtype=int)
-        return joints, np.array([_moved_parameters(offset[segment]) for segment in self.segments])
+        return joints, _moved_parameters([offset[segment] for segment in self.segments])
 
 
 def placed_by(axis: Axis, value: float) -> pin.SE3:
@@ -293,7 +292,7 @@ def placed_by(axis: Axis, value: float) -> pin.SE3:
         value = float(axis.function(np.array([value]))[0])
     if axis.kind == "translation":
         return pin.SE3(np.eye(3), direction * value)
-    return pin.SE3(Rotation.from_rotvec(direction * value).as_matrix(), np.zeros(3))
+    return pin.SE3(pin.exp3(direction * value), np.zeros(3))
 
 
 _ALIGNED = {
@@ -314,26 +313,37 @@ def _pinocchio_joint(axis: Axis) -> pin.JointModel:
     return unaligned(*axis.direction)
 
 
-def _moved_parameters(place: pin.SE3) -> np.ndarray:
-    """(10, 10) linear map of dynamic parameters from a frame to the frame in which it stands at `place`.
+def _moved_parameters(places: Sequence[pin.SE3]) -> np.ndarray:
+    """(s, 10, 10) linear maps of dynamic parameters from frames to the one in which they stand at these places.
 
     The pseudo-inertia of a body moves as J' = T J T^T (Wensing, Kim and Slotine 2018); the parameters are linear in J.
     """
-    transform = place.homogeneous
-    columns = [_from_pseudo(transform @ _to_pseudo(unit) @ transform.T) for unit in np.eye(10)]
-    return np.array(columns).T
+    transform = np.array([place.homogeneous for place in places])[:, None]
+    moved = transform @ _PSEUDO @ transform.transpose(0, 1, 3, 2)
+    return _from_pseudo(moved).transpose(0, 2, 1)
 
 
-def _to_pseudo(p: np.ndarray) -> np.ndarray:
-    inertia = np.array([[p[4], p[5], p[7]], [p[5], p[6], p[8]], [p[7], p[8], p[9]]])
-    pseudo = np.zeros((4, 4))
-    pseudo[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    pseudo[:3, 3] = pseudo[3, :3] = p[1:4]
-    pseudo[3, 3] = p[0]
+def _unit_pseudo() -> np.ndarray:
+    """(10, 4, 4) pseudo-inertias of dynamic parameters that are one each (mass, first moments, xx xy yy xz yz zz)."""
+    pseudo = np.zeros((10, 4, 4))
+    pseudo[0, 3, 3] = 1.0
+    for axis in range(3):
+        pseudo[1 + axis, axis, 3] = pseudo[1 + axis, 3, axis] = 1.0
+    for k, (i, j) in enumerate(_INERTIA, start=4):
+        inertia = np.zeros((3, 3))
+        inertia[i, j] = inertia[j, i] = 1.0
+        pseudo[k, :3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     return pseudo
 
 
 def _from_pseudo(pseudo: np.ndarray) -> np.ndarray:
-    inertia = np.trace(pseudo[:3, :3]) * np.eye(3) - pseudo[:3, :3]
-    i = inertia
-    return np.array([pseudo[3, 3], *pseudo[:3, 3], i[0, 0], i[0, 1], i[1, 1], i[0, 2], i[1, 2], i[2, 2]])
+    """(..., 10) dynamic parameters of pseudo-inertias (..., 4, 4)."""
+    second = pseudo[..., :3, :3]
+    inertia = np.trace(second, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - second
+    rows, columns = zip(*_INERTIA, strict=True)
+    return np.concatenate([pseudo[..., 3, 3:], pseudo[..., :3, 3], inertia[..., rows, columns]], axis=-1)
+
+
+_INERTIA = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Order of the inertia among Pinocchio's dynamic parameters."""
+_PSEUDO = _unit_pseudo()
