@@ -2,8 +2,8 @@
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
 once, by Gauss-Newton steps with an analytic Jacobian. Frames are independent problems, so they are computed together:
-one Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over every tenth frame gives the warm start
-of all the others.
+one Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over a frame every tenth of a second gives
+the warm start of all the others.
 
 The normal matrix of a tree of markers is the mass matrix of the same tree with a unit mass at every marker, and is
 built the same way: per segment one 6 x 6 matrix of its markers, summed over what each coordinate carries.
@@ -20,9 +20,9 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.skeleton import Pose, Skeleton
 from kinertia.trial import Markers
 
-_WARM_START_EVERY = 10
+_WARM_START_EVERY_S = 0.1
 _FAR = 1.0
-"""Rad or m between frames a tenth of a second apart: more than a person moves."""
+"""Rad or m between frames so far apart: more than a person moves."""
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
@@ -97,7 +97,8 @@ def solve_ik(
         )
     fine = np.flatnonzero(placed)
     if consecutive and len(fine) > 1:
-        coarse = np.unique(np.append(fine[::_WARM_START_EVERY], fine[-1]))
+        every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz))
+        coarse = np.unique(np.append(fine[::every], fine[-1]))
         q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], gain_tolerance_m2)
         _carry_on(model, measured[coarse], q_coarse, gain_tolerance_m2)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
