@@ -26,7 +26,7 @@ _MAX_FRAMES = 60
 _STEPS = 15
 _TOLERANCE_M = 1e-5
 _ENOUGH_M2 = 1e-6
-"""Which coordinates markers show does not ask for a pose better than a millimetre."""
+"""Neither which coordinates markers show nor a start asks for a pose better than a millimetre."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def adapt(
     base = skeleton.with_markers(kept)
     few = [sampled(markers) for markers in trials]
     measured = np.concatenate([markers.arranged(base.labels) for markers in few])
-    start = np.concatenate([solve_ik(base, markers).q for markers in few])
+    start = np.concatenate([solve_ik(base, markers, gain_tolerance_m2=_ENOUGH_M2).q for markers in few])
     seen = np.isfinite(start).all(axis=1)
     measured, moving = measured[seen], start[seen]
 

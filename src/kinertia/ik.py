@@ -23,7 +23,7 @@ from kinertia.trial import Markers
 _WARM_START_EVERY_S = 0.1
 _FAR = 1.0
 """Rad or m between frames so far apart: more than a person moves."""
-_MAX_STEPS = 60
+MOST_STEPS = 60
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
 _WOUND_RAD, _ANEW_RAD = 2.6, 1.0
@@ -59,6 +59,14 @@ class InverseKinematics:
         return rms(self.errors_m)
 
 
+@dataclass(frozen=True)
+class _Stop:
+    """When to stop: as `solve_ik` takes it."""
+
+    gain_tolerance_m2: float
+    most_steps: int
+
+
 def rms(values: np.ndarray) -> float:
     """Root mean square over everything that is not NaN."""
     return float(np.sqrt(np.nanmean(np.square(values))))
@@ -70,6 +78,7 @@ def solve_ik(
     name: str = "markers",
     consecutive: bool = True,
     gain_tolerance_m2: float = 0.0,
+    most_steps: int = MOST_STEPS,
 ) -> InverseKinematics:
     """All coordinates at every frame, by least squares on all visible markers.
 
@@ -80,6 +89,7 @@ def solve_ik(
         consecutive: neighbouring frames show nearly the same pose, so that one may start from the other.
         gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last; what goes on
             moving then is a coordinate that the markers hardly show.
+        most_steps: after so many, from one start, a frame counts as not converged.
 
     Raises:
         MarkerSetError: fewer than three root markers of the skeleton are in the trial.
@@ -95,16 +105,16 @@ def solve_ik(
             name,
             "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
         )
-    fine = np.flatnonzero(placed)
+    fine, stop = np.flatnonzero(placed), _Stop(gain_tolerance_m2, most_steps)
     if consecutive and len(fine) > 1:
         every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz))
         coarse = np.unique(np.append(fine[::every], fine[-1]))
-        q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], gain_tolerance_m2)
-        _carry_on(model, measured[coarse], q_coarse, gain_tolerance_m2)
+        q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], stop)
+        _carry_on(model, measured[coarse], q_coarse, stop)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
     converged = np.zeros(len(q), dtype=bool)
-    q[fine], converged[fine], normal = _best_fit(model, measured[fine], q[fine], gain_tolerance_m2)
+    q[fine], converged[fine], normal = _best_fit(model, measured[fine], q[fine], stop)
     errors = np.full(measured.shape[:2], np.nan)
     errors[fine] = _misses(model, measured[fine], q[fine])
     q[~placed] = np.nan
@@ -121,16 +131,16 @@ def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _best_fit(
-    model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float
+    model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """`_gauss_newton`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
-    q, converged, normal = _gauss_newton(model, measured, q, gain_tolerance_m2)
+    q, converged, normal = _gauss_newton(model, measured, q, stop)
     joints = np.abs(q[:, 6:][:, model.rotational[6:]])
     doubtful = np.flatnonzero(~converged | (joints.max(axis=1, initial=0.0) > _WOUND_RAD))
     if doubtful.size:
         anew = q[doubtful]
         anew[:, 6:] = np.clip(anew[:, 6:], -_ANEW_RAD, _ANEW_RAD)
-        anew, settled, shown = _gauss_newton(model, measured[doubtful], anew, gain_tolerance_m2)
+        anew, settled, shown = _gauss_newton(model, measured[doubtful], anew, stop)
         old, new = (
             np.nansum(np.square(_misses(model, measured[doubtful], one)), axis=1) for one in (q[doubtful], anew)
         )
@@ -140,7 +150,7 @@ def _best_fit(
     return q, converged, normal
 
 
-def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float) -> None:
+def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop) -> None:
     """Start frames that lie far from their neighbour again from there; they keep what fits better.
 
     An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
@@ -152,7 +162,7 @@ def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_toleran
             change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
             if np.abs(change).max() < _FAR:
                 continue
-            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], gain_tolerance_m2)
+            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], stop)
             old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
             if new < old:
                 q[k] = again[0]
@@ -187,7 +197,7 @@ def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.nd
 
 
 def _gauss_newton(
-    model: Skeleton, measured: np.ndarray, q: np.ndarray, gain_tolerance_m2: float
+    model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minimise the squared marker distances frame by frame; returns q (n, c), (n,) converged, J^T J (n, c, c).
 
@@ -204,7 +214,7 @@ def _gauss_newton(
     normal = np.zeros((n, q.shape[1], q.shape[1]))
     gradient = np.zeros_like(q)
     above = ancestor_of(model)
-    for _ in range(_MAX_STEPS):
+    for _ in range(stop.most_steps):
         h, g, cost = normal_equations(model, above, measured[active], model.pose(q[active]))
         better = cost <= best[active] * (1 + 1e-12)
         up = active[better]
@@ -214,7 +224,7 @@ def _gauss_newton(
         damping[active[~better]] *= 100.0
         step[active] = _damped_step(normal[active], gradient[active], damping[active])
         gain = np.einsum("nc,nc->n", step[active], gradient[active])
-        small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | (gain < gain_tolerance_m2)
+        small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | (gain < stop.gain_tolerance_m2)
         done = active[small]
         converged[done] = True
         accepted[done] += step[done]

@@ -19,6 +19,8 @@ from kinertia.trial import Markers
 _FRAMES = 3
 _ENOUGH_M2 = 1e-6
 """Errors of centimetres are compared: fits that would gain less than the square of a millimetre may stop."""
+_MOST_STEPS = 15
+"""The right exchange falls into place in ten steps; what takes many more is none."""
 _SUSPECT_M = 0.025
 """Markers that the static model misses by less than this are not doubted."""
 _MOST_SUSPECTS = 8
@@ -39,14 +41,14 @@ def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
         name: the trial's, for the message.
         markers: the trial's, or a few frames of them.
     """
-    skeleton, labels, measured = _complete_frames(skeleton, name, markers)
-    plain = _errors(skeleton, labels, measured[None])[0]
+    skeleton, measured, errors = _complete_frames(skeleton, name, markers)
+    labels, plain = measured.labels, _typical(errors)
     suspects = [k for k in np.argsort(-plain)[:_MOST_SUSPECTS] if plain[k] > _SUSPECT_M]
     pairs = np.array(list(combinations(sorted(suspects), 2)), dtype=int).reshape(-1, 2)
-    trials = np.repeat(measured[None], len(pairs), axis=0)
+    trials = np.repeat(measured.positions[None], len(pairs), axis=0)
     for trial, pair in zip(trials, pairs, strict=True):
         trial[:, pair] = trial[:, pair[::-1]]
-    found = _errors(skeleton, labels, trials)
+    found = _exchanged_errors(skeleton, labels, trials)
     # the exchanged markers' errors under each other's names
     before = np.sqrt(np.square(plain[pairs]).mean(axis=1))
     after = np.sqrt(np.square(np.take_along_axis(found, pairs, axis=1)).mean(axis=1))
@@ -70,9 +72,11 @@ def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
         )
 
 
-def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, tuple[str, ...], np.ndarray]:
-    """The skeleton without coordinates that the trial never shows, labels, and (f, m, 3) markers of a few frames."""
-    ik = solve_ik(skeleton, markers, name, gain_tolerance_m2=_ENOUGH_M2)
+def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, Markers, np.ndarray]:
+    """The skeleton without coordinates that the trial never shows, a few frames of its markers, and their errors (f, m)
+    from the model that fits best.
+    """
+    ik = solve_ik(skeleton, markers, name, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
     known = np.isfinite(ik.q)
     never = [c for c, shown in zip(ik.coordinates, known.any(axis=0), strict=True) if not shown]
     known = known[:, known.any(axis=0)]
@@ -86,20 +90,25 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
             f"{rare}); fill the gaps of the markers or use another trial",
         )
     some = solved[np.unique(np.linspace(0, len(solved) - 1, _FRAMES).round().astype(int))]
-    return skeleton.lock(dict.fromkeys(never, 0.0)), ik.labels, markers.select(ik.labels).positions[some]
+    measured = markers.select(ik.labels)
+    few = Markers(measured.time[some], ik.labels, measured.positions[some])
+    return skeleton.lock(dict.fromkeys(never, 0.0)), few, ik.errors_m[some]
 
 
-def _errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:
-    """(h, m) m, distance of each marker from the model that fits best, for h versions of f frames (h, f, m, 3).
-
-    The median over the frames, because the fit starts from the upright pose and may be lost in one of them; 0 for a
-    marker that is not seen.
-    """
+def _exchanged_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:
+    """(h, m) m, `_typical` distance of each marker from the model that fits best, for h versions (h, f, m, 3)."""
     if not len(measured):
         return np.zeros((0, len(labels)))
     frames = measured.reshape(-1, *measured.shape[2:])
     unrelated = Markers(np.arange(len(frames), dtype=float), labels, frames)
-    ik = solve_ik(skeleton, unrelated, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
-    errors = ik.errors_m.reshape(measured.shape[:3])
-    seen = np.isfinite(errors).any(axis=1)
-    return np.where(seen, np.nanmedian(np.where(seen[:, None], errors, 0.0), axis=1), 0.0)
+    ik = solve_ik(skeleton, unrelated, consecutive=False, gain_tolerance_m2=_ENOUGH_M2, most_steps=_MOST_STEPS)
+    return _typical(ik.errors_m.reshape(measured.shape[:3]))
+
+
+def _typical(errors: np.ndarray) -> np.ndarray:
+    """(..., m) of errors (..., f, m): the median over the frames, 0 for a marker that is not seen.
+
+    The fit starts from the upright pose and may be lost in one of them.
+    """
+    seen = np.isfinite(errors).any(axis=-2)
+    return np.where(seen, np.nanmedian(np.where(seen[..., None, :], errors, 0.0), axis=-2), 0.0)
