@@ -162,9 +162,7 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
     system = _System.of((time - time[0]) / spacing)
     fitted = np.empty_like(columns)
     cutoff, sigma = np.empty(columns.shape[1]), np.empty(columns.shape[1])
-    masks, group_of = np.unique(~np.isnan(columns), axis=1, return_inverse=True)
-    for k, visible in enumerate(masks.T):
-        group = np.flatnonzero(group_of.ravel() == k)
+    for visible, group in _alike(~np.isnan(columns)):
         y = _filled(columns[:, group], visible)
         if smoothing == "gcv":
             chosen = _gcv_cutoffs(system, y, visible)
@@ -202,6 +200,14 @@ def _validated(
         if n_visible < MIN_SAMPLES:
             raise SmoothingError(column, int(n_visible))
     return time, columns, values.shape[1:]
+
+
+def _alike(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.int_]]]:
+    """Each different column of `visible` (n, c), and which columns are like it."""
+    groups: dict[bytes, list[int]] = {}
+    for column, mask in enumerate(visible.T):
+        groups.setdefault(mask.tobytes(), []).append(column)
+    return [(visible[:, group[0]], np.array(group)) for group in groups.values()]
 
 
 def _filled(columns: Array, visible: NDArray[np.bool_]) -> Array:
@@ -286,10 +292,10 @@ class _System:
         places = 2 * np.arange(n - 3) + 3
         matrix = self._matrix((2 * np.pi * f) ** 3 * (1 + 0.5j * _STEP), visible, places)
         factors, pivots, _ = lapack.zgbtrf(matrix, _BAND, _BAND, overwrite_ab=1)
-        right = np.zeros((2 * n - 1, y.shape[1]), complex, order="F")
+        right = np.zeros((2 * n - 1, y.shape[1]), order="F")
         right[places] = sum(self.differences[:, m, None] * y[m : n - 3 + m] for m in range(4))
-        solution, _ = lapack.zgbtrs(factors, _BAND, _BAND, right, pivots, overwrite_b=1)
-        residual = solution[::2].real
+        solution, _ = lapack.dgbtrs(factors.real, _BAND, _BAND, right, pivots, overwrite_b=1)
+        residual = solution[::2]
         diagonal = factors[2 * _BAND]
         trace = 1.5 + float((diagonal.imag / diagonal.real).sum()) / _STEP
         return y - residual, (residual[visible] ** 2).sum(axis=0), trace

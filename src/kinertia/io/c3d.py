@@ -68,20 +68,20 @@ def _open(path: Path) -> tuple[Any, list[str]]:
     _expect_complete(path)
     notes = []
     try:
-        file = ezc3d.c3d(str(path))
-    except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
-        raise FileError(path, f"broken C3D file ({error}); export it again") from None
+        file = ezc3d.c3d(str(path), extract_forceplat_data=True)
+    except Exception as trouble:  # ezc3d lets OSError, RuntimeError, IndexError and more through
+        try:
+            file = ezc3d.c3d(str(path))
+        except Exception as error:
+            raise FileError(path, f"broken C3D file ({error}); export it again") from None
+        if _values(file["parameters"], "FORCE_PLATFORM", "USED", [0])[0]:
+            types = ", ".join(map(str, _values(file["parameters"], "FORCE_PLATFORM", "TYPE", [])))
+            notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {trouble}")
     if not file["data"]["points"].shape[1]:
         raise FileError(
             path,
             "has no points; expected marker trajectories (a file of rotations or forces alone is not enough)",
         )
-    if _values(file["parameters"], "FORCE_PLATFORM", "USED", [0])[0]:
-        try:
-            file = ezc3d.c3d(str(path), extract_forceplat_data=True)
-        except Exception as error:  # the same, for plate types and parameters that it does not know
-            types = ", ".join(map(str, _values(file["parameters"], "FORCE_PLATFORM", "TYPE", [])))
-            notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {error}")
     return file, notes
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from kinertia.errors import FileError
 from kinertia.trial import FloatArray
@@ -63,30 +66,46 @@ def read_rows(
     Raises:
         FileError: a cell is not a number, or a row has too many or too few cells; with the line.
     """
-    rows: list[list[float]] = []
-    numbers: list[int] = []
-    for number, line in enumerate(lines[first_line - 1 :], start=first_line):
-        stripped = line.rstrip()
-        if not stripped:
-            continue
-        cells = stripped.split("\t") if "\t" in stripped else stripped.split()
-        if len(cells) > columns or (len(cells) < columns and not may_be_short):
-            raise FileError(
-                path,
-                f"the row has {len(cells)} values, expected {columns} as the header says; repair or export it again",
-                number,
-            )
-        try:
-            row = list(map(float, cells))
-        except ValueError:
-            row = [_cell(path, number, column, cell) for column, cell in enumerate(cells, start=1)]
-        rows.append(row + [math.nan] * (columns - len(row)))
-        numbers.append(number)
-    values = np.array(rows, dtype=float).reshape(len(rows), columns)
+    kept = [(number, line.rstrip()) for number, line in enumerate(lines[first_line - 1 :], start=first_line)]
+    kept = [(number, line) for number, line in kept if line]
+    numbers = [number for number, _ in kept]
+    values = _all_at_once([line for _, line in kept], columns)
+    if values is None:
+        rows = [_row(path, number, line, columns, may_be_short) for number, line in kept]
+        values = np.array(rows, dtype=float).reshape(len(rows), columns)
     if np.isinf(values).any():
         row_index, column_index = np.argwhere(np.isinf(values))[0]
         raise FileError(path, f"infinite value in column {column_index + 1}; expected a number", numbers[row_index])
     return values, numbers
+
+
+def _all_at_once(rows: Sequence[str], columns: int) -> FloatArray | None:
+    """The numbers of rows that all have this many cells, tabs between them; None where one needs a closer look."""
+    if not rows or any(row.count("\t") != columns - 1 for row in rows):
+        return None
+    text, missing = io.StringIO("\n".join(rows)), ["", "nan", "NaN"]
+    try:
+        table = pd.read_csv(
+            text, sep="\t", header=None, dtype=float, na_values=missing, keep_default_na=False, quoting=csv.QUOTE_NONE
+        )
+    except ValueError:
+        return None
+    return table.to_numpy(copy=True)
+
+
+def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -> list[float]:
+    cells = line.split("\t") if "\t" in line else line.split()
+    if len(cells) > columns or (len(cells) < columns and not may_be_short):
+        raise FileError(
+            path,
+            f"the row has {len(cells)} values, expected {columns} as the header says; repair or export it again",
+            number,
+        )
+    try:
+        row = list(map(float, cells))
+    except ValueError:
+        row = [_cell(path, number, column, cell) for column, cell in enumerate(cells, start=1)]
+    return row + [math.nan] * (columns - len(row))
 
 
 def _cell(path: Path, line: int, column: int, cell: str) -> float:
