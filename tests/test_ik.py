@@ -6,9 +6,12 @@ from hypothesis import strategies as st
 
 from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.anthropometry import literature_bsp
-from kinertia.calibration import marker_jacobian
+from kinertia.calibration import marker_jacobian, sampled
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.gait27 import build_gait27
 from kinertia.ik import _STEP_TOLERANCE, ancestor_of, normal_equations, solve_ik
+from kinertia.io.recording import read_recording
+from kinertia.marker_set import choose_marker_set
 from kinertia.trial import Markers
 from opensim_model import build_opensim
 
@@ -164,6 +167,16 @@ def test_opensim_finds_the_same_coordinates(model):
     theirs, rms = opensim_ik(model, markers)
     assert ours.marker_rms_m <= rms * (1 + 1e-9)
     np.testing.assert_allclose(ours.q, theirs, atol=2e-4)
+
+
+@pytest.mark.parametrize("person", ["a", "b"])
+def test_a_few_frames_are_solved_as_in_the_whole_trial(shared_data, person):
+    """Frames a second apart are no start for one another: a foot would end upside down."""
+    static, walk = (read_recording(shared_data / f"pig_c3d/subject_{person}_{kind}.c3d") for kind in ("static", "walk"))
+    skeleton = build_gait27(static, choose_marker_set(static.markers.labels), 1.6, "female").skeleton
+    every = round(walk.markers.rate_hz / 10)
+    few = solve_ik(skeleton, sampled(walk.markers)).q
+    np.testing.assert_allclose(few, solve_ik(skeleton, walk.markers).q[::every], atol=1e-3)
 
 
 def opensim_ik(model, markers: Markers) -> tuple[np.ndarray, float]:

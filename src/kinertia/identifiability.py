@@ -98,7 +98,8 @@ def base_parameters(
     scale = block_diagonal(dynamic_by_table(bsp.mass_kg, bsp.com_m)) * prior_sd.ravel()
     anything = _scaled_regressor(skeleton, bsp, _random_motion(len(skeleton.coordinates)), np.ones(6)) @ scale
     singular = np.linalg.svd(anything, compute_uv=False)
-    count = int((singular > _ROUNDING * singular[0]).sum())
+    rounding = _ROUNDING * float(singular[0])
+    count = int((singular > rounding).sum())
     parts = [
         np.linalg.qr(_scaled_regressor(skeleton, bsp, motion, sd) @ scale, mode="r")
         for motion, sd in zip(motions, root_sd, strict=True)
@@ -112,7 +113,7 @@ def base_parameters(
     )
     condition = float(gains[0] / gains[-1]) if gains[-1] > 0 else float("inf")
     return BaseParameters(
-        count, int((gains > 1.0).sum()), condition, best, _never(skeleton, bsp.segments, anything, count)
+        count, int((gains > 1.0).sum()), condition, best, _never(skeleton, bsp.segments, anything, count, rounding)
     )
 
 
@@ -166,14 +167,15 @@ def _words(segments: Sequence[str], vector: np.ndarray) -> str:
     return ", ".join(told) + ("" if share > _NAMED_SHARE else ", and others")
 
 
-def _never(skeleton: Skeleton, segments: Sequence[str], anything: np.ndarray, count: int) -> tuple[str, ...]:
-    """Phrases for the null space (columns of `anything`), joint by joint."""
+def _never(
+    skeleton: Skeleton, segments: Sequence[str], anything: np.ndarray, count: int, rounding: float
+) -> tuple[str, ...]:
+    """Phrases for the null space (columns of `anything`), joint by joint; singular values up to `rounding` are zero."""
     phrases, explained = [], 0
-    largest = np.linalg.svd(anything, compute_uv=False)[0]
     for parent, child in _neighbours(skeleton, segments):
         columns = np.concatenate([10 * segments.index(name) + np.arange(10) for name in (parent, child)])
         singular = np.linalg.svd(anything[:, columns], compute_uv=False)
-        hidden = int((singular <= _ROUNDING * largest).sum())
+        hidden = int((singular <= rounding).sum())
         explained += hidden
         if hidden:
             phrases.append(_hidden_between(parent, child, hidden))

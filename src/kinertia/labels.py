@@ -19,8 +19,8 @@ from kinertia.trial import Markers
 _FRAMES = 3
 _ENOUGH_M2 = 1e-6
 """Errors of centimetres are compared: fits that would gain less than the square of a millimetre may stop."""
-_MOST_STEPS = 15
-"""The right exchange falls into place in ten steps; what takes many more is none."""
+_MOST_STEPS = 8
+"""The right exchange falls into place in a few steps (on measured walks with four); what takes more is none."""
 _SUSPECT_M = 0.025
 """Markers that the static model misses by less than this are not doubted."""
 _MOST_SUSPECTS = 8
