@@ -35,7 +35,7 @@ def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     n, s = size * c, problem.layout.size
     full = np.zeros((n + s, n + s))
     for i in range(size):
-        for offset in range(min(6, size - i)):
+        for offset in range(min(7, size - i)):
             j = i + offset
             full[c * i : c * i + c, c * j : c * j + c] = normal.band[i, offset]
             full[c * j : c * j + c, c * i : c * i + c] = normal.band[i, offset].T

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from kinertia.log_cholesky import dynamic_jacobian
 from kinertia.map_terms import MapProblem
-from kinertia.normal_equations import NormalEquations, reduced
+from kinertia.normal_equations import SPLINES_PER_BLOCK, NormalEquations, reduced
 from kinertia.skeleton import Pose, Skeleton
 
 
@@ -139,8 +139,8 @@ class _MotionCovariance:
     """Posterior covariance of neighbouring spline coefficients, and of each with the static unknowns.
 
     Attributes:
-        diagonal, below: blocks of five splines (b, 5 c, 5 c), (b - 1, 5 c, 5 c), static unknowns known.
-        by_static: (5 b, c, S) minus the derivative of the coefficients by the static unknowns.
+        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k), static unknowns known.
+        by_static: (splines, c, S) minus the derivative of the coefficients by the static unknowns.
         static: (S, S) covariance.
     """
 
@@ -157,7 +157,7 @@ class _MotionCovariance:
 
     def active(self, first: int, root: slice) -> tuple[np.ndarray, np.ndarray]:
         """(6 c, 6 c) covariance of the six splines from `first` on, (6 c, s) theirs with the static unknowns `root`."""
-        block, offset = divmod(first, 5)
+        block, offset = divmod(first, SPLINES_PER_BLOCK)
         pair = np.block(
             [
                 [self.diagonal[block], self.below[block].T],
