@@ -45,6 +45,7 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
         dynamic=dynamic,
         ground=FootPlates(
             smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0),
+            rng.normal(0.0, 5.0, (len(trial.time), 2, 6)),
             ("first", "second", "third"),
             np.stack([np.where(trial.time < 0.1, 0, 2), np.full(len(trial.time), 1)], axis=1),
             Rotation.from_euler("y", 90, degrees=True).as_matrix(),

@@ -105,7 +105,10 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float) -> FootP
     turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
     used, carrier = np.unique(loads.carrier[nearest], return_inverse=True)
     names = tuple(loads.plates[i] for i in used)
-    return FootPlates(kinematics.smoothed_loads(cutoff_hz), names, carrier.reshape(-1, 2), turn)
+    smoothed = kinematics.smoothed_loads(cutoff_hz)
+    raw = np.concatenate([loads.force[nearest], loads.moment[nearest]], axis=-1)
+    lost = raw - smoothed(loads.time[nearest]).reshape(raw.shape)
+    return FootPlates(smoothed, lost, names, carrier.reshape(-1, 2), turn)
 
 
 def _noise(
