@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from generic_static import generic_model, smooth_motion
-from kinertia.calibration import adapt, hold_uninformed, sampled
+from kinertia import calibration
+from kinertia.calibration import first_poses, sampled
 from kinertia.errors import TrialError
 from kinertia.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.skeleton import Marker
@@ -34,6 +35,15 @@ def dropped(markers: Markers, labels) -> Markers:
 
 def deviations(skeleton, lower=0.01, upper=0.04) -> dict[str, float]:
     return {segment: upper if segment in UPPER else lower for segment in skeleton.segments}
+
+
+def adapt(skeleton, recordings, *deviations):
+    trials = [trial(markers) for markers in recordings]
+    return calibration.adapt(skeleton, trials, first_poses(skeleton, trials), *deviations)
+
+
+def hold_uninformed(skeleton, trials, may_hold):
+    return calibration.hold_uninformed(skeleton, trials, first_poses(skeleton, trials), may_hold)
 
 
 def test_moved_markers_come_back(skeleton):

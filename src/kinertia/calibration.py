@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.errors import TrialError
-from kinertia.ik import solve_ik
+from kinertia.ik import InverseKinematics, solve_ik
 from kinertia.skeleton import Marker, Pose, Skeleton
 from kinertia.trial import Markers, Trial
 
@@ -26,7 +26,7 @@ _MAX_FRAMES = 60
 _STEPS = 15
 _TOLERANCE_M = 1e-5
 _ENOUGH_M2 = 1e-6
-"""Neither which coordinates markers show nor a start asks for a pose better than a millimetre."""
+"""Square of a millimetre."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,15 @@ class Adaptation:
     coordinates: Mapping[str, float]
 
 
+def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKinematics]:
+    """Poses of the `sampled` frames of each trial, good to a millimetre: what `hold_uninformed` and `adapt` go by."""
+    return [solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2) for trial in trials]
+
+
 def adapt(
     skeleton: Skeleton,
-    trials: Sequence[Markers],
+    trials: Sequence[Trial],
+    poses: Sequence[InverseKinematics],
     marker_sd_m: Mapping[str, float],
     coordinate_sd: Mapping[str, float],
 ) -> Adaptation:
@@ -54,19 +60,19 @@ def adapt(
 
     Args:
         skeleton: from the static trial.
-        trials: the markers of the trials.
+        trials: the trials it will be used for.
+        poses: their `first_poses`; of coordinates that are locked by now no notice is taken.
         marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
         coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
 
     Frames whose visible markers do not determine every coordinate are left out; at least one must remain.
     """
-    present = {label for markers in trials for label in markers.labels}
+    present = {label for trial in trials for label in trial.markers.labels}
     kept = [marker for marker in skeleton.markers if marker.label in present]
     rest = [marker for marker in skeleton.markers if marker.label not in present]
     base = skeleton.with_markers(kept)
-    few = [sampled(markers) for markers in trials]
-    measured = np.concatenate([markers.arranged(base.labels) for markers in few])
-    start = np.concatenate([solve_ik(base, markers, gain_tolerance_m2=_ENOUGH_M2).q for markers in few])
+    measured = np.concatenate([sampled(trial.markers).arranged(base.labels) for trial in trials])
+    start = np.concatenate([ik.q[:, [ik.coordinates.index(name) for name in base.coordinates]] for ik in poses])
     seen = np.isfinite(start).all(axis=1)
     measured, moving = measured[seen], start[seen]
 
@@ -96,21 +102,21 @@ def adapt(
 
 
 def hold_uninformed(
-    skeleton: Skeleton, trials: Sequence[Trial], may_hold: Mapping[str, float]
+    skeleton: Skeleton, trials: Sequence[Trial], poses: Sequence[InverseKinematics], may_hold: Mapping[str, float]
 ) -> tuple[Skeleton, tuple[str, ...]]:
     """The skeleton with those coordinates held that no marker shows, and their names.
 
     Args:
         skeleton: from the static trial.
         trials: the trials it will be used for.
+        poses: their `first_poses`.
         may_hold: the coordinates that need not be shown, and the values at which they are held.
 
     Raises:
         TrialError: a trial never shows another coordinate, or one that another trial shows.
     """
     never = []
-    for trial in trials:
-        ik = solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2)
+    for ik in poses:
         shown = np.isfinite(ik.q).any(axis=0)
         never.append([name for name, known in zip(ik.coordinates, shown, strict=True) if not known])
     held = [name for name in skeleton.coordinates if all(name in names for names in never) and name in may_hold]

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import SCALE_SD, BspPrior, literature_prior
-from kinertia.calibration import adapt, hold_uninformed
+from kinertia.calibration import adapt, first_poses, hold_uninformed
 from kinertia.checks import complete_subject, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
@@ -55,11 +55,10 @@ def prepare_osim(
     trials = [_trial(model, item, feet) for item in inputs]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
-    skeleton, idle = hold_uninformed(skeleton, trials, may_hold)
+    poses = first_poses(skeleton, trials)
+    skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
     if calibrate:
-        skeleton = adapt(
-            with_centre_offsets(model, skeleton), [trial.markers for trial in trials], _marker_sd(skeleton), {}
-        ).skeleton
+        skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, known(subject.mass_kg))
     prior, held = parted(skeleton, own)

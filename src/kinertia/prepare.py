@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from kinertia.anthropometry import literature_bsp
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior, literature_prior
-from kinertia.calibration import adapt, hold_uninformed, sampled
+from kinertia.calibration import adapt, first_poses, hold_uninformed, sampled
 from kinertia.checks import check_same_person, check_visible, complete_subject, known
 from kinertia.config import Settings, Subject
 from kinertia.contacts import build_trial
@@ -85,7 +85,8 @@ def calibrate(
     for trial in trials:
         check_visible(model.skeleton, trial)
     check_same_person(model.skeleton, trials)
-    skeleton, held = hold_uninformed(model.skeleton, trials, dict.fromkeys(ARM_COORDINATES, 0.0))
+    poses = first_poses(model.skeleton, trials)
+    skeleton, held = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     for trial in trials:
         check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
     upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
@@ -93,7 +94,7 @@ def calibrate(
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
-    adapted = adapt(skeleton, [trial.markers for trial in trials], marker_sd, coordinate_sd)
+    adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
     far = {label: moved for label, moved in adapted.moved_m.items() if moved > 0.03}
     notes = []
     if held:
