@@ -296,6 +296,6 @@ def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
     """(d, r, 10 s) derivative by the body's unknowns, from a regressor (d, r, 10 s) and `chain` (s, 10, 10), the
     derivative of each segment's parameters in it by the segment's own ten.
     """
-    d, r, _ = regressor.shape
+    d, r, wide = regressor.shape
     by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain
-    return by_segment.transpose(1, 0, 2).reshape(d, r, -1)
+    return by_segment.transpose(1, 0, 2).reshape(d, r, wide)
