@@ -40,10 +40,12 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
         time=trial.time,
         markers=markers,
         marker_sd=np.linspace(0.01, 0.03, len(KEPT)),
+        marker_autocorrelation=0.8,
         q=trial.motion.q,
         dynamic=dynamic,
         ground=FootPlates(
             smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0),
+            rng.normal(0.0, 5.0, (len(trial.time), 2, 6)),
             ("first", "second", "third"),
             np.stack([np.where(trial.time < 0.1, 0, 2), np.full(len(trial.time), 1)], axis=1),
             Rotation.from_euler("y", 90, degrees=True).as_matrix(),
@@ -79,6 +81,7 @@ def curved_problem(path: Path) -> MapProblem:
         time=time,
         markers=markers + rng.normal(0.0, 0.01, markers.shape),
         marker_sd=np.linspace(0.01, 0.03, 5),
+        marker_autocorrelation=0.8,
         q=motion.q,
         dynamic=np.arange(13) > 1,
         ground=FootPlates.one_per_foot(smooth(time, rng.normal(0.0, 50.0, (13, 12)), 15.0), 13),
@@ -107,7 +110,7 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     skeleton = problem.skeleton.with_markers(placed).lock(values)
     q, qd, qdd = problem.bases[k].evaluate(coefficients)
     pose = skeleton.pose(q)
-    errors = ((trial.markers - skeleton.marker_positions(pose)) / trial.marker_sd[:, None]).ravel()
+    errors = whitened(trial.markers - skeleton.marker_positions(pose), trial.marker_sd, trial.marker_autocorrelation)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
     values = dict(zip(problem.plates, static[layout.plates].reshape(-1, 3), strict=True))
     for i, foot in np.ndindex(len(loads), 2):
@@ -121,4 +124,16 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     left = np.array([pin.rnea(loaded, data, *rows)[:6] for rows in axes]) - reaction
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
     moved = (coefficients - problem.bases[k].fit(trial.q)) / COEFFICIENT_SD
-    return np.concatenate([errors[np.isfinite(errors)], left[trial.dynamic].ravel(), moved.ravel()])
+    return np.concatenate([errors, left[trial.dynamic].ravel(), moved.ravel()])
+
+
+def whitened(errors: np.ndarray, sd: np.ndarray, autocorrelation: float) -> np.ndarray:
+    """Errors (n, m, 3) of a first-order autoregressive process as independent ones, by the dense covariance of every
+    run of frames without a gap."""
+    result = []
+    for j in range(errors.shape[1]):
+        seen = np.flatnonzero(np.isfinite(errors[:, j, 0]))
+        for run in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
+            covariance = sd[j] ** 2 * autocorrelation ** np.abs(run[:, None] - run)
+            result.append(np.linalg.solve(np.linalg.cholesky(covariance), errors[run, j]).ravel())
+    return np.concatenate(result)

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.accuracy_study import CLASSES, PROOF, SCENARIOS, Draw, run_accuracy, run_draw, summarised
+from kinertia.accuracy_study import (
+    CLASSES,
+    JOINTS,
+    PROOF,
+    SCENARIOS,
+    Draw,
+    MomentAccuracy,
+    run_accuracy,
+    run_draw,
+    summarised,
+)
 from kinertia.disturbed import Faults, measured, tilted
 from kinertia.synthetic import walk, walking_subject
 
@@ -19,7 +29,8 @@ def made_up(scale: float, seed: int = 0) -> Draw:
     rng = np.random.default_rng(seed)
     prior = np.full((12, 10), 2.0)
     sd = np.tile([0.5, 1.2, 1.9, 1.0, 1.0, 1.0, 1.0, 1.9, 1.9, 1.9], (12, 1))
-    return Draw(scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, (0.1, 0.2), (0.1, 0.1), True)
+    angles, moments = (0.1, 0.2), dict.fromkeys(JOINTS, (4.0, 9.0, 0.9))
+    return Draw(scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, angles, angles, moments, True)
 
 
 def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
@@ -32,6 +43,7 @@ def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
     assert good.classes["measured"].rms == pytest.approx(0.25, rel=0.1)
     assert good.classes["measured"].rms_literature == pytest.approx(1.0, rel=0.1)
     assert good.classes["mass"].better > 0.99
+    assert good.moments["hips"] == MomentAccuracy(2.0, 3.0, pytest.approx(0.9))
 
 
 def test_draws_do_not_depend_on_the_number_of_processes():
@@ -57,6 +69,9 @@ def test_bars_hold_short_form():
         assert accuracy.rms < 1.3 * accuracy.bound
     assert found.classes["mass"].rms < found.classes["mass"].rms_literature
     assert found.classes["CoM"].rms < found.classes["CoM"].rms_literature
+    for joint in JOINTS:
+        assert found.moments[joint].cover > 0.92
+        assert found.moments[joint].sd_nm < 2.0 * found.moments[joint].rms_nm
 
 
 @pytest.mark.slow
@@ -67,6 +82,8 @@ def test_bars_hold(key):
         assert 0.92 < found.classes[name].cover < 0.98
         assert 0.85 < found.classes[name].ratio < 1.15
         assert found.classes[name].rms < 1.3 * found.classes[name].bound
+    for joint in JOINTS:
+        assert found.moments[joint].cover > 0.93
 
 
 def test_faults_are_what_they_say(trial):

@@ -89,7 +89,7 @@ def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
 
     banded = np.zeros((size, c, size, c))
     for i in range(size):
-        for offset in range(min(6, size - i)):
+        for offset in range(min(7, size - i)):
             banded[i, :, i + offset] = normal.band[i, offset]
             banded[i + offset, :, i] = normal.band[i, offset].T
     tolerance = 1e-6 * np.sqrt(np.outer(np.diag(dense), np.diag(dense))) + 1e-6

@@ -18,13 +18,14 @@ def estimate(request, tmp_path_factory):
     return problem, coefficients, static
 
 
-def moments(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """(d, c) joint moments at a point, by `inverse_dynamics`."""
+def moments(problem, coefficients: np.ndarray, static: np.ndarray, added: np.ndarray | None = None) -> np.ndarray:
+    """(d, c) joint moments at a point, by `inverse_dynamics`; with other loads added to those on the feet."""
     names = problem.calibration.coordinates
     values = dict(zip(names, static[problem.layout.coordinates].tolist(), strict=True))
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
     motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
-    loads = problem.foot_loads(0, static)[dynamic]
+    loads = problem.foot_loads(0, static) + (0.0 if added is None else added)
+    loads = loads[dynamic]
     return inverse_dynamics(problem.skeleton.lock(values), problem.bsp(static), motion, loads)
 
 
@@ -35,7 +36,7 @@ def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     n, s = size * c, problem.layout.size
     full = np.zeros((n + s, n + s))
     for i in range(size):
-        for offset in range(min(6, size - i)):
+        for offset in range(min(7, size - i)):
             j = i + offset
             full[c * i : c * i + c, c * j : c * j + c] = normal.band[i, offset]
             full[c * j : c * j + c, c * i : c * i + c] = normal.band[i, offset].T
@@ -84,12 +85,22 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
     full = covariance_of(dense(problem, coefficients, static))
     n = coefficients.size
     by = dense_derivative(problem, coefficients, static)
-    expected = np.sqrt(np.einsum("dri,ij,drj->dr", by, full, by, optimize=True))
+    expected = np.sqrt(np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + lost(problem, coefficients, static))
     normal = problem.normal(0, coefficients, static)
     covariance = covariance_of(problem.prior_terms(static)[0] + reduced(normal, 0.0)[0])
     np.testing.assert_allclose(covariance, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     found = joint_moment_sd(problem, 0, coefficients, static, normal, covariance)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+def lost(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(d, c) moving mean square of what the loads that smoothing took off would have added to the joint moments."""
+    (trial,) = problem.trials
+    more = moments(problem, coefficients, static, trial.ground.lost) - moments(problem, coefficients, static)
+    basis = problem.bases[0]
+    half = round(2.0 * len(basis.first) / (basis.size - 5))
+    rows = np.clip(np.arange(len(more))[:, None] + np.arange(-half, half + 1), 0, len(more) - 1)
+    return np.square(more)[rows].mean(axis=1)
 
 
 def test_blocks_of_the_inverse():

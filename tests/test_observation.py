@@ -37,17 +37,19 @@ def test_effective_deviation_of_white_noise_is_its_deviation(trial, white):
     assert np.median(list(noise.sd_m.values())) == pytest.approx(0.005, rel=0.1)
     assert noise.correlation_s == pytest.approx(1.0 / trial.markers.rate_hz, rel=0.2)
     assert np.median(seen.marker_sd) == pytest.approx(0.005, rel=0.15)
+    assert seen.marker_autocorrelation == pytest.approx(0.0, abs=0.1)
     assert noise.wandering == ()
 
 
-def test_effective_deviation_of_slow_noise_is_larger(trial, white):
+def test_slow_noise_is_alike_from_frame_to_frame(trial, white):
     """The study's noise is correlated over some pi / 25 s, more than ten frames."""
     slow = study_noise(trial.markers, np.random.default_rng(0))
     seen, noise = observed(trial, slow)
     sd = np.std(slow.positions - trial.markers.positions)
     assert np.median(list(noise.sd_m.values())) == pytest.approx(sd, rel=0.3)
     assert 0.05 < noise.correlation_s < 0.5
-    assert np.median(seen.marker_sd) > 2.0 * sd
+    assert seen.marker_autocorrelation > 0.7
+    assert np.median(seen.marker_sd) > 1.1 * sd
 
 
 def test_exact_markers_keep_a_smallest_deviation(trial):
@@ -107,8 +109,7 @@ def test_markers_that_err_together_count_as_few(trial):
     ratios = []
     for markers in (apart, together):
         seen, noise = observed(trial, markers)
-        frames = noise.correlation_s * trial.markers.rate_hz
-        ratios.append(np.square(seen.marker_sd / np.array([noise.sd_m[n] for n in trial.skeleton.labels])) / frames)
+        ratios.append(np.square(seen.marker_sd / np.array([noise.sd_m[n] for n in trial.skeleton.labels])))
     assert np.median(ratios[0]) == pytest.approx(1.0, abs=0.1)
     on_thigh = trial.skeleton.marker_segments == trial.skeleton.segments.index("thigh_r")
     assert ratios[1][on_thigh] == pytest.approx(np.full(on_thigh.sum(), on_thigh.sum()), rel=0.4)
@@ -132,6 +133,16 @@ def test_noise_that_comes_back_with_every_stride_says_nothing_new():
     stride = np.cumsum(rng.normal(size=(60, 30)), axis=0)
     stride -= np.linspace(0, 1, 60)[:, None] * (stride[-1] - stride[0]) + stride.mean(axis=0)
     once, often = (_correlation_frames(np.tile(stride, (count, 1))) for count in (2, 8))
-    assert often == pytest.approx(4.0 * once, rel=0.35)
+    assert np.prod(often) == pytest.approx(4.0 * np.prod(once), rel=0.35)
     white = rng.normal(size=(480, 30))
-    assert _correlation_frames(white) == pytest.approx(1.0, abs=0.1)
+    assert _correlation_frames(white) == pytest.approx((1.0, 1.0), abs=0.1)
+
+
+def test_the_process_is_as_dense_at_zero_frequency_as_the_errors(trial):
+    """Variance times frames alike is what says how well constants are known; it is that of the errors."""
+    seen, noise = observed(trial, study_noise(trial.markers, np.random.default_rng(0)))
+    a = seen.marker_autocorrelation
+    sd = np.array([noise.sd_m[label] for label in trial.skeleton.labels])
+    frames = noise.correlation_s * trial.markers.rate_hz
+    density = np.square(seen.marker_sd / sd) * (1.0 + a) / (1.0 - a)
+    assert density.min() == pytest.approx(frames)

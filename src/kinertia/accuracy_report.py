@@ -42,13 +42,24 @@ def angles_sentence(scenario: ScenarioAccuracy) -> str:
     )
 
 
+def moments_sentence(scenario: ScenarioAccuracy) -> str:
+    """How far joint moments are off, and how far their deviations say."""
+    told = [
+        f"{joint} {found.rms_nm:.1f} / {found.sd_nm:.1f} ({100 * found.cover:.0f} %)"
+        for joint, found in scenario.moments.items()
+    ]
+    return f"Joint moments, RMS error / RMS deviation in N m (95 % cover): {', '.join(told)}."
+
+
 def accuracy_markdown(found: Mapping[str, ScenarioAccuracy]) -> str:
     """A table per scenario."""
     parts = []
     for scenario in found.values():
         lines = [f"| {' | '.join(cells)} |" for cells in (HEADINGS, _rule(HEADINGS), *accuracy_rows(scenario))]
         title = scenario.title[0].upper() + scenario.title[1:]
-        parts.append("\n".join([f"### {title}", "", *lines, "", angles_sentence(scenario)]))
+        parts.append(
+            "\n".join([f"### {title}", "", *lines, "", angles_sentence(scenario), "", moments_sentence(scenario)])
+        )
     return "\n\n".join(parts)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.bsp_prior import literature_prior
 from kinertia.disturbed import Faults, measured
+from kinertia.dynamics import inverse_dynamics
 from kinertia.identifiability import evidence
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, observe
@@ -37,6 +38,14 @@ CLASSES = {
 """Columns of `BodySegmentParameters.table`."""
 EVIDENCE = ("measured", "informed", "assumed")
 """Parameters of all kinds by what stands behind their estimate (`identifiability.evidence`)."""
+JOINTS = {
+    "hips": ("hip",),
+    "knees": ("knee",),
+    "ankles": ("ankle", "subtalar"),
+    "back": ("lumbar",),
+    "arms": ("arm", "elbow"),
+}
+"""How the coordinates of each kind of joint begin."""
 WITHIN = 1.959964
 """Half width of a 95 % interval in deviations."""
 _HELD_SD_M = 1e-4
@@ -81,6 +90,8 @@ class Draw:
             own noise model, prior included.
         angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
         angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
+        moments: per kind of joint, of the joint moments at all frames: mean square error and mean posterior variance,
+            (N m)^2, and share within the 95 % intervals.
         converged: of the estimate.
     """
 
@@ -91,6 +102,7 @@ class Draw:
     bound: np.ndarray
     angles_rad: tuple[float, float]
     angle_changes_rad: tuple[float, float]
+    moments: Mapping[str, tuple[float, float, float]]
     converged: bool
 
 
@@ -117,9 +129,18 @@ class ClassAccuracy:
 
 
 @dataclass(frozen=True)
+class MomentAccuracy:
+    """Joint moments of one kind of joint: RMS error and RMS posterior deviation (N m), and cover of 95 % intervals."""
+
+    rms_nm: float
+    sd_nm: float
+    cover: float
+
+
+@dataclass(frozen=True)
 class ScenarioAccuracy:
     """All classes of one scenario, RMS errors of joint angles (rad) by inverse kinematics and by the estimate, with
-    and without each angle's mean error, and the share of draws that converged.
+    and without each angle's mean error, joint moments, and the share of draws that converged.
     """
 
     title: str
@@ -127,6 +148,7 @@ class ScenarioAccuracy:
     classes: Mapping[str, ClassAccuracy]
     angles_rad: tuple[float, float]
     angle_changes_rad: tuple[float, float]
+    moments: Mapping[str, MomentAccuracy]
     converged: float
 
 
@@ -178,8 +200,11 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     there = Information.at(trial.skeleton, replace(prior, mean=person.bsp), calibration, at_truth, SPACING_S)
     angles = np.flatnonzero(trial.skeleton.rotational)[3:]
     inside = np.flatnonzero(seen[0].dynamic)
-    truth = trial.motion.q[np.searchsorted(trial.time, kinematics.time - 1e-9)]
-    off = [(q - truth)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]
+    at = np.searchsorted(trial.time, kinematics.time - 1e-9)
+    truth = trial.motion.cut(at)
+    off = [(q - truth.q)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]
+    found = inverse_dynamics(result.skeleton, result.bsp, result.motions[0].cut(inside), result.foot_loads[0][inside])
+    wrong = found - inverse_dynamics(trial.skeleton, person.bsp, truth, trial.foot_loads[at])
     return Draw(
         result.bsp.table() - person.bsp.table(),
         prior.mean.table() - person.bsp.table(),
@@ -188,8 +213,20 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
         there.sd(range(len(seen))),
         (_rms(off[0]), _rms(off[1])),
         (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
+        _by_joint(trial.skeleton.coordinates, wrong, result.moment_sd[0]),
         result.converged,
     )
+
+
+def _by_joint(coordinates: Sequence[str], errors: np.ndarray, sd: np.ndarray) -> dict[str, tuple[float, float, float]]:
+    """Mean squares and cover of the moments' errors and deviations (w, c), per kind of joint."""
+    found = {}
+    for joint, begins in JOINTS.items():
+        own = [name.startswith(begins) for name in coordinates]
+        error, deviation = errors[:, own], sd[:, own]
+        within = np.abs(error) < WITHIN * deviation
+        found[joint] = (float(np.square(error).mean()), float(np.square(deviation).mean()), float(within.mean()))
+    return found
 
 
 def held(skeleton: Skeleton) -> CalibrationPrior:
@@ -213,8 +250,13 @@ def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
         if np.isfinite(chosen).any():
             classes[word] = _class(*(part * chosen for part in (errors, before, sd, bound)))
     angles = [_rms(np.array([getattr(d, kind)[i] for d in draws])) for kind in _ANGLES for i in range(2)]
+    moments = {}
+    for joint in JOINTS:
+        square, variance, cover = np.mean([d.moments[joint] for d in draws], axis=0)
+        moments[joint] = MomentAccuracy(float(np.sqrt(square)), float(np.sqrt(variance)), float(cover))
     converged = float(np.mean([d.converged for d in draws]))
-    return ScenarioAccuracy(title, len(draws), classes, (angles[0], angles[1]), (angles[2], angles[3]), converged)
+    pairs = (angles[0], angles[1]), (angles[2], angles[3])
+    return ScenarioAccuracy(title, len(draws), classes, *pairs, moments, converged)
 
 
 def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.ndarray) -> ClassAccuracy:

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from kinertia.accuracy_report import HEADINGS, accuracy_rows, angles_sentence, save_accuracy
+from kinertia.accuracy_report import HEADINGS, accuracy_rows, angles_sentence, moments_sentence, save_accuracy
 from kinertia.accuracy_study import SCENARIOS, run_accuracy
 from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
@@ -209,6 +209,7 @@ def accuracy(
             shown.add_row(*row)
         out.print(shown)
         out.print(angles_sentence(scenario))
+        out.print(moments_sentence(scenario))
     save_accuracy(found, seed, output)
     out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
 

@@ -232,34 +232,75 @@ def _damped_step(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) 
 
 
 def normal_equations(
-    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose, weight: np.ndarray | float = 1.0
+    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T W J (n, c, c), J^T W r (n, c) and r^T W r (n,) of the visible markers; r = measured - model.
+    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
 
-    `above` is the model's `ancestor_of`; `weight` (m,) is per marker.
+    `above` is the model's `ancestor_of`.
     """
     positions = model.marker_positions(pose)
     residual = measured - positions
     seen = np.isfinite(residual).all(axis=-1)
     residual = np.where(seen[..., None], residual, 0.0)
-    weights = seen * np.broadcast_to(weight, len(model.markers))
-    square = np.einsum("nm,nmi->n", weights, np.square(residual))
-    residual = residual * weights[..., None]
-    per_segment = np.zeros((len(model.segments), len(model.markers)))
-    per_segment[model.marker_segments, np.arange(len(model.markers))] = 1.0
-    wrench = per_segment @ np.concatenate([residual, np.cross(positions, residual)], axis=-1)
-    support = model.support.astype(float)
-    blocks = _marker_blocks(positions, weights, per_segment)
-    n, a = len(measured), support.shape[1]
-    carried = (support.T @ blocks.reshape(n, -1, 36)).reshape(n, a, 6, 6)
+    normal = gram(model, above, pose, twist_blocks(model, positions, positions, seen.astype(float)))
+    return normal, marker_forces(model, pose, positions, residual), np.square(residual).sum(axis=(1, 2))
+
+
+def marker_forces(model: Skeleton, pose: Pose, positions: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """(n, c) generalised forces J^T f of forces (n, m, 3) on the markers at these positions (n, m, 3)."""
+    wrench = _per_segment(model) @ np.concatenate([forces, np.cross(positions, forces)], axis=-1)
     columns = pose.jacobian.transpose(0, 2, 1)
-    moved = (carried @ columns[..., None])[..., 0]
-    upper = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
-    normal = upper + np.triu(upper, 1).transpose(0, 2, 1)
-    gradient = np.einsum("ncd,ncd->nc", columns, support.T @ wrench)
-    gradient = model.map.to_coordinates(gradient, pose.slopes)
-    half = model.map.to_coordinates(normal, pose.slopes).transpose(0, 2, 1)
-    return model.map.to_coordinates(half, pose.slopes), gradient, square
+    return model.map.to_coordinates(np.einsum("ncd,ncd->nc", columns, model.support.T @ wrench), pose.slopes)
+
+
+def gram(model: Skeleton, above: np.ndarray, pose: Pose, blocks: np.ndarray, second: Pose | None = None) -> np.ndarray:
+    """(n, c, c) J^T W J' with J of the markers at a pose and J' at a second pose (the same if None).
+
+    Args:
+        model: the skeleton.
+        above: its `ancestor_of`.
+        pose, second: n frames each.
+        blocks: (n, s, 6, 6) of `twist_blocks`, symmetric if there is no second pose.
+    """
+    n, s = blocks.shape[:2]
+    carried = (model.support.T.astype(float) @ blocks.reshape(n, s, 36)).reshape(n, -1, 6, 6)
+    columns = pose.jacobian.transpose(0, 2, 1)
+    others = columns if second is None else second.jacobian.transpose(0, 2, 1)
+    moved = (carried @ others[..., None])[..., 0]
+    product = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
+    if second is None:
+        product += np.triu(product, 1).transpose(0, 2, 1)
+    else:
+        moved = (columns[:, :, None] @ carried)[:, :, 0]
+        product += np.where(above.T & ~above, moved @ others.transpose(0, 2, 1), 0.0)
+    half = model.map.to_coordinates(product, (second or pose).slopes).transpose(0, 2, 1)
+    return model.map.to_coordinates(half, pose.slopes).transpose(0, 2, 1)
+
+
+def twist_blocks(model: Skeleton, first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(n, s, 6, 6): sum over a segment's markers of w B^T B' with B = [1, -[x]]: how a twist moves them.
+
+    Args:
+        model: tells which marker is on which segment.
+        first, second: (n, m, 3) m, places x and x' of the markers.
+        weight: (n, m).
+    """
+    per_segment = _per_segment(model)
+    x, y = (places * weight[..., None] for places in (first, second))
+    sums = per_segment @ np.concatenate([weight[..., None], x, y], axis=-1)
+    outer = per_segment @ (y[..., :, None] * first[..., None, :]).reshape(*x.shape[:2], 9)
+    outer = outer.reshape(*outer.shape[:2], 3, 3)
+    blocks = np.zeros((*outer.shape[:2], 6, 6))
+    blocks[..., :3, :3] = sums[..., :1, None] * np.eye(3)
+    blocks[..., :3, 3:] = -_skew(sums[..., 4:])
+    blocks[..., 3:, :3] = _skew(sums[..., 1:4])
+    blocks[..., 3:, 3:] = np.einsum("nsii->ns", outer)[..., None, None] * np.eye(3) - outer
+    return blocks
+
+
+def _per_segment(model: Skeleton) -> np.ndarray:
+    """(s, m) 1 where the marker is on the segment."""
+    return (np.arange(len(model.segments))[:, None] == model.marker_segments).astype(float)
 
 
 def ancestor_of(model: Skeleton) -> np.ndarray:
@@ -269,21 +310,6 @@ def ancestor_of(model: Skeleton) -> np.ndarray:
     for joint in range(1, tree.njoints):
         above[[i - 1 for i in tree.supports[joint] if i > 0], joint - 1] = True
     return above
-
-
-def _marker_blocks(positions: np.ndarray, weight: np.ndarray, per_segment: np.ndarray) -> np.ndarray:
-    """(n, s, 6, 6): sum over a segment's markers of B^T B with B = [1, -[x]]: how a twist moves them."""
-    x = positions * weight[..., None]
-    sums = per_segment @ np.concatenate([weight[..., None], x], axis=-1)
-    outer = per_segment @ (x[..., :, None] * positions[..., None, :]).reshape(*x.shape[:2], 9)
-    outer = outer.reshape(*outer.shape[:2], 3, 3)
-    blocks = np.zeros((*outer.shape[:2], 6, 6))
-    blocks[..., :3, :3] = sums[..., :1, None] * np.eye(3)
-    skew = _skew(sums[..., 1:])
-    blocks[..., :3, 3:] = -skew
-    blocks[..., 3:, :3] = skew
-    blocks[..., 3:, 3:] = np.einsum("nsii->ns", outer)[..., None, None] * np.eye(3) - outer
-    return blocks
 
 
 def _skew(v: np.ndarray) -> np.ndarray:

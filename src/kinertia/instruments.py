@@ -23,20 +23,23 @@ class FootPlates:
 
     Attributes:
         loads: time -> (12) smoothed force and moment about the ground origin under the right foot, then the left.
+        lost: (n, 2, 6) what smoothing took off the loads on each foot at the frames of the trial.
         plates: names.
         carrier: (n, 2) index into `plates` of the plate that each foot stands on, at the frames of the trial.
         turn: (3, 3) from the laboratory's axes to the trial's.
     """
 
     loads: SmoothedSpline
+    lost: np.ndarray
     plates: tuple[str, ...]
     carrier: np.ndarray
     turn: np.ndarray
 
     @classmethod
     def one_per_foot(cls, loads: SmoothedSpline, n_frames: int) -> FootPlates:
-        """A plate of its own under each foot, recorded in the trial's axes."""
-        return cls(loads, ("right foot", "left foot"), np.tile([0, 1], (n_frames, 1)), np.eye(3))
+        """A plate of its own under each foot, recorded in the trial's axes; smoothing took nothing off."""
+        lost = np.zeros((n_frames, 2, 6))
+        return cls(loads, lost, ("right foot", "left foot"), np.tile([0, 1], (n_frames, 1)), np.eye(3))
 
     def columns(self, plates: Sequence[str]) -> np.ndarray:
         """(n, 2) index into these plates (a session's) of the plate that each foot stands on."""

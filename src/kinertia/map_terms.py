@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
-from kinertia.ik import ancestor_of, normal_equations
+from kinertia.ik import ancestor_of
 from kinertia.instruments import PLATE_UNKNOWNS, FootPlates
 from kinertia.log_cholesky import (
     dynamic_jacobian,
@@ -23,6 +23,7 @@ from kinertia.log_cholesky import (
     table_jacobian,
     to_log_cholesky,
 )
+from kinertia.marker_terms import marker_terms
 from kinertia.motion_basis import MotionBasis
 from kinertia.normal_equations import NormalEquations, assemble
 from kinertia.skeleton import Marker, Skeleton
@@ -38,7 +39,8 @@ class Observation:
     Attributes:
         time: (n,) s, uniform.
         markers: (n, m, 3) m in the order of the skeleton's markers; NaN where not seen.
-        marker_sd: (m,) effective white deviation, m (inflated by the square root of the noise's correlation length).
+        marker_sd: (m,) effective deviation of each marker coordinate in one frame, m.
+        marker_autocorrelation: of these errors between neighbouring frames (`marker_terms`).
         q: (n, c) start.
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
@@ -48,6 +50,7 @@ class Observation:
     time: np.ndarray
     markers: np.ndarray
     marker_sd: np.ndarray
+    marker_autocorrelation: float
     q: np.ndarray
     dynamic: np.ndarray
     ground: FootPlates
@@ -226,54 +229,15 @@ class MapProblem:
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
         parts = self.full(basis.evaluate(coefficients), static)
         skeleton = self.placed(static)
-        c = len(self.moving)
-        normal = NormalEquations(
-            np.zeros((basis.size, 6, c, c)),
-            np.zeros((basis.size, c, layout.size)),
-            np.zeros((layout.size, layout.size)),
-            np.zeros((basis.size, c)),
-            np.zeros(layout.size),
-            0.0,
-        )
-        marker = self._marker_terms(trial, skeleton, parts[0])
+        noise = (trial.marker_sd, trial.marker_autocorrelation)
+        marker = marker_terms(skeleton, self.above, trial.markers, parts[0], noise, self.moving, self.still)
         root = self._root_terms(k, skeleton, parts, static)
-        assemble(normal, basis, marker, root, layout.in_markers, layout.in_root)
+        normal = assemble(basis, marker, root, layout.in_markers, layout.in_root)
         moved = coefficients - self.start[k]
-        normal.band[:, 0] += np.eye(c) / COEFFICIENT_SD**2
+        normal.band[:, 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2
         normal.right -= moved / COEFFICIENT_SD**2
         normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
         return normal
-
-    def _marker_terms(self, trial: Observation, skeleton: Skeleton, q: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Per frame J^T J (n, c, c), J^T S (n, c, k), J^T r (n, c); and S^T S (k, k), S^T r (k,), r^T r.
-
-        S holds the static coordinates and the marker positions, which stand side by side in the layout.
-        """
-        n, m = trial.markers.shape[:2]
-        still, moving = self.still, self.moving
-        pose = skeleton.pose(q)
-        weight = 1.0 / np.square(trial.marker_sd)
-        normal, gradient, square = normal_equations(skeleton, self.above, trial.markers, pose, weight)
-        positions = skeleton.marker_positions(pose)
-        error = trial.markers - positions
-        weights = np.isfinite(error).all(axis=-1) * weight
-        turned = pose.rotation[:, skeleton.marker_segments]
-        twist = (
-            np.concatenate([turned, np.cross(positions[..., None], turned, axis=2)], axis=2) * weights[..., None, None]
-        )
-        by_marker = pose.jacobian.transpose(0, 2, 1) @ twist.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
-        by_marker *= np.repeat(skeleton.support[skeleton.marker_segments].T, 3, axis=1)
-        by_marker = skeleton.map.to_coordinates(by_marker.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
-        across = np.concatenate([normal[:, moving[:, None], still], by_marker[:, moving]], axis=-1)
-        k = len(still)
-        static = np.zeros((k + 3 * m, k + 3 * m))
-        static[:k, :k] = normal[:, still[:, None], still].sum(axis=0)
-        static[:k, k:] = by_marker[:, still].sum(axis=0)
-        static[k:, :k] = static[:k, k:].T
-        static[range(k, k + 3 * m), range(k, k + 3 * m)] = np.repeat(weights.sum(axis=0), 3)
-        pulled = np.nan_to_num(error) * weights[..., None]
-        right = np.concatenate([gradient[:, still].sum(axis=0), np.einsum("nmij,nmi->mj", turned, pulled).ravel()])
-        return normal[:, moving[:, None], moving], across, gradient[:, moving], static, right, square.sum()
 
     def _root_terms(
         self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray

@@ -2,7 +2,9 @@
 
 Delta method: the joint moments' analytic derivatives by spline coefficients and static unknowns, times their posterior
 covariance. Of the coefficients' covariance only the blocks near the diagonal are needed, since six splines are active
-in any frame; they come from the block-banded factor (`BlockBand.inverse_blocks`) and the static unknowns.
+in any frame; they come from the block-banded factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what
+smoothing took off the loads under the feet, as a moving mean square: sharp forces at foot strike are lost to the
+moments of the leg.
 """
 
 from __future__ import annotations
@@ -11,11 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from scipy.ndimage import uniform_filter1d
 
 from kinertia.log_cholesky import dynamic_jacobian
 from kinertia.map_terms import MapProblem
-from kinertia.normal_equations import NormalEquations, reduced
+from kinertia.normal_equations import SPLINES_PER_BLOCK, NormalEquations, reduced
 from kinertia.skeleton import Pose, Skeleton
+
+_LOST_KNOTS = 2.0
+"""Half of the stretch over which what smoothing took off is averaged, in knot intervals: one period of the cutoff."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +31,14 @@ class MomentDerivatives:
     Attributes:
         q, qd, qdd: (d, c, c) by the coordinates that move and their rates.
         static: (d, c, s) by the static unknowns that root equations depend on.
+        lost: (d, c) what the loads that smoothing took off would have added.
     """
 
     q: np.ndarray
     qd: np.ndarray
     qdd: np.ndarray
     static: np.ndarray
+    lost: np.ndarray
 
 
 def joint_moment_sd(
@@ -64,6 +72,8 @@ def joint_moment_sd(
         still = by.static[rows]
         variance[rows] = np.einsum("nri,nri->nr", through @ own, through)
         variance[rows] += np.einsum("nri,nri->nr", 2.0 * through @ across + still @ covariance[root, root], still)
+    around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
+    variance += uniform_filter1d(np.square(by.lost), around, axis=0, mode="nearest")
     return np.sqrt(np.maximum(variance, 0.0))
 
 
@@ -88,7 +98,7 @@ def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, st
     da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
     loads, rates = (problem.foot_loads(k, static, order)[frames] for order in (0, 1))
     pose = skeleton.pose(q)
-    by_static = np.zeros((d, axes, layout.in_root.stop))
+    by_static, lost = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
     by_segment = (regressor.reshape(d, axes, len(joints), 1, 10) @ place)[..., 0, :]
     chain = dynamic_jacobian(static[layout.theta])
     by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, axes, 10 * len(joints))
@@ -100,6 +110,7 @@ def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, st
         by_static[:, :, layout.plates] -= jacobian @ by_plate
         by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]
         tau -= (jacobian @ loads[:, foot, :, None])[..., 0]
+        lost -= (jacobian @ trial.ground.lost[frames, foot, :, None])[..., 0]
         dq -= _load_derivative(pose, moves, loads[:, foot])
     by_q, by_qd, by_qdd = (
         _rows_to_coordinates(skeleton, pose, part)
@@ -111,7 +122,8 @@ def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, st
     by_static[:, :, layout.coordinates] = by_q[:, :, problem.still]
     rows = problem.moving[:, None]
     by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (by_q, by_qd, by_qdd))
-    return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving])
+    lost = skeleton.map.to_coordinates(lost, pose.slopes)[:, problem.moving]
+    return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving], lost)
 
 
 def _rows_to_coordinates(skeleton: Skeleton, pose: Pose, by: np.ndarray) -> np.ndarray:
@@ -139,8 +151,8 @@ class _MotionCovariance:
     """Posterior covariance of neighbouring spline coefficients, and of each with the static unknowns.
 
     Attributes:
-        diagonal, below: blocks of five splines (b, 5 c, 5 c), (b - 1, 5 c, 5 c), static unknowns known.
-        by_static: (5 b, c, S) minus the derivative of the coefficients by the static unknowns.
+        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k), static unknowns known.
+        by_static: (splines, c, S) minus the derivative of the coefficients by the static unknowns.
         static: (S, S) covariance.
     """
 
@@ -157,7 +169,7 @@ class _MotionCovariance:
 
     def active(self, first: int, root: slice) -> tuple[np.ndarray, np.ndarray]:
         """(6 c, 6 c) covariance of the six splines from `first` on, (6 c, s) theirs with the static unknowns `root`."""
-        block, offset = divmod(first, 5)
+        block, offset = divmod(first, SPLINES_PER_BLOCK)
         pair = np.block(
             [
                 [self.diagonal[block], self.below[block].T],

@@ -11,13 +11,14 @@ _DEGREE = 5
 _ACTIVE = _DEGREE + 1
 _RIDGE = 1e-8
 """Keeps splines that no frame touches at zero."""
+_ROUNDING = 1e-9
+"""Of a knot interval."""
 
 
 class MotionBasis:
-    """Uniform quintic B-splines over a trial's time.
+    """Uniform quintic B-splines over a trial's time, with knots no closer than frames.
 
-    Six splines are active at any time, so that the normal equations of coefficients ordered by time are block
-    tridiagonal in blocks of five splines.
+    Six splines are active at any time, and seven at two neighbouring frames.
 
     Attributes:
         size: number of splines.
@@ -26,11 +27,11 @@ class MotionBasis:
     """
 
     def __init__(self, time: np.ndarray, spacing_s: float) -> None:
-        count = max(1, int(np.ceil((time[-1] - time[0]) / spacing_s)))
+        count = min(max(1, int(np.ceil((time[-1] - time[0]) / spacing_s))), len(time) - 1)
         step = (time[-1] - time[0]) / count
         knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
-        self.first = np.minimum(((time - time[0]) / step).astype(int), count - 1)
+        self.first = np.minimum(((time - time[0]) / step + _ROUNDING).astype(int), count - 1)
         # on a uniform grid all splines are one, shifted
         shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
         local = (time - time[0]) / step - self.first

@@ -2,9 +2,10 @@
 are.
 
 Marker noise is not white (DESIGN section 6): skin motion lasts for many frames. Its deviation and correlation length
-are read from the errors that inverse kinematics leaves, and the deviation is inflated by the square root of the number
-of frames over which errors are alike, and of the number of markers that err alike: those of a segment ride on the same
-skin. Inverse kinematics absorbs part of the noise; the deviation makes up for its degrees of freedom only on average.
+are read from the errors that inverse kinematics leaves; the estimate takes it as a first-order autoregressive process
+(`marker_terms`). The deviation is inflated by the square root of the number of markers that err alike: those of a
+segment ride on the same skin. Inverse kinematics absorbs part of the noise; the deviation makes up for its degrees of
+freedom only on average.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ MOMENT_ARM_M = 0.3
 """Deviation of the root moment over that of the force."""
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0
+CORNER = 1.5
+"""Skin motion has a nearly flat spectrum up to its highest frequency; that of a first-order process as strong and as
+long falls before. One with so many times its bandwidth, as dense at zero frequency, is half as dense there."""
 _UNLIKE, _REPEATING = 0.05, 0.3
 """Autocorrelations below which errors count as unlike, and above which they count as coming back."""
 
@@ -73,7 +77,9 @@ def observe(
     local = (turned @ errors[..., None])[..., 0]
     shown = np.isfinite(local).any(axis=0)
     local -= np.nanmean(np.where(shown, local, 0.0), axis=0)
-    noise, effective = _noise(skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz)
+    noise, effective, autocorrelation = _noise(
+        skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
+    )
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
@@ -82,6 +88,7 @@ def observe(
             time=time[frames],
             markers=measured,
             marker_sd=effective,
+            marker_autocorrelation=autocorrelation,
             q=q,
             dynamic=(time[frames] >= start - 1e-9) & (time[frames] <= end + 1e-9),
             ground=_ground(kinematics, time[frames], cutoff_hz),
@@ -98,18 +105,25 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float) -> FootP
     turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
     used, carrier = np.unique(loads.carrier[nearest], return_inverse=True)
     names = tuple(loads.plates[i] for i in used)
-    return FootPlates(kinematics.smoothed_loads(cutoff_hz), names, carrier.reshape(-1, 2), turn)
+    smoothed = kinematics.smoothed_loads(cutoff_hz)
+    raw = np.concatenate([loads.force[nearest], loads.moment[nearest]], axis=-1)
+    lost = raw - smoothed(loads.time[nearest]).reshape(raw.shape)
+    return FootPlates(smoothed, lost, names, carrier.reshape(-1, 2), turn)
 
 
-def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float) -> tuple[MarkerNoise, np.ndarray]:
-    """Noise of the markers and their effective white deviations (m,), from errors (n, m, 3)."""
+def _noise(
+    skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float
+) -> tuple[MarkerNoise, np.ndarray, float]:
+    """Noise of the markers, their effective deviations (m,), and the autocorrelation of one frame with the next, from
+    errors (n, m, 3).
+    """
     seen = np.isfinite(errors)
     filled = np.where(seen, errors, 0.0)
     count = np.maximum(seen.sum(axis=(0, 2)), 1)
     per_frame = seen.sum() / len(errors)
     lost = np.sqrt(per_frame / max(per_frame - unknowns, 1.0))
     sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
-    frames = _correlation_frames(filled.reshape(len(errors), -1))
+    frames, strides = _correlation_frames(filled.reshape(len(errors), -1))
     usual = float(np.median(sd))
     labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
     deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
@@ -118,7 +132,9 @@ def _noise(skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float
         frames / rate_hz,
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
-    return noise, sd * np.sqrt(frames * _alike(skeleton, filled))
+    alike = max(1.0, frames / CORNER)
+    spread = strides * _alike(skeleton, filled) * frames / alike
+    return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0)
 
 
 def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
@@ -135,15 +151,16 @@ def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
     return count
 
 
-def _correlation_frames(errors: np.ndarray) -> float:
-    """Over how many frames the columns (n, k) err alike, by their autocorrelation: 1 for white noise.
+def _correlation_frames(errors: np.ndarray) -> tuple[float, float]:
+    """Over how many frames the columns (n, k) err alike, by their autocorrelation (1 for white noise), and in how many
+    strides.
 
     Errors near in time are alike, and those of gait come back with every stride: a tenth stride says no more than the
-    ones before it. The correlation length is multiplied by the number of strides that repeat one another.
+    ones before it.
     """
     power = np.square(errors).sum()
     if not power > 0:
-        return 1.0
+        return 1.0, 1.0
     n = len(errors)
     spectrum = np.square(np.abs(np.fft.rfft(errors, 2 * n, axis=0))).sum(axis=1)
     alike = np.fft.irfft(spectrum)[:n] / power
@@ -152,6 +169,6 @@ def _correlation_frames(errors: np.ndarray) -> float:
     per_pair = alike * n / (n - np.arange(n))
     later = np.arange(apart, 2 * n // 3)
     if not later.size or per_pair[later].max() < _REPEATING:
-        return near
+        return near, 1.0
     period = int(later[np.argmax(per_pair[later])])
-    return near * (1.0 + 2.0 * float(np.maximum(alike[period::period], 0.0).sum()))
+    return near, 1.0 + 2.0 * float(np.maximum(alike[period::period], 0.0).sum())

@@ -87,6 +87,11 @@ class Pose:
     jacobian: np.ndarray
     slopes: np.ndarray | None
 
+    def cut(self, frames: slice | np.ndarray) -> Pose:
+        """The pose at these frames."""
+        slopes = None if self.slopes is None else self.slopes[frames]
+        return Pose(self.rotation[frames], self.translation[frames], self.jacobian[frames], slopes)
+
 
 @dataclass(frozen=True)
 class Skeleton:
