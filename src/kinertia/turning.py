@@ -59,8 +59,8 @@ class Turning:
         same = "turn to the same side" if right * left > 0 else "do not cancel"
         return (
             f"{told}; the free moments under the feet {same} (right {right:+.1f}, left {left:+.1f} N m, expected "
-            f"opposite): check sign and calibration of the plates' vertical moments, or leave the torque columns out of "
-            f"a MOT file"
+            f"opposite): check sign and calibration of the plates' vertical moments, or leave the torque columns out "
+            f"of a MOT file"
         )
 
 
