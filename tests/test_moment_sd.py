@@ -5,7 +5,7 @@ from kinertia.block_band import BlockBand
 from kinertia.dynamics import Motion, inverse_dynamics
 from kinertia.moment_sd import joint_moment_sd, moment_derivatives
 from kinertia.normal_equations import reduced
-from kinertia.simultaneous import covariance_of
+from kinertia.simultaneous import root_of_covariance
 from small_problem import curved_problem, point, small_problem
 
 
@@ -82,14 +82,15 @@ def test_derivatives_agree_with_finite_differences(estimate):
 
 def test_deviations_are_those_of_the_dense_covariance(estimate):
     problem, coefficients, static = estimate
-    full = covariance_of(dense(problem, coefficients, static))
+    root = root_of_covariance(dense(problem, coefficients, static))
+    full = root @ root.T
     n = coefficients.size
     by = dense_derivative(problem, coefficients, static)
     expected = np.sqrt(np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + lost(problem, coefficients, static))
-    normal = problem.normal(0, coefficients, static)
-    covariance = covariance_of(problem.prior_terms(static)[0] + reduced(normal, 0.0)[0])
-    np.testing.assert_allclose(covariance, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
-    found = joint_moment_sd(problem, 0, coefficients, static, normal, covariance)
+    part = reduced(problem.normal(0, coefficients, static), 0.0)
+    root = root_of_covariance(problem.prior_terms(static)[0] + part.information)
+    np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
+    found = joint_moment_sd(problem, 0, coefficients, static, part, root)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
 
 

@@ -272,10 +272,8 @@ class MapProblem:
         loads = self.foot_loads(k, static)[frames]
         wrench = loads.sum(axis=1)
         dq[:, :, :6] -= root.ground_load_derivative(q, wrench)
-        by_segment = (regressor.reshape(d, 6, len(joints), 1, 10) @ place).reshape(d, 6, len(joints), 10)
         by_static = np.zeros((d, 6, layout.in_root.stop))
-        chain = dynamic_jacobian(static[layout.theta])
-        by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, 6, 10 * len(joints))
+        by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
         by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
         for column in range(by_plate.shape[2]):
@@ -292,3 +290,12 @@ class MapProblem:
             by_static / sd,
             left,
         )
+
+
+def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
+    """(d, r, 10 s) derivative by the body's unknowns, from a regressor (d, r, 10 s) and `chain` (s, 10, 10), the
+    derivative of each segment's parameters in it by the segment's own ten.
+    """
+    d, r, wide = regressor.shape
+    by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain
+    return by_segment.transpose(1, 0, 2).reshape(d, r, wide)

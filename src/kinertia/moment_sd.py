@@ -16,8 +16,8 @@ import pinocchio as pin
 from scipy.ndimage import uniform_filter1d
 
 from kinertia.log_cholesky import dynamic_jacobian
-from kinertia.map_terms import MapProblem
-from kinertia.normal_equations import SPLINES_PER_BLOCK, NormalEquations, reduced
+from kinertia.map_terms import MapProblem, by_body
+from kinertia.normal_equations import SPLINES_PER_BLOCK, Reduced
 from kinertia.skeleton import Pose, Skeleton
 
 _LOST_KNOTS = 2.0
@@ -46,8 +46,8 @@ def joint_moment_sd(
     k: int,
     coefficients: np.ndarray,
     static: np.ndarray,
-    normal: NormalEquations,
-    covariance: np.ndarray,
+    eliminated: Reduced,
+    root: np.ndarray,
 ) -> np.ndarray:
     """(d, c) posterior deviations of the generalised forces of trial k at its dynamic frames, N m and N.
 
@@ -55,23 +55,22 @@ def joint_moment_sd(
         problem: of the estimate.
         k: the trial.
         coefficients, static: the estimate.
-        normal: the trial's normal equations there.
-        covariance: (S, S) posterior covariance of the static unknowns.
+        eliminated: the trial's normal equations there, undamped.
+        root: (S, S) root of the posterior covariance of the static unknowns.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     by = moment_derivatives(problem, k, coefficients, static)
-    motion = _MotionCovariance.of(normal, covariance)
-    root = problem.layout.in_root
+    motion = _MotionSpread.of(eliminated, coefficients.shape[1], root)
+    still = by.static @ root[problem.layout.in_root]
     variance = np.empty(by.q.shape[:2])
     for first in np.unique(basis.first[frames]):
         rows = np.flatnonzero(basis.first[frames] == first)
         values = basis.values[:, frames[rows], None, :, None]
         through = sum(value * part[rows][:, :, None] for value, part in zip(values, (by.q, by.qd, by.qdd), strict=True))
         through = through.reshape(len(rows), through.shape[1], -1)
-        own, across = motion.active(int(first), root)
-        still = by.static[rows]
-        variance[rows] = np.einsum("nri,nri->nr", through @ own, through)
-        variance[rows] += np.einsum("nri,nri->nr", 2.0 * through @ across + still @ covariance[root, root], still)
+        own, carried = motion.active(int(first))
+        variance[rows] = ((through @ own) * through).sum(axis=-1)
+        variance[rows] += np.square(still[rows] - through @ carried).sum(axis=-1)
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
     variance += uniform_filter1d(np.square(by.lost), around, axis=0, mode="nearest")
     return np.sqrt(np.maximum(variance, 0.0))
@@ -99,9 +98,7 @@ def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, st
     loads, rates = (problem.foot_loads(k, static, order)[frames] for order in (0, 1))
     pose = skeleton.pose(q)
     by_static, lost = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
-    by_segment = (regressor.reshape(d, axes, len(joints), 1, 10) @ place)[..., 0, :]
-    chain = dynamic_jacobian(static[layout.theta])
-    by_static[:, :, layout.theta] = np.einsum("drsi,sij->drsj", by_segment, chain).reshape(d, axes, 10 * len(joints))
+    by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
     for foot, name in enumerate(skeleton.feet):
         moves = skeleton.support[skeleton.segments.index(name)]
         jacobian = (pose.jacobian * moves).transpose(0, 2, 1)
@@ -147,28 +144,27 @@ def _load_derivative(pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndar
 
 
 @dataclass(frozen=True)
-class _MotionCovariance:
-    """Posterior covariance of neighbouring spline coefficients, and of each with the static unknowns.
+class _MotionSpread:
+    """How uncertain neighbouring spline coefficients are, and how they go with the static unknowns.
 
     Attributes:
-        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k), static unknowns known.
-        by_static: (splines, c, S) minus the derivative of the coefficients by the static unknowns.
-        static: (S, S) covariance.
+        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k) of their covariance if the static
+            unknowns were known.
+        carried: (splines, c, S) how far one deviation of each independent part of the static unknowns carries them.
     """
 
     diagonal: np.ndarray
     below: np.ndarray
-    by_static: np.ndarray
-    static: np.ndarray
+    carried: np.ndarray
 
     @classmethod
-    def of(cls, normal: NormalEquations, covariance: np.ndarray) -> _MotionCovariance:
-        _, _, band, border, _ = reduced(normal, 0.0)
-        c = normal.right.shape[1]
-        return cls(*band.inverse_blocks(), band.backward(border).reshape(-1, c, border.shape[-1]), covariance)
+    def of(cls, eliminated: Reduced, c: int, root: np.ndarray) -> _MotionSpread:
+        band, size = eliminated.band, len(root)
+        carried = band.backward(eliminated.border).reshape(-1, size) @ root
+        return cls(*band.inverse_blocks(), carried.reshape(-1, c, size))
 
-    def active(self, first: int, root: slice) -> tuple[np.ndarray, np.ndarray]:
-        """(6 c, 6 c) covariance of the six splines from `first` on, (6 c, s) theirs with the static unknowns `root`."""
+    def active(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """(6 c, 6 c) covariance and (6 c, S) of the six splines from `first` on."""
         block, offset = divmod(first, SPLINES_PER_BLOCK)
         pair = np.block(
             [
@@ -176,8 +172,6 @@ class _MotionCovariance:
                 [self.below[block], self.diagonal[block + 1]],
             ]
         )
-        c = self.by_static.shape[1]
+        c = self.carried.shape[1]
         here = slice(offset * c, (offset + 6) * c)
-        through = self.by_static[first : first + 6].reshape(6 * c, -1)
-        spread = through @ self.static
-        return pair[here, here] + spread @ through.T, -spread[:, root]
+        return pair[here, here], self.carried[first : first + 6].reshape(6 * c, -1)

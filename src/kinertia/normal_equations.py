@@ -61,58 +61,71 @@ def assemble(
     normal.static_right[in_root] -= flat.T @ left.ravel()
     normal.static_right[in_markers] += marker.static_gradient
     normal.cost += 0.5 * float(marker.square + np.square(left).sum())
-    values = basis.values
-    starts = np.searchsorted(basis.first, np.arange(basis.size - 4))
+    values, size = basis.values, basis.size
+    rows = _by_splines(values[:, frames], (dq, dv, da))
+    neighbours = _neighbours(basis)
+    starts = np.searchsorted(basis.first, np.arange(size - 4))
     root_starts = np.searchsorted(frames, starts)
+    next_starts = np.minimum(starts, len(marker.to_next))
     for first, (start, end) in enumerate(pairwise(starts)):
-        here = slice(start, end)
+        here, dynamic, pairs = (slice(each[first], each[first + 1]) for each in (starts, root_starts, next_starts))
         weight = values[0, here]
-        pairs = (weight[:, :, None] * weight[:, None]).reshape(-1, 36)
-        block = (pairs.T @ marker.per_frame[here].reshape(len(weight), -1)).reshape(6, 6, c, c)
-        border = normal.border[first : first + 6]
-        border[..., in_markers] += (weight.T @ marker.across[here].reshape(len(weight), -1)).reshape(6, c, -1)
-        up = weight.T @ marker.gradient[here]
-        rows = slice(root_starts[first], root_starts[first + 1])
-        at = frames[rows]
-        if at.size:
-            x = sum(
-                values[order, at][:, None, :, None] * part[rows][:, :, None] for order, part in enumerate((dq, dv, da))
-            ).reshape(-1, 6 * c)
-            block += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
-            border[..., in_root] += (x.T @ by_static[rows].reshape(-1, wide)).reshape(6, c, wide)
-            up -= (x.T @ left[rows].ravel()).reshape(6, c)
-        normal.right[first : first + 6] += up
-        for a in range(6):
-            normal.band[first + a, : 6 - a] += block[a, a:]
-    _add_neighbours(normal.band, basis, marker.to_next)
+        block = np.zeros((7, 7, c, c))
+        block[:6] = (neighbours[pairs].T @ marker.to_next[pairs].reshape(-1, c * c)).reshape(6, 7, c, c)
+        block += block.transpose(1, 0, 3, 2)
+        squares = (weight[:, :, None] * weight[:, None]).reshape(-1, 36)
+        block[:6, :6] += (squares.T @ marker.per_frame[here].reshape(-1, c * c)).reshape(6, 6, c, c)
+        border, right = normal.border[first : first + 6], normal.right[first : first + 6]
+        border[..., in_markers] += (weight.T @ marker.across[here].reshape(end - start, -1)).reshape(6, c, -1)
+        right += weight.T @ marker.gradient[here]
+        x = rows[dynamic].reshape(-1, 6 * c)
+        if len(x):
+            block[:6, :6] += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
+            border[..., in_root] += (x.T @ by_static[dynamic].reshape(-1, wide)).reshape(6, c, wide)
+            right -= (x.T @ left[dynamic].ravel()).reshape(6, c)
+        reach = min(7, size - first)
+        for a in range(reach):
+            normal.band[first + a, : reach - a] += block[a, a:reach]
     return normal
 
 
-def _add_neighbours(band: np.ndarray, basis: MotionBasis, to_next: np.ndarray) -> None:
-    """Add the terms (n - 1, c, c) of each frame with the one after it, and their transposes."""
-    first, values = basis.first, basis.values[0]
-    c = to_next.shape[1]
-    wide = SPLINES_PER_BLOCK + 1
-    # of the later frame, whose splines may begin one further on
-    later = np.zeros((len(to_next), wide))
-    moved = first[1:] - first[:-1]
-    np.put_along_axis(later, moved[:, None] + np.arange(6), values[1:], axis=1)
-    pairs = (values[:-1, :, None] * later[:, None]).reshape(len(to_next), -1)
-    starts = np.searchsorted(first[:-1], np.arange(basis.size - 4))
-    for begin, (start, end) in enumerate(pairwise(starts)):
-        block = np.zeros((wide, wide, c, c))
-        flat = to_next[start:end].reshape(end - start, -1)
-        block[:6] = (pairs[start:end].T @ flat).reshape(6, wide, c, c)
-        block += block.transpose(1, 0, 3, 2)
-        reach = min(wide, basis.size - begin)
-        for a in range(reach):
-            band[begin + a, : reach - a] += block[a, a:reach]
+def _by_splines(values: np.ndarray, parts: tuple[np.ndarray, ...]) -> np.ndarray:
+    """(d, r, 6, c) derivatives by the coefficients of the six active splines, from those by q, qd, qdd (d, r, c)."""
+    result = values[0][:, None, :, None] * parts[0][:, :, None]
+    for value, part in zip(values[1:], parts[1:], strict=True):
+        result += value[:, None, :, None] * part[:, :, None]
+    return result
 
 
-def reduced(
-    normal: NormalEquations, damping: float
-) -> tuple[np.ndarray, np.ndarray, BlockBand, np.ndarray, np.ndarray]:
-    """Schur complement (S, S) and right-hand side (S,) of the static unknowns, with what back-substitution needs."""
+def _neighbours(basis: MotionBasis) -> np.ndarray:
+    """(n - 1, 42) products of the six splines at a frame and the seven, from the same one on, at the frame after it."""
+    values, first = basis.values[0], basis.first
+    later = np.zeros((len(first) - 1, SPLINES_PER_BLOCK + 1))
+    np.put_along_axis(later, np.diff(first)[:, None] + np.arange(6), values[1:], axis=1)
+    return (values[:-1, :, None] * later[:, None]).reshape(len(later), -1)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Normal equations with the motion eliminated.
+
+    Attributes:
+        information: (S, S) on the static unknowns (Schur complement).
+        right: (S,) its right-hand side.
+        band: factor L of the motion's own normal matrix.
+        border: (b, k, S) L^-1 times the border.
+        motion: (b, k, 1) L^-1 times the motion's right-hand side.
+    """
+
+    information: np.ndarray
+    right: np.ndarray
+    band: BlockBand
+    border: np.ndarray
+    motion: np.ndarray
+
+
+def reduced(normal: NormalEquations, damping: float) -> Reduced:
+    """Eliminate the motion, with its diagonal raised by this share."""
     diagonal, below = _blocks(normal.band, damping)
     band = BlockBand.factor(diagonal, below)
     b, k, _ = diagonal.shape
@@ -122,7 +135,8 @@ def reduced(
     solved = band.forward(right.reshape(b, k, s + 1))
     border, motion = solved[..., :s], solved[..., s:]
     flat = border.reshape(-1, s)
-    return normal.static - flat.T @ flat, normal.static_right - flat.T @ motion.ravel(), band, border, motion
+    information, moved = normal.static - flat.T @ flat, normal.static_right - flat.T @ motion.ravel()
+    return Reduced(information, moved, band, border, motion)
 
 
 def _blocks(band: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from kinertia.bsp_prior import BspPrior
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import CalibrationPrior, MapProblem, Observation
 from kinertia.normal_equations import reduced
-from kinertia.simultaneous import covariance_of
+from kinertia.simultaneous import root_of_covariance
 from kinertia.skeleton import Skeleton
 
 
@@ -49,7 +49,7 @@ class Information:
         """Per trial (S, S) information on the static unknowns, motion eliminated."""
         problem = self.problem
         normals = (problem.normal(k, start, problem.start_static) for k, start in enumerate(problem.start))
-        return tuple(reduced(normal, 0.0)[0] for normal in normals)
+        return tuple(reduced(normal, 0.0).information for normal in normals)
 
     @cached_property
     def of_prior(self) -> np.ndarray:
@@ -61,5 +61,4 @@ class Information:
         information = self.of_prior + sum(self.of_trials[k] for k in trials)
         theta = self.problem.layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
-        covariance = chain @ covariance_of(information)[theta, theta] @ chain.T
-        return np.sqrt(np.diag(covariance)).reshape(-1, 10)
+        return np.linalg.norm(chain @ root_of_covariance(information)[theta], axis=1).reshape(-1, 10)

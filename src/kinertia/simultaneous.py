@@ -90,12 +90,13 @@ def estimate_simultaneous(
         if kept > 0.0:
             values, coefficients, here = new_values, new_coefficients, there
         damping = max(damping * _change_of_damping(kept), 1e-9)
-    information = here.information + sum(reduced(normal, 0.0)[0] for normal in here.normals)
-    covariance = covariance_of(information)
+    parts = [reduced(normal, 0.0) for normal in here.normals]
+    root = root_of_covariance(here.information + sum(part.information for part in parts))
     moment_sd = tuple(
-        joint_moment_sd(problem, k, part, values, normal, covariance)
-        for k, (part, normal) in enumerate(zip(coefficients, here.normals, strict=True))
+        joint_moment_sd(problem, k, motion, values, part, root)
+        for k, (motion, part) in enumerate(zip(coefficients, parts, strict=True))
     )
+    covariance = root @ root.T
     return _result(problem, coefficients, values, covariance, moment_sd, converged, iterations, (begin, here.cost))
 
 
@@ -106,31 +107,30 @@ def _change_of_damping(kept: float) -> float:
     return 1.0 if kept > 0.25 else 10.0
 
 
-def covariance_of(information: np.ndarray) -> np.ndarray:
-    """Covariance; finite also where a segment has come near the edge of what is physically possible.
+def root_of_covariance(information: np.ndarray) -> np.ndarray:
+    """R with covariance R R^T; finite also where a segment has come near the edge of what is physically possible.
 
     There the logarithm of a second moment tells nothing any more, and the information on it may round to below zero.
     """
     scale = 1.0 / np.sqrt(np.diag(information))
     values, vectors = np.linalg.eigh(scale[:, None] * information * scale)
-    half = scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
-    return half @ half.T
+    return scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
 
 
 def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], float]:
     """Step of the static unknowns (S,) and of each trial's coefficients, and by how much it would lower the cost."""
     information, right = here.information.copy(), here.right.copy()
     parts = [reduced(normal, damping) for normal in here.normals]
-    for schur, reduced_right, *_ in parts:
-        information += schur
-        right += reduced_right
+    for part in parts:
+        information += part.information
+        right += part.right
     information[np.diag_indices_from(information)] += damping * scale
     step = np.linalg.solve(information, right)
     moves = []
     promised = 0.5 * float(here.right @ step)
-    for (_, _, band, border, motion), normal in zip(parts, here.normals, strict=True):
+    for part, normal in zip(parts, here.normals, strict=True):
         size, c = normal.right.shape
-        move = band.backward(motion - border @ step[:, None]).reshape(-1, c)[:size]
+        move = part.band.backward(part.motion - part.border @ step[:, None]).reshape(-1, c)[:size]
         moves.append(move)
         promised += 0.5 * float(normal.static_right @ step + (normal.right * move).sum())
     return step, moves, promised
