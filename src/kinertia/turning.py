@@ -17,8 +17,9 @@ from kinertia.trial import FloatArray, FootLoads
 TURNING_LEVER_M = 0.002
 """A mean vertical moment above body weight times this contradicts gait.
 
-For 70 kg it is 1.4 N m: about a body's 1.2 kg m2 it adds 80 degrees a second with every stride. Measured walks have at
-most 0.5 mm (Rajagopal's); that of gait2354, with a plate that is wrong, has 5 mm.
+For 70 kg it is 1.4 N m: about a body's 1.2 kg m2 it adds 80 degrees a second with every stride. Of the measured walks
+two hold a whole stride: Rajagopal's has 0.5 mm (1.6 at most, were the stride taken elsewhere), gait2354, where a plate
+is wrong, 5 mm.
 """
 
 
@@ -59,8 +60,7 @@ class Turning:
         same = "turn to the same side" if right * left > 0 else "do not cancel"
         return (
             f"{told}; the free moments under the feet {same} (right {right:+.1f}, left {left:+.1f} N m, expected "
-            f"opposite): check sign and calibration of the plates' vertical moments, or leave the torque columns out "
-            f"of a MOT file"
+            f"opposite): check zero, sign and calibration of the plates' vertical moments, and export them again"
         )
 
 
