@@ -15,8 +15,10 @@ from kinertia.anthropometry import check_subject
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import Subject
 from kinertia.errors import SubjectError, TrialError
+from kinertia.kinematics import Kinematics
 from kinertia.skeleton import Skeleton
 from kinertia.trial import Recording, Trial
+from kinertia.turning import mean_turning
 from kinertia.two_level import TwoLevelResult
 
 if TYPE_CHECKING:
@@ -210,6 +212,12 @@ def fit_warnings(
             f"moved by {moved[worst] * 1e3:.0f} mm"
         )
     return found
+
+
+def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
+    """Trials whose ground reactions turn the person ever further to one side, and why that may be."""
+    means = {k.trial.name: mean_turning(k.trial.loads, k.time, skeleton.root.centre(k.motion.q)) for k in trials}
+    return [f"{name}: {mean.sentence()}" for name, mean in means.items() if mean is not None and mean.contradicts]
 
 
 def two_level_warnings(result: TwoLevelResult) -> list[str]:

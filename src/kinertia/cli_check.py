@@ -73,7 +73,9 @@ def check(
 
     Measured: rates, units, axes; markers and gaps; force plates and which foot
     is on them; the stretch in which all ground contact is measured; the
-    vertical force against body mass.
+    vertical force against body mass; over whole strides, whether the ground
+    turns the person to one side, as it does where a plate's vertical moment is
+    wrong.
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
-from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, two_level_warnings
+from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, turning_warnings, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.identifiability import evidence
@@ -217,6 +217,7 @@ def _estimate(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     warnings = (
         *ready.warnings,
+        *turning_warnings(ready.skeleton, ready.kinematics),
         *outcome.warnings,
         *fit_warnings(
             known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.freedom.source

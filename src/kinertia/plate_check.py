@@ -143,7 +143,7 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     if not trial.measured.any():
         return None
     start, end = trial.windows()[0]
-    strides, steps = _periods(trial.loads)
+    strides, steps = periods(trial.loads)
     fitting = [period for period in strides if period <= end - start]
     stepping = [period for period in steps if period <= end - start]
     if standing:
@@ -163,7 +163,7 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     return ForceMass(mean / GRAVITY_M_S2, first, last, over)
 
 
-def _periods(loads: FootLoads) -> tuple[list[float], list[float]]:
+def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
     """Times (s) between landings, and between leavings, of one foot; and from each to the other foot's next."""
     strides, steps = [], []
     contacts = [runs(bridged(loads.time, loads.force[:, foot, 1] > 0)) for foot in range(len(FEET))]

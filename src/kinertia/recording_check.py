@@ -20,6 +20,7 @@ from kinertia.marker_set import MarkerSet, check_marker_set, choose_marker_set, 
 from kinertia.model_segments import segment_of
 from kinertia.plate_check import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.trial import Markers, Recording, Trial
+from kinertia.turning import mean_turning
 from kinertia.verdict import Verdict
 
 OFF_PLATE_SHARE = 0.05
@@ -145,6 +146,7 @@ def check_recording(
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
     found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
+    found += [] if trial is None or used is None else _turning(trial, used)
     return RecordingCheck(recording, match, seen, moves, plates, windows, mass, scale, tuple(found), tuple(notes))
 
 
@@ -330,6 +332,16 @@ def _pressure(plates: Sequence[PlateCheck]) -> list[Verdict]:
         for plate, share in off
         if share is not None
     ]
+
+
+def _turning(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
+    markers = trial.markers.cut(*trial.windows()[0])
+    pelvis = markers.arranged(marker_set.segments.get("pelvis", ()))
+    seen = np.isfinite(pelvis).all(axis=(1, 2))
+    if not seen.any():
+        return []
+    found = mean_turning(trial.loads, markers.time[seen], pelvis[seen].mean(axis=1))
+    return [] if found is None else [Verdict("okay" if found.contradicts else "good", found.sentence())]
 
 
 def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
