@@ -19,7 +19,7 @@ import pinocchio as pin
 from threadpoolctl import threadpool_limits
 
 from kinertia.accuracy_report import accuracy_markdown
-from kinertia.accuracy_study import SCENARIOS, run_accuracy
+from kinertia.accuracy_study import SCENARIOS, held, run_accuracy
 from kinertia.bsp import BodySegmentParameters, ParameterVector
 from kinertia.bsp_prior import BspPrior, literature_prior, with_symmetry
 from kinertia.config import Settings, Subject
@@ -34,8 +34,7 @@ from kinertia.noise import camera_noise, soft_tissue_artefact, study_noise
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.prepare import TrialInput
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
-from kinertia.simultaneous_fit import GAIN_SD, fit_simultaneous
-from kinertia.skeleton import Skeleton
+from kinertia.simultaneous_fit import PLATE_SD, fit_simultaneous
 from kinertia.splines import smooth
 from kinertia.study import MARGIN_S, START_SHARE, symmetric_truth
 from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
@@ -66,11 +65,6 @@ def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | N
     measured = np.ones(len(trial.time), dtype=bool)
     feet = FootLoads(trial.time, loads[..., :3], loads[..., 3:])
     return solve_kinematics(trial.skeleton, Trial("walk", markers, feet, measured), 0.0, CUTOFF_HZ)
-
-
-def held(skeleton: Skeleton) -> CalibrationPrior:
-    """Calibration that is known: the study's skeleton and instruments are exact."""
-    return CalibrationPrior({}, np.full(len(skeleton.markers), 1e-4), 1e-4, 1e-4, 1e-4)
 
 
 def start_prior(start: BodySegmentParameters, mass_kg: float) -> BspPrior:
@@ -207,7 +201,8 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
         return estimate_simultaneous(off.skeleton, prior, calibration, [seen], SPACING_S)
 
     marker_sd = np.full(len(off.skeleton.markers), 0.005)
-    free = CalibrationPrior(dict.fromkeys(HIP_OFFSETS, PRIOR.hips_m), marker_sd, PRIOR.plate_m, GAIN_SD, PRIOR.clock_s)
+    plate_sd = {**PLATE_SD, "x": PRIOR.plate_m, "z": PRIOR.plate_m}
+    free = CalibrationPrior(dict.fromkeys(HIP_OFFSETS, PRIOR.hips_m), marker_sd, plate_sd, PRIOR.clock_s)
     result = estimate(free)
     offsets, sds = result.plates["right foot"]
     clock, clock_sd = result.clock_s

@@ -21,6 +21,7 @@ from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
+PLATES = {"x": 0.02, "z": 0.03, "gain": 0.02, "free moment": 0.01}
 LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
 
 
@@ -57,7 +58,7 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
 
 def small_problem(n_trials: int = 1) -> MapProblem:
     trial = small_trial()
-    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), 0.02, 0.02, 0.01)
+    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), PLATES, 0.01)
     observations = [small_observation(trial, seed) for seed in range(n_trials)]
     return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations, 0.1)
 
@@ -89,7 +90,7 @@ def curved_problem(path: Path) -> MapProblem:
         moment_sd=2.0,
     )
     prior = BspPrior(ours.bsp, np.diag(np.square(np.full(20, 0.01))), 13.0, 0.1)
-    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), 0.02, 0.02, 0.01)
+    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), PLATES, 0.01)
     return MapProblem(skeleton, prior, calibration, [observation], 0.1)
 
 
@@ -112,10 +113,11 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     pose = skeleton.pose(q)
     errors = whitened(trial.markers - skeleton.marker_positions(pose), trial.marker_sd, trial.marker_autocorrelation)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
-    values = dict(zip(problem.plates, static[layout.plates].reshape(-1, 3), strict=True))
+    values = dict(zip(problem.plates, static[layout.plates].reshape(-1, 4), strict=True))
     for i, foot in np.ndindex(len(loads), 2):
-        x, z, gain = values[trial.ground.plates[trial.ground.carrier[i, foot]]]
+        x, z, gain, free_moment = values[trial.ground.plates[trial.ground.carrier[i, foot]]]
         loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])
+        loads[i, foot, 4] += free_moment * loads[i, foot, 1]
         loads[i, foot] *= 1.0 + gain
     reaction = np.einsum("nij,ni->nj", pose.jacobian[:, :, :6], loads.sum(axis=1))
     loaded = skeleton.model_with(problem.bsp(static))

@@ -125,7 +125,8 @@ def test_prior_cost_counts_deviations(problem):
     prior = problem.calibration
     cases = [(layout.coordinates.start, 0.01), (layout.locals.start + 4, float(prior.marker_sd_m[1]))]
     plate = layout.plates.start
-    cases += [(plate, prior.plate_sd_m), (plate + 2, prior.gain_sd), (layout.clock, prior.clock_sd_s)]
+    cases += [(plate + i, sd) for i, sd in enumerate(prior.plate_sd.values())]
+    cases.append((layout.clock, prior.clock_sd_s))
     for at, deviation in cases:
         static = problem.start_static.copy()
         static[at] += deviation
@@ -160,7 +161,7 @@ def test_trials_share_plates_by_name_and_the_clock():
     for k, foreign in ((0, "fourth"), (1, "first")):
         static_terms = pair.normal(k, coefficients[k], static).static
         for i, name in enumerate(pair.plates):
-            own = np.abs(static_terms[pair.layout.plates][3 * i : 3 * i + 3]).max(axis=1)
+            own = np.abs(static_terms[pair.layout.plates][4 * i : 4 * i + 4]).max(axis=1)
             assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
         assert static_terms[pair.layout.clock, pair.layout.clock] > 0
 

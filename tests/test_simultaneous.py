@@ -16,6 +16,7 @@ from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
 
 SPACING_S = 0.05
+PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -42,7 +43,7 @@ def trial(person):
 
 @pytest.fixture(scope="module")
 def calibration(trial):
-    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), 0.005, 0.02, 0.005)
+    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), PLATES, 0.005)
 
 
 def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: float = 0.0, seed: int = 0) -> Observation:
@@ -146,7 +147,7 @@ def test_without_forces_only_markers_count(trial, prior, calibration):
     assert result.clock_s == (pytest.approx(0.0, abs=1e-9), pytest.approx(0.005))
     for values, sds in result.plates.values():
         np.testing.assert_allclose(values, 0.0, atol=1e-9)
-        np.testing.assert_allclose(sds, [0.005, 0.005, 0.02])
+        np.testing.assert_allclose(sds, list(PLATES.values()))
     np.testing.assert_allclose(result.motions[0].q[6:-6], trial.motion.q[6:-6], atol=0.08)
 
 

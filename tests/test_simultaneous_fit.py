@@ -15,7 +15,7 @@ from kinertia.io.recording import read_recording
 from kinertia.noise import camera_noise
 from kinertia.prepare import TrialInput
 from kinertia.results import save_fit
-from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, PLATE_SD_M, fit_simultaneous
+from kinertia.simultaneous_fit import CLOCK_SD_S, PLATE_SD, fit_simultaneous
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
 
 
@@ -60,8 +60,8 @@ def test_information_is_between_nothing_and_everything(plain):
 def test_calibration_is_told_with_its_deviations(plain):
     told = plain.posterior.calibration
     assert told["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
-    assert told["plate right foot: x"]["prior_sd"] == PLATE_SD_M
-    assert told["plate left foot: gain"]["prior_sd"] == GAIN_SD
+    assert told["plate right foot: x"]["prior_sd"] == PLATE_SD["x"]
+    assert told["plate left foot: gain"]["prior_sd"] == PLATE_SD["gain"]
     assert told["clock: forces late by"] == {
         "value": plain.result.clock_s[0],
         "prior_sd": CLOCK_SD_S,
@@ -130,6 +130,18 @@ def test_a_wrong_gain_is_named(trial):
     outcome = fitted(trial, disturb=weaken)
     assert any(w.startswith("plate right foot: gain: +") and "check the instruments" in w for w in outcome.warnings)
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
+
+
+def test_a_free_moment_that_is_not_there_is_named(trial):
+    """Nobody turns to the left all the time."""
+
+    def crosstalk(positions, loads):
+        loads[:, 1, 4] += 0.008 * loads[:, 1, 1]
+
+    outcome = fitted(trial, disturb=crosstalk)
+    told = outcome.posterior.calibration["plate left foot: free moment"]
+    assert told["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_SD["free moment"])
+    assert any(w.startswith("plate left foot: free moment: -") and "N m/kN" in w for w in outcome.warnings)
 
 
 def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):

@@ -17,6 +17,7 @@ from kinertia.bsp_prior import literature_prior
 from kinertia.disturbed import Faults, measured
 from kinertia.dynamics import inverse_dynamics
 from kinertia.identifiability import evidence
+from kinertia.instruments import PLATE_UNKNOWNS
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.parallel import in_parallel
@@ -232,7 +233,7 @@ def _by_joint(coordinates: Sequence[str], errors: np.ndarray, sd: np.ndarray) ->
 def held(skeleton: Skeleton) -> CalibrationPrior:
     """Calibration switched off: skeleton and instruments count as exact."""
     places = np.full(len(skeleton.markers), _HELD_SD_M)
-    return CalibrationPrior({}, places, _HELD_SD_M, _HELD_SD_M, _HELD_SD_M)
+    return CalibrationPrior({}, places, dict.fromkeys(PLATE_UNKNOWNS, _HELD_SD_M), _HELD_SD_M)
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:

@@ -17,7 +17,7 @@ from kinertia.freedom import JOINT_CENTRE_SD_M, MARKER_SD_M
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.kinematics import Kinematics, solve_kinematics
 from kinertia.noise import camera_noise, soft_tissue_artefact, study_noise
-from kinertia.simultaneous_fit import CLOCK_SD_S, GAIN_SD, PLATE_SD_M
+from kinertia.simultaneous_fit import CLOCK_SD_S, PLATE_SD
 from kinertia.skeleton import GRAVITY_M_S2, Marker, Skeleton
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial
@@ -89,9 +89,11 @@ def _miscalibrated(trial: SyntheticTrial, loads: np.ndarray, rng: np.random.Gene
     placed = [Marker(m.label, m.segment, place) for m, place in zip(skeleton.markers, places, strict=True)]
     late = smooth(trial.time, loads.reshape(len(trial.time), 12), _LOADS_HZ)(trial.time + rng.normal(0.0, CLOCK_SD_S))
     wrong = late.reshape(loads.shape)
-    offset = rng.normal(0.0, PLATE_SD_M, (2, 3)) * [1.0, 0.0, 1.0]
+    offset = rng.normal(0.0, 1.0, (2, 3)) * [PLATE_SD["x"], 0.0, PLATE_SD["z"]]
     wrong[..., 3:] += np.cross(offset, wrong[..., :3])
-    return skeleton.with_markers(placed), wrong * (1.0 + rng.normal(0.0, GAIN_SD, (2, 1)))
+    wrong *= 1.0 + rng.normal(0.0, PLATE_SD["gain"], (2, 1))
+    wrong[..., 4] += rng.normal(0.0, PLATE_SD["free moment"], 2) * wrong[..., 1]
+    return skeleton.with_markers(placed), wrong
 
 
 def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Skeleton:

@@ -1,7 +1,8 @@
 """What force plates and clock may have wrong, and the ground reactions once that is put right.
 
-Each plate may stand off its recorded place in the floor's plane and have a wrong gain; forces may be recorded late. The
-plates are the laboratory's: their offsets are in its axes and are shared by all trials, as is the clock.
+Each plate may stand off its recorded place in the floor's plane, have a wrong gain, and read a vertical moment that is
+not there, in proportion to the vertical force (crosstalk of its channels); forces may be recorded late. The plates are
+the laboratory's: their offsets are in its axes and are shared by all trials, as is the clock.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import numpy as np
 
 from kinertia.splines import SmoothedSpline
 
-PLATE_UNKNOWNS = ("x", "z", "gain")
-"""Of each plate: offsets in the floor's plane (m), and relative error of the gain."""
+PLATE_UNKNOWNS = {"x": "m", "z": "m", "gain": "1", "free moment": "N m/N"}
+"""Of each plate, and its unit: offsets in the floor's plane, relative error of the gain, and what the vertical moment
+lacks per vertical force."""
 
 
 @dataclass(frozen=True)
@@ -51,25 +53,27 @@ class FootPlates:
         Args:
             time: (n,) by the plates' clock.
             carrier: (n, 2) row of `plates` under each foot.
-            plates: (p, 3) offsets and gain error of the plates.
+            plates: (p, 4) what is wrong with the plates.
         """
         loads = self.loads(time, derivative).reshape(len(time), 2, 6)
         here = plates[carrier]
         loads[..., 3:] += np.cross(self._ground_offset(here), loads[..., :3])
-        return (1.0 + here[..., 2:]) * loads
+        loads[..., 4] += here[..., 3] * loads[..., 1]
+        return (1.0 + here[..., 2:3]) * loads
 
     def by_plate(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """(n, 6, 3 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 3)."""
-        result = np.zeros((len(loads), 6, len(plates), 3))
-        raw = loads / (1.0 + plates[carrier][..., 2:])
+        """(n, 6, 4 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 4)."""
+        result = np.zeros((len(loads), 6, *plates.shape))
+        raw = loads / (1.0 + plates[carrier][..., 2:3])
         for foot in range(2):
             under = carrier[:, foot, None] == np.arange(len(plates))
             for j, axis in enumerate((0, 2)):
                 moment = np.cross(self.turn[:, axis], loads[:, foot, :3])
                 result[:, 3:, :, j] += moment[:, :, None] * under[:, None, :]
             result[..., 2] += raw[:, foot, :, None] * under[:, None, :]
-        return result.reshape(len(loads), 6, 3 * len(plates))
+            result[:, 4, :, 3] += loads[:, foot, 1, None] * under
+        return result.reshape(len(loads), 6, plates.size)
 
     def _ground_offset(self, plates: np.ndarray) -> np.ndarray:
-        """(..., 3) m: offsets of plates (..., 3) in the trial's axes."""
+        """(..., 3) m: offsets of plates (..., 4) in the trial's axes."""
         return plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]

@@ -65,15 +65,13 @@ class CalibrationPrior:
     Attributes:
         coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
-        plate_sd_m: of each plate's in-plane offset.
-        gain_sd: of each plate's relative error of gain.
+        plate_sd: of each of PLATE_UNKNOWNS.
         clock_sd_s: of the time between forces and markers.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
-    plate_sd_m: float
-    gain_sd: float
+    plate_sd: Mapping[str, float]
     clock_sd_s: float
 
 
@@ -156,8 +154,7 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        each = (calibration.plate_sd_m, calibration.plate_sd_m, calibration.gain_sd)
-        deviation[self.layout.plates] = each * len(self.plates)
+        deviation[self.layout.plates] = [calibration.plate_sd[name] for name in PLATE_UNKNOWNS] * len(self.plates)
         deviation[self.layout.clock] = calibration.clock_sd_s
         self.weight = 1.0 / np.square(deviation)
 
@@ -215,7 +212,7 @@ class MapProblem:
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
     def plate_values(self, static: np.ndarray) -> np.ndarray:
-        """(p, 3) offsets and gain error of every plate."""
+        """(p, 4) what is wrong with every plate, in the order of PLATE_UNKNOWNS."""
         return static[self.layout.plates].reshape(-1, len(PLATE_UNKNOWNS))
 
     def foot_loads(self, k: int, static: np.ndarray, derivative: int = 0) -> np.ndarray:

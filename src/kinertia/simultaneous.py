@@ -2,10 +2,11 @@
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
-segments, each plate's in-plane offset and gain, and the time offset of the forces. Minimised is the sum of squares,
-each over its deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg
-damping, all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns
-(`block_band`); its Schur complement is the information on them, and its inverse their covariance.
+segments, what is wrong with each plate (`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is
+the sum of squares, each over its deviation, of: marker errors, root residuals, and departures from the priors.
+Gauss-Newton with Levenberg damping, all derivatives analytic. The normal matrix is block tridiagonal in time with a
+border of static unknowns (`block_band`); its Schur complement is the information on them, and its inverse their
+covariance.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class SimultaneousResult:
         bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
         skeleton: with the estimated marker positions and static coordinates.
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        plates: per plate its offsets x and z (m) and gain error, (3,), and their posterior deviations (3,).
+        plates: per plate what is wrong with it (4,), in the order of PLATE_UNKNOWNS, and the posterior deviations (4,).
         clock_s: the time offset and its posterior deviation, s.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
         motions: per trial q, qd, qdd at its frames.

@@ -12,15 +12,16 @@ from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import Motion
 from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import BaseParameters, base_parameters
+from kinertia.instruments import PLATE_UNKNOWNS
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
 from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
 
-PLATE_SD_M = 0.010
-GAIN_SD = 0.02
-"""Scale and plates of a laboratory may differ by this much before it is worth a warning (DESIGN section 7)."""
+PLATE_SD = {"x": 0.010, "z": 0.010, "gain": 0.02, "free moment": 0.0015}
+"""Names and units as in PLATE_UNKNOWNS. Gain: scale and plates of a laboratory may differ by this much before it is
+worth a warning (DESIGN section 7). Free moment: half a percent of the vertical force at 0.3 m (no source)."""
 CLOCK_SD_S = 0.005
 _STAYING_SD_M = 1e-6
 """Of markers that stay where they are."""
@@ -132,7 +133,7 @@ def fit_simultaneous(
 def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
     """How far a calibrated skeleton with these markers, plates and clock may be off."""
     places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
-    return CalibrationPrior(freedom.coordinates, places, PLATE_SD_M, GAIN_SD, CLOCK_SD_S)
+    return CalibrationPrior(freedom.coordinates, places, PLATE_SD, CLOCK_SD_S)
 
 
 def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
@@ -143,17 +144,21 @@ def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResul
         found[name] = {**told, "unit": "rad" if name in freedom.axes else "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
-        for axis, value, deviation in zip("xz", values, sds, strict=False):
-            told = {"value": float(value), "prior_sd": PLATE_SD_M, "sd": float(deviation)}
-            found[f"{name}: {axis}"] = {**told, "unit": "m"}
-        told = {"value": float(values[2]), "prior_sd": GAIN_SD, "sd": float(sds[2])}
-        found[f"{name}: gain"] = {**told, "unit": "1"}
+        for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
+            told = {"value": float(value), "prior_sd": PLATE_SD[unknown], "sd": float(deviation)}
+            found[f"{name}: {unknown}"] = {**told, "unit": unit}
     clock, clock_sd = result.clock_s
     found["clock: forces late by"] = {"value": clock, "prior_sd": CLOCK_SD_S, "sd": clock_sd, "unit": "s"}
     return found
 
 
-SHOWN_UNIT = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%"), "rad": (180.0 / np.pi, "degrees")}
+SHOWN_UNIT = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "1": (1e2, "%"),
+    "rad": (180.0 / np.pi, "degrees"),
+    "N m/N": (1e3, "N m/kN"),
+}
 """Factor and unit in which people read a calibrated quantity."""
 
 
@@ -174,7 +179,7 @@ def _warnings(
         if ":" in name and abs(value) > _NOTABLE * sd:
             scale, unit = SHOWN_UNIT[str(told["unit"])]
             found.append(
-                f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.0f} {unit}); check the instruments"
+                f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit}); check the instruments"
             )
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
