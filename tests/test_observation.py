@@ -83,6 +83,23 @@ def test_gaps_are_missing_and_a_marker_that_the_trial_lacks_too(trial):
     assert np.isfinite(seen.markers[:, 8]).all()
 
 
+def test_frames_stay_uniform_where_the_pelvis_is_not_seen(trial):
+    """Terms of neighbouring frames and the window of the other results need every frame."""
+    pelvis = [trial.markers.labels.index(m.label) for m in trial.skeleton.markers if m.segment == "pelvis"]
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions.copy()
+    gap = slice(50, 58)
+    positions[gap, pelvis] = np.nan
+    kinematics = kinematics_of(trial, replace(trial.markers, positions=positions))
+    seen, noise = observe(trial.skeleton, kinematics, MASS_KG, 10.0)
+    np.testing.assert_allclose(np.diff(seen.time), 0.01)
+    np.testing.assert_allclose(seen.time[seen.dynamic], kinematics.time)
+    here = slice(*(int(np.searchsorted(seen.time, trial.time[i] - 1e-9)) for i in (gap.start, gap.stop)))
+    assert np.isnan(seen.markers[here]).all()
+    assert np.isfinite(seen.q).all()
+    np.testing.assert_allclose(seen.q[here], trial.motion.q[gap], atol=0.15)
+    assert np.median(list(noise.sd_m.values())) == pytest.approx(0.002, rel=0.1)
+
+
 def test_only_the_window_is_dynamic_and_its_surroundings_are_markers(trial):
     kinematics = replace(kinematics_of(trial, trial.markers), window_s=(0.4, 0.6))
     seen, _ = observe(trial.skeleton, kinematics, MASS_KG, 10.0)

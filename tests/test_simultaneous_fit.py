@@ -98,6 +98,22 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
     assert "knee_tilt_1_r" not in fitted(trial).posterior.calibration
 
 
+@pytest.mark.parametrize("gap", [slice(40, 41), slice(40, 48), slice(2, 14)])
+def test_the_motion_is_known_in_every_frame_of_the_window_though_the_pelvis_is_not_seen(trial, gap):
+    pelvis = [trial.markers.labels.index(m.label) for m in trial.skeleton.markers if m.segment == "pelvis"]
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions
+    positions[gap, pelvis] = np.nan
+    kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), trial.foot_loads)
+    with threadpool_limits(1, user_api="blas"):
+        prior = literature_prior(walking_subject().literature)
+        outcome = fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
+    assert outcome.result.converged
+    at = np.searchsorted(trial.time, kinematics.time - 1e-9)
+    np.testing.assert_allclose(outcome.motions[0].q, trial.motion.q[at], atol=0.06)
+    assert outcome.foot_loads[0].shape == (len(at), 2, 6)
+    assert outcome.result.moment_sd[0].shape == trial.motion.q[at].shape
+
+
 def test_a_displaced_plate_is_named(trial):
     def shift(positions, loads):
         loads[:, 0, 3:] += np.cross([0.0, 0.0, 0.03], loads[:, 0, :3])

@@ -66,10 +66,15 @@ def observe(
     time = kinematics.trial.markers.time
     start, end = kinematics.window_s
     near = (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
-    frames = np.flatnonzero(near & np.isfinite(kinematics.ik.q).any(axis=1))
-    q = kinematics.ik.q[frames]
+    solved = np.isfinite(kinematics.ik.q).any(axis=1)
+    frames = np.flatnonzero(near & np.logical_or.accumulate(solved) & np.logical_or.accumulate(solved[::-1])[::-1])
+    # frames between must stay, or neighbours would not be neighbours; their markers show no pose
+    solved = solved[frames]
+    bridged = kinematics.spline(time[frames])
+    q = np.where(solved[:, None], kinematics.ik.q[frames], bridged)
     measured = kinematics.trial.markers.arranged(skeleton.labels)[frames]
-    known = np.where(np.isfinite(q), q, kinematics.spline(time[frames]))
+    measured[~solved] = np.nan
+    known = np.where(np.isfinite(q), q, bridged)
     pose = skeleton.pose(known)
     errors = measured - skeleton.marker_positions(pose)
     # what a marker is off its place in the segment all the time is calibration, not noise
@@ -120,7 +125,7 @@ def _noise(
     seen = np.isfinite(errors)
     filled = np.where(seen, errors, 0.0)
     count = np.maximum(seen.sum(axis=(0, 2)), 1)
-    per_frame = seen.sum() / len(errors)
+    per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
     lost = np.sqrt(per_frame / max(per_frame - unknowns, 1.0))
     sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
     frames, strides = _correlation_frames(filled.reshape(len(errors), -1))
