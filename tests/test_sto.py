@@ -85,6 +85,7 @@ BROKEN = {
     "short row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3"), 9, "2 values, expected 3"),
     "long row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3\t4\t5"), 9, "4 values, expected 3"),
     "not a number": (HEADER + TABLE.replace("3", "three"), 9, "'three' in column 2"),
+    "truth values": (HEADER + TABLE.replace("\t1", "\tTrue").replace("\t3", "\tFalse"), 8, "'True' in column 2"),
     "no time": (HEADER + TABLE.replace("0.5", ""), 9, "no time"),
     "no time column": (HEADER + TABLE.replace("time", "frame"), 7, "first column is 'frame'"),
     "repeated": (HEADER + TABLE.replace("a\tb", "a\ta"), 7, "repeated column labels a"),

@@ -15,6 +15,9 @@ import pandas as pd
 from kinertia.errors import FileError
 from kinertia.trial import FloatArray
 
+_TRUTH = ("true", "false")
+"""What pandas takes for the numbers 1 and 0 where a whole column has nothing else."""
+
 
 def read_lines(path: Path) -> list[str]:
     """The lines of a text file, whatever its line ends.
@@ -83,10 +86,19 @@ def _all_at_once(rows: Sequence[str], columns: int) -> FloatArray | None:
     """The numbers of rows that all have this many cells, tabs between them; None where one needs a closer look."""
     if not rows or any(row.count("\t") != columns - 1 for row in rows):
         return None
-    text, missing = io.StringIO("\n".join(rows)), ["", "nan", "NaN"]
+    text, missing = "\n".join(rows), ["", "nan", "NaN"]
+    lower = text.lower()
+    if any(word in lower for word in _TRUTH):
+        return None
     try:
         table = pd.read_csv(
-            text, sep="\t", header=None, dtype=float, na_values=missing, keep_default_na=False, quoting=csv.QUOTE_NONE
+            io.StringIO(text),
+            sep="\t",
+            header=None,
+            dtype=float,
+            na_values=missing,
+            keep_default_na=False,
+            quoting=csv.QUOTE_NONE,
         )
     except ValueError:
         return None
