@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.io.osim import read_osim
 from kinertia.io.recording import read_recording
+from kinertia.marker_set import MarkerSet, choose_marker_set
 from kinertia.recording_check import check_recording, markers_of_model
 from kinertia.synthetic import walk, walking_subject
 from kinertia.trial import FootLoads, PlateLoads, Recording
@@ -146,6 +147,15 @@ def test_check_of_a_recording(walked):
     positions[100:104, walked.markers.labels.index("R.ASIS")] = np.nan
     assert verdicts(replace(walked, markers=replace(walked.markers, positions=positions))) == [fine]
     assert verdicts(replace(walked, plates=None)) == []
+
+
+def test_the_check_goes_by_the_pelvis_markers_that_there_are(walked):
+    (fine,) = verdicts(walked)
+    marker_set = choose_marker_set(walked.markers.labels)
+    named = {**marker_set.segments, "pelvis": (*marker_set.segments["pelvis"], "Not.Worn")}
+    assert verdicts(walked, replace(marker_set, segments=named)) == [fine]
+    none = {name: labels for name, labels in marker_set.segments.items() if name != "pelvis"}
+    assert verdicts(walked, MarkerSet("a model", {}, none, {})) == []
 
 
 MEASURED = {

@@ -336,9 +336,10 @@ def _pressure(plates: Sequence[PlateCheck]) -> list[Verdict]:
 
 def _turning(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
     markers = trial.markers.cut(*trial.windows()[0])
-    pelvis = markers.arranged(marker_set.segments.get("pelvis", ()))
+    worn = [label for label in marker_set.segments.get("pelvis", ()) if label in markers.labels]
+    pelvis = markers.select(worn).positions
     seen = np.isfinite(pelvis).all(axis=(1, 2))
-    if not seen.any():
+    if not worn or not seen.any():
         return []
     found = mean_turning(trial.loads, markers.time[seen], pelvis[seen].mean(axis=1))
     return [] if found is None else [Verdict("okay" if found.contradicts else "good", found.sentence())]
