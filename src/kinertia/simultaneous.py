@@ -64,8 +64,8 @@ CONVERGED = 0.25
 deviations over all unknowns together; or that does lower it by less, where segments creep to the edge of what is
 physically possible."""
 _FIRST_DAMPING = 1e-5
-"""Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more information:
-with 1e-3 the first steps would hold them back."""
+"""Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
+information: 1e-3 would hold the first steps back."""
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 40
