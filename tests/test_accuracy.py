@@ -7,6 +7,12 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 import accuracy
+from bsp_errors import errors
+from calibration_errors import PRIOR, calibrated, calibration_section
+from estimate_speed import speed_section, timed
+from pooling import pooling_section
+from study_noise import study_draw, study_section
+from synthetic_walks import study_walk
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -16,24 +22,24 @@ def _one_thread():
 
 
 def test_errors_of_the_truth_are_zero():
-    trial = accuracy.study_walk(0.5)
-    assert accuracy.errors(trial.bsp, trial.bsp) == (0.0, 0.0, 0.0)
+    trial = study_walk(0.5)
+    assert errors(trial.bsp, trial.bsp) == (0.0, 0.0, 0.0)
 
 
 def test_page():
-    draw = accuracy.study_draw(0, two_level=False)
-    outcome = accuracy.calibrated(accuracy.PRIOR, 0, duration_s=0.8)
+    draw = study_draw(0, two_level=False)
+    outcome = calibrated(PRIOR, 0, duration_s=0.8)
     values = {name: np.arange(3.0) for name in ("whole", "first half", "second half", "halves")}
     sds = {"whole": np.ones(3), "first half": np.full(3, 2.0), "second half": np.full(3, 2.0), "halves": np.ones(3)}
-    timing = accuracy.timed(1.0)
+    timing = timed(1.0)
     page = accuracy.document(
         {
             "draws": "1",
-            "study": accuracy.study_section([draw]),
-            "calibration": accuracy.calibration_section({"all three": [outcome]}),
+            "study": study_section([draw]),
+            "calibration": calibration_section({"all three": [outcome]}),
             "measured": "",
-            "pooling": accuracy.pooling_section(values, sds),
-            "speed": accuracy.speed_section([timing]),
+            "pooling": pooling_section(values, sds),
+            "speed": speed_section([timing]),
             "people": "2",
             "error_bars": "| mass (kg) |",
         }

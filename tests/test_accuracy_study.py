@@ -11,10 +11,12 @@ from kinertia.accuracy_study import (
     SCENARIOS,
     Draw,
     MomentAccuracy,
+    attainable,
     run_accuracy,
     run_draw,
     summarised,
 )
+from kinertia.bsp_prior import literature_prior
 from kinertia.disturbed import Faults, measured, tilted
 from kinertia.synthetic import walk, walking_subject
 
@@ -29,8 +31,11 @@ def made_up(scale: float, seed: int = 0) -> Draw:
     rng = np.random.default_rng(seed)
     prior = np.full((12, 10), 2.0)
     sd = np.tile([0.5, 1.2, 1.9, 1.0, 1.0, 1.0, 1.0, 1.9, 1.9, 1.9], (12, 1))
+    shares = dict.fromkeys(CLASSES, 0.8)
     angles, moments = (0.1, 0.2), dict.fromkeys(JOINTS, (4.0, 9.0, 0.9))
-    return Draw(scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, angles, angles, moments, True)
+    return Draw(
+        scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, shares, angles, angles, moments, True
+    )
 
 
 def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
@@ -44,6 +49,16 @@ def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
     assert good.classes["measured"].rms_literature == pytest.approx(1.0, rel=0.1)
     assert good.classes["mass"].better > 0.99
     assert good.moments["hips"] == MomentAccuracy(2.0, 3.0, pytest.approx(0.9))
+
+
+def test_what_an_estimate_at_the_bound_can_attain():
+    """Known parts: an exact estimate is always better, none at all never, half the variance in between."""
+    prior = literature_prior(walking_subject().literature)
+    root = np.linalg.cholesky(prior.given_scale()[1])
+    exact, half, nothing = (attainable(prior, share * root, np.random.default_rng(0)) for share in (1e-6, 0.7, 1.0))
+    assert set(exact.values()) == {1.0}
+    assert all(nothing[name] + 0.1 < share < 1.0 for name, share in half.items())
+    assert max(nothing.values()) < 0.6
 
 
 def test_draws_do_not_depend_on_the_number_of_processes():

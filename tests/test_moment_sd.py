@@ -48,8 +48,9 @@ def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
 
 def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns."""
-    by = moment_derivatives(problem, 0, coefficients, static)
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
+    motion = [part[frames] for part in problem.full(basis.evaluate(coefficients), static)]
+    by = moment_derivatives(problem, 0, motion, static, frames)
     size, c = coefficients.shape
     through = np.zeros((len(frames), c, size, c))
     for row, t in enumerate(frames):

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from accuracy import kinematics_of, study_walk
 from kinertia.noise import camera_noise, study_noise
 from kinertia.observation import (
     AROUND_WINDOW_S,
@@ -14,6 +13,7 @@ from kinertia.observation import (
     observe,
 )
 from kinertia.skeleton import GRAVITY_M_S2
+from synthetic_walks import kinematics_of, study_walk
 
 MASS_KG = 72.6
 

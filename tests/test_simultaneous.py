@@ -5,7 +5,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 import kinertia.simultaneous as simultaneous
-from accuracy import DISTURBANCES, calibrated
+from calibration_errors import DISTURBANCES, calibrated
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import literature_prior, with_symmetry
 from kinertia.instruments import FootPlates

@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from threadpoolctl import threadpool_limits
 
-from accuracy import kinematics_of
 from kinertia.bsp_prior import literature_prior
 from kinertia.config import Settings, Subject
 from kinertia.fit import Fit, estimate_bsp
@@ -17,6 +16,7 @@ from kinertia.prepare import TrialInput
 from kinertia.results import save_fit
 from kinertia.simultaneous_fit import CLOCK_SD_S, PLATE_SD, fit_simultaneous
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+from synthetic_walks import kinematics_of
 
 
 @pytest.fixture(scope="module")

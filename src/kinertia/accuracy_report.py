@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from kinertia import __version__
-from kinertia.accuracy_study import ScenarioAccuracy
+from kinertia.accuracy_study import ClassAccuracy, ScenarioAccuracy
 from kinertia.io.folder import complete_folder
 
-HEADINGS = ("", "95 % cover", "error / sd", "RMS error", "bound", "literature", "better")
+HEADINGS = ("", "95 % cover", "error / sd", "RMS error", "bound", "literature", "better (at best)")
 _SHOWN = {
     "mass": (1.0, "kg", ".2f"),
     "CoM": (1e3, "mm", ".1f"),
@@ -29,8 +29,13 @@ def accuracy_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
         factor, unit, form = _SHOWN.get(name, (1.0, "prior sd", ".2f"))
         errors = (f"{factor * value:{form}}" for value in (found.rms, found.bound, found.rms_literature))
         cover = f"{100 * found.cover:.1f} ± {100 * found.cover_sd:.1f} %"
-        rows.append([f"{name} ({unit})", cover, f"{found.ratio:.2f}", *errors, f"{100 * found.better:.0f} %"])
+        rows.append([f"{name} ({unit})", cover, f"{found.ratio:.2f}", *errors, _better(found)])
     return rows
+
+
+def _better(found: ClassAccuracy) -> str:
+    told = f"{100 * found.better:.0f} %"
+    return told if np.isnan(found.attainable) else f"{told} ({100 * found.attainable:.0f} %)"
 
 
 def angles_sentence(scenario: ScenarioAccuracy) -> str:

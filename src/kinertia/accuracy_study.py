@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from kinertia.bsp_prior import literature_prior
+from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.disturbed import Faults, measured
 from kinertia.dynamics import inverse_dynamics
 from kinertia.identifiability import evidence
@@ -50,6 +50,7 @@ JOINTS = {
 WITHIN = 1.959964
 """Half width of a 95 % interval in deviations."""
 _HELD_SD_M = 1e-4
+_TRIES = 500
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ class Draw:
         prior_sd, sd: (s, 10) prior and posterior deviations.
         bound: (s, 10) the latter at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's
             own noise model, prior included.
+        attainable: per class, chance that an estimate at the bound has a smaller RMS error than the literature.
         angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
         angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
         moments: per kind of joint, of the joint moments at all frames: mean square error and mean posterior variance,
@@ -101,6 +103,7 @@ class Draw:
     prior_sd: np.ndarray
     sd: np.ndarray
     bound: np.ndarray
+    attainable: Mapping[str, float]
     angles_rad: tuple[float, float]
     angle_changes_rad: tuple[float, float]
     moments: Mapping[str, tuple[float, float, float]]
@@ -118,6 +121,7 @@ class ClassAccuracy:
         rms, rms_literature: RMS errors of the estimate and the literature, SI.
         bound: RMS of the Cramér-Rao bound of the estimator's own noise model at the truth, prior included, SI.
         better: share of draws in which the RMS error is below the literature's.
+        attainable: what this share would be for an estimate at the bound; NaN for classes by evidence.
     """
 
     cover: float
@@ -127,6 +131,7 @@ class ClassAccuracy:
     rms_literature: float
     bound: float
     better: float
+    attainable: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -212,6 +217,7 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
         prior.sd,
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         there.sd(range(len(seen))),
+        attainable(prior, there.root(range(len(seen))), of_noise),
         (_rms(off[0]), _rms(off[1])),
         (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
         _by_joint(trial.skeleton.coordinates, wrong, result.moment_sd[0]),
@@ -230,6 +236,22 @@ def _by_joint(coordinates: Sequence[str], errors: np.ndarray, sd: np.ndarray) ->
     return found
 
 
+def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
+    """Per class, the chance that an unbiased estimate of covariance R R^T (10 s, k) errs less than the prior's mean.
+
+    Its errors and its distance from the prior's mean are independent; covariances of the two add up to the prior's.
+    """
+    moved, vectors = np.linalg.eigh(prior.given_scale()[1] - root @ root.T)
+    error = root @ rng.standard_normal((root.shape[1], _TRIES))
+    change = vectors @ (np.sqrt(np.maximum(moved, 0.0))[:, None] * rng.standard_normal((len(moved), _TRIES)))
+    found = {}
+    for name, columns in CLASSES.items():
+        own, before = (part.reshape(-1, 10, _TRIES)[:, columns] for part in (error, error + change))
+        squares = (np.square(part).sum(axis=(0, 1)) for part in (own, before))
+        found[name] = float(np.mean(np.less(*squares)))
+    return found
+
+
 def held(skeleton: Skeleton) -> CalibrationPrior:
     """Calibration switched off: skeleton and instruments count as exact."""
     places = np.full(len(skeleton.markers), _HELD_SD_M)
@@ -244,7 +266,8 @@ def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
     )
     classes = {}
     for name, columns in CLASSES.items():
-        classes[name] = _class(*(part[..., columns] for part in (errors, before, sd, bound)))
+        plain = _class(*(part[..., columns] for part in (errors, before, sd, bound)))
+        classes[name] = replace(plain, attainable=float(np.mean([d.attainable[name] for d in draws])))
     words = np.vectorize(evidence)(1.0 - np.square(sd / prior))
     for word in EVIDENCE:
         chosen = np.where(words == word, 1.0, np.nan) / prior

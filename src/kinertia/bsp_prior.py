@@ -97,14 +97,18 @@ class BspPrior:
         """(s, 10) prior deviations, in the table's order and units."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 10)
 
-    def draw(self, rng: np.random.Generator) -> BodySegmentParameters:
-        """A person of this prior whose scale said `mass_kg`; drawn again until every segment is physically possible."""
+    def given_scale(self) -> tuple[np.ndarray, np.ndarray]:
+        """(10 s,) mean and (10 s, 10 s) covariance of the table rows once the scale has said `mass_kg`."""
         scale = np.zeros(self.covariance.shape[0])
         scale[::10] = 1.0
         with_total = self.covariance @ scale
         variance = scale @ with_total + self.mass_sd_kg**2
         mean = self.mean.table().ravel() + with_total * (self.mass_kg - self.mean.total_mass_kg) / variance
-        covariance = self.covariance - np.outer(with_total, with_total) / variance
+        return mean, self.covariance - np.outer(with_total, with_total) / variance
+
+    def draw(self, rng: np.random.Generator) -> BodySegmentParameters:
+        """A person of this prior whose scale said `mass_kg`; drawn again until every segment is physically possible."""
+        mean, covariance = self.given_scale()
         sd = np.sqrt(np.diag(covariance))
         root = sd[:, None] * np.linalg.cholesky(covariance / np.outer(sd, sd))
         while True:

@@ -82,7 +82,7 @@ class CoordinateMap:
         """
         if slopes is None:
             return columns
-        return (columns * slopes.reshape(len(slopes), *(1,) * (columns.ndim - 2), -1)) @ self._sum
+        return (columns * slopes.reshape(len(slopes), *(1,) * (columns.ndim - 2), slopes.shape[1])) @ self._sum
 
     def turned_forces(self, forces: np.ndarray, q: np.ndarray) -> np.ndarray | float:
         """(n, c) derivative of the generalised forces by their own coordinates that is due to the map alone.

@@ -274,7 +274,7 @@ def gram(model: Skeleton, above: np.ndarray, pose: Pose, blocks: np.ndarray, sec
         blocks: (n, s, 6, 6) of `twist_blocks`, symmetric if there is no second pose.
     """
     n, s = blocks.shape[:2]
-    carried = (model.support.T.astype(float) @ blocks.reshape(n, s, 36)).reshape(n, -1, 6, 6)
+    carried = (model.support.T.astype(float) @ blocks.reshape(n, s, 36)).reshape(n, model.support.shape[1], 6, 6)
     columns = pose.jacobian.transpose(0, 2, 1)
     others = columns if second is None else second.jacobian.transpose(0, 2, 1)
     moved = (carried @ others[..., None])[..., 0]

@@ -215,11 +215,13 @@ class MapProblem:
         """(p, 4) what is wrong with every plate, in the order of PLATE_UNKNOWNS."""
         return static[self.layout.plates].reshape(-1, len(PLATE_UNKNOWNS))
 
-    def foot_loads(self, k: int, static: np.ndarray, derivative: int = 0) -> np.ndarray:
+    def foot_loads(
+        self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
+    ) -> np.ndarray:
         """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
         trial = self.trials[k]
-        at = trial.time + static[self.layout.clock]
-        return trial.ground.corrected(at, self.carriers[k], self.plate_values(static), derivative)
+        at = trial.time[frames] + static[self.layout.clock]
+        return trial.ground.corrected(at, self.carriers[k][frames], self.plate_values(static), derivative)
 
     def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
         """Normal equations of trial k."""
@@ -266,7 +268,7 @@ class MapProblem:
         da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
         dq, dv, da = skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
         root = skeleton.root
-        loads = self.foot_loads(k, static)[frames]
+        loads = self.foot_loads(k, static, 0, frames)
         wrench = loads.sum(axis=1)
         dq[:, :, :6] -= root.ground_load_derivative(q, wrench)
         by_static = np.zeros((d, 6, layout.in_root.stop))
@@ -275,7 +277,7 @@ class MapProblem:
         by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
         for column in range(by_plate.shape[2]):
             by_static[:, :, layout.plates.start + column] = -root.ground_load_to_generalised(q, by_plate[..., column])
-        rates = self.foot_loads(k, static, 1)[frames].sum(axis=1)
+        rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
         by_static[:, :, layout.clock] = -root.ground_load_to_generalised(q, rates)
         sd = self.root_sd(trial)[None, :, None]
         left = (tau - root.ground_load_to_generalised(q, wrench)) / sd[..., 0]

@@ -17,6 +17,9 @@ import numpy as np
 from kinertia.ik import gram, marker_forces, twist_blocks
 from kinertia.skeleton import Pose, Skeleton
 
+FRAMES_AT_ONCE = 100
+"""Larger arrays would leave the processor's cache."""
+
 
 @dataclass(frozen=True)
 class MarkerTerms:
@@ -93,7 +96,7 @@ def marker_terms(
         deviation: (m,) of each marker's errors, m, and their correlation between neighbouring frames.
         moving, still: columns of q that move in time, and that do not.
     """
-    m = measured.shape[1]
+    (n, m), c, k = measured.shape[:2], len(moving), len(still)
     pose = skeleton.pose(q)
     positions = skeleton.marker_positions(pose)
     error = measured - positions
@@ -102,33 +105,48 @@ def marker_terms(
     error = np.where(seen[..., None], error, 0.0)
     pull = information @ error
     gradient = marker_forces(skeleton, pose, positions, pull)
-    whole = gram(skeleton, above, pose, twist_blocks(skeleton, positions, positions, information.own))
-    following = twist_blocks(skeleton, positions[:-1], positions[1:], information.next)
-    to_next = gram(skeleton, above, pose.cut(slice(None, -1)), following, pose.cut(slice(1, None)))
     turned = pose.rotation[:, skeleton.marker_segments]
     weighted = information @ turned
-    by_marker = _by_places(skeleton, pose, positions, weighted)
-    by_still = whole[:, :, still]
-    by_still[:-1] += to_next[:, :, still]
-    by_still[1:] += to_next[:, still].transpose(0, 2, 1)
-    across = np.concatenate([by_still, by_marker], axis=-1)
-    k = len(still)
+    per_frame, to_next = np.empty((n, c, c)), np.empty((n - 1, c, c))
+    across, by_still = np.empty((n, c, k + 3 * m)), np.zeros((n, q.shape[1], k))
     static = np.zeros((k + 3 * m, k + 3 * m))
-    static[:k] = across[:, still].sum(axis=0)
+    for start in range(0, n, FRAMES_AT_ONCE):
+        here, before, after = _stretch(start, n)
+        now = pose.cut(here)
+        blocks = twist_blocks(skeleton, positions[here], positions[here], information.own[here])
+        whole = gram(skeleton, above, now, blocks)
+        per_frame[here] = whole[:, moving[:, None], moving]
+        by_still[here] += whole[:, :, still]
+        by_place = _by_places(skeleton, now, positions[here], weighted[here])
+        across[here, :, k:] = by_place[:, moving]
+        static[:k, k:] += by_place[:, still].sum(axis=0)
+        blocks = twist_blocks(skeleton, positions[before], positions[after], information.next[before])
+        following = gram(skeleton, above, pose.cut(before), blocks, pose.cut(after))
+        to_next[before] = following[:, moving[:, None], moving]
+        by_still[before] += following[:, :, still]
+        by_still[after] += following[:, still].transpose(0, 2, 1)
+    across[:, :, :k] = by_still[:, moving]
+    static[:k, :k] = by_still[:, still].sum(axis=0)
     static[k:, :k] = static[:k, k:].T
     each = np.arange(k, k + 3 * m).reshape(m, 3)
     static[each[:, :, None], each[:, None]] = np.einsum("nmij,nmik->mjk", turned, weighted)
     by_place = np.einsum("nmij,nmi->mj", turned, pull)
-    rows = moving[:, None]
     return MarkerTerms(
-        whole[:, rows, moving],
-        to_next[:, rows, moving],
-        across[:, moving],
+        per_frame,
+        to_next,
+        across,
         gradient[:, moving],
         static,
         np.concatenate([gradient[:, still].sum(axis=0), by_place.ravel()]),
         float((error * pull).sum()),
     )
+
+
+def _stretch(start: int, n: int) -> tuple[slice, slice, slice]:
+    """The frames of one stretch, those of them that have one after them, and the ones after these."""
+    end = min(start + FRAMES_AT_ONCE, n)
+    last = min(end, n - 1)
+    return slice(start, end), slice(start, last), slice(start + 1, last + 1)
 
 
 def _by_places(skeleton: Skeleton, pose: Pose, positions: np.ndarray, directions: np.ndarray) -> np.ndarray:

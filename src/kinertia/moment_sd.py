@@ -9,6 +9,7 @@ moments of the leg.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,8 @@ from scipy.ndimage import uniform_filter1d
 
 from kinertia.log_cholesky import dynamic_jacobian
 from kinertia.map_terms import MapProblem, by_body
-from kinertia.normal_equations import SPLINES_PER_BLOCK, Reduced
+from kinertia.marker_terms import FRAMES_AT_ONCE
+from kinertia.normal_equations import SPLINES_PER_BLOCK, Reduced, by_splines
 from kinertia.skeleton import Pose, Skeleton
 
 _LOST_KNOTS = 2.0
@@ -59,29 +61,41 @@ def joint_moment_sd(
         root: (S, S) root of the posterior covariance of the static unknowns.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
-    by = moment_derivatives(problem, k, coefficients, static)
+    parts = problem.full(basis.evaluate(coefficients), static)
     motion = _MotionSpread.of(eliminated, coefficients.shape[1], root)
-    still = by.static @ root[problem.layout.in_root]
-    variance = np.empty(by.q.shape[:2])
-    for first in np.unique(basis.first[frames]):
-        rows = np.flatnonzero(basis.first[frames] == first)
-        values = basis.values[:, frames[rows], None, :, None]
-        through = sum(value * part[rows][:, :, None] for value, part in zip(values, (by.q, by.qd, by.qdd), strict=True))
-        through = through.reshape(len(rows), through.shape[1], -1)
-        own, carried = motion.active(int(first))
-        variance[rows] = ((through @ own) * through).sum(axis=-1)
-        variance[rows] += np.square(still[rows] - through @ carried).sum(axis=-1)
+    variance, lost = np.empty((2, len(frames), coefficients.shape[1]))
+    for start in range(0, len(frames), FRAMES_AT_ONCE):
+        chosen = frames[start : start + FRAMES_AT_ONCE]
+        by = moment_derivatives(problem, k, [part[chosen] for part in parts], static, chosen)
+        still = by.static @ root[problem.layout.in_root]
+        through = by_splines(basis.values[:, chosen], (by.q, by.qd, by.qdd)).reshape(*by.q.shape[:2], -1)
+        lost[start : start + len(chosen)] = by.lost
+        for first in np.unique(basis.first[chosen]):
+            rows = np.flatnonzero(basis.first[chosen] == first)
+            own, carried = motion.active(int(first))
+            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1)
+            spread += np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
+            variance[start + rows] = spread
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    variance += uniform_filter1d(np.square(by.lost), around, axis=0, mode="nearest")
+    variance += uniform_filter1d(np.square(lost), around, axis=0, mode="nearest")
     return np.sqrt(np.maximum(variance, 0.0))
 
 
-def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> MomentDerivatives:
-    """Derivatives of `dynamics.inverse_dynamics` at the dynamic frames of trial k."""
+def moment_derivatives(
+    problem: MapProblem, k: int, motion: Sequence[np.ndarray], static: np.ndarray, frames: np.ndarray
+) -> MomentDerivatives:
+    """Derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
+
+    Args:
+        problem: of the estimate.
+        k: the trial.
+        motion: all coordinates, static ones included, and their rates (d, c), as `MapProblem.full` has them.
+        static: the estimate.
+        frames: (d,) indices.
+    """
     trial, layout = problem.trials[k], problem.layout
-    frames = np.flatnonzero(trial.dynamic)
     skeleton = problem.placed(static)
-    q, qd, qdd = (part[frames] for part in problem.full(problem.bases[k].evaluate(coefficients), static))
+    q, qd, qdd = motion
     model = skeleton.model_with(problem.bsp(static))
     data = model.createData()
     x, v, a = skeleton.map.motion(q, qd, qdd)
@@ -95,7 +109,7 @@ def moment_derivatives(problem: MapProblem, k: int, coefficients: np.ndarray, st
         tau[i], dq[i], dv[i], da[i] = data.tau, data.dtau_dq, data.dtau_dv, data.M
         regressor[i] = pin.computeJointTorqueRegressor(model, data, x[i], v[i], a[i])[:, columns]
     da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
-    loads, rates = (problem.foot_loads(k, static, order)[frames] for order in (0, 1))
+    loads, rates = (problem.foot_loads(k, static, order, frames) for order in (0, 1))
     pose = skeleton.pose(q)
     by_static, lost = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
     by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))

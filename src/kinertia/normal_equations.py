@@ -62,7 +62,7 @@ def assemble(
     normal.static_right[in_markers] += marker.static_gradient
     normal.cost += 0.5 * float(marker.square + np.square(left).sum())
     values, size = basis.values, basis.size
-    rows = _by_splines(values[:, frames], (dq, dv, da))
+    rows = by_splines(values[:, frames], (dq, dv, da))
     neighbours = _neighbours(basis)
     starts = np.searchsorted(basis.first, np.arange(size - 4))
     root_starts = np.searchsorted(frames, starts)
@@ -89,7 +89,7 @@ def assemble(
     return normal
 
 
-def _by_splines(values: np.ndarray, parts: tuple[np.ndarray, ...]) -> np.ndarray:
+def by_splines(values: np.ndarray, parts: tuple[np.ndarray, ...]) -> np.ndarray:
     """(d, r, 6, c) derivatives by the coefficients of the six active splines, from those by q, qd, qdd (d, r, c)."""
     result = values[0][:, None, :, None] * parts[0][:, :, None]
     for value, part in zip(values[1:], parts[1:], strict=True):

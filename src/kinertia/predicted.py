@@ -56,9 +56,13 @@ class Information:
         """(S, S) information of all priors."""
         return self.problem.prior_terms(self.problem.start_static)[0]
 
-    def sd(self, trials: Iterable[int]) -> np.ndarray:
-        """(s, 10) deviations of the body segment parameters that these trials together would leave."""
+    def root(self, trials: Iterable[int]) -> np.ndarray:
+        """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
         information = self.of_prior + sum(self.of_trials[k] for k in trials)
         theta = self.problem.layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
-        return np.linalg.norm(chain @ root_of_covariance(information)[theta], axis=1).reshape(-1, 10)
+        return chain @ root_of_covariance(information)[theta]
+
+    def sd(self, trials: Iterable[int]) -> np.ndarray:
+        """(s, 10) deviations of the body segment parameters that these trials together would leave."""
+        return np.linalg.norm(self.root(trials), axis=1).reshape(-1, 10)

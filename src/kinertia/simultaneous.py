@@ -60,8 +60,12 @@ class SimultaneousResult:
 
 
 CONVERGED = 0.25
-"""Stop after a step that promises to lower half the sum of squares by less: it is shorter than 0.7 standard deviations
-over all unknowns together."""
+"""Stop after a step that promises to lower half the sum of squares by less, and is thus shorter than 0.7 standard
+deviations over all unknowns together; or that does lower it by less, where segments creep to the edge of what is
+physically possible."""
+_FIRST_DAMPING = 1e-5
+"""Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
+information: 1e-3 would hold the first steps back."""
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 40
@@ -77,7 +81,7 @@ def estimate_simultaneous(
     coefficients = [start.copy() for start in problem.start]
     values = problem.start_static.copy()
     here = problem.at(coefficients, values)
-    begin, damping, iterations, converged = here.cost, 1e-3, 0, False
+    begin, damping, iterations, converged = here.cost, _FIRST_DAMPING, 0, False
     scale = np.zeros(len(values))
     while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
         iterations += 1
@@ -86,8 +90,9 @@ def estimate_simultaneous(
         new_values = values + problem.shortened(step)
         new_coefficients = [old + move for old, move in zip(coefficients, moves, strict=True)]
         there = problem.at(new_coefficients, new_values)
-        kept = (here.cost - there.cost) / promised
-        converged = promised < CONVERGED and damping <= 1e-3
+        gained = here.cost - there.cost
+        kept = gained / promised
+        converged = damping <= 1e-3 and (promised < CONVERGED or 0.0 < gained < CONVERGED)
         if kept > 0.0:
             values, coefficients, here = new_values, new_coefficients, there
         damping = max(damping * _change_of_damping(kept), 1e-9)

@@ -1,0 +1,15 @@
+"""How wrong estimated body segment parameters are, beside the truth of a synthetic walk."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.bsp import BodySegmentParameters, ParameterVector
+
+
+def errors(found: BodySegmentParameters, truth: BodySegmentParameters) -> tuple[float, float, float]:
+    """RMS error of masses (kg), CoM coordinates (m) and moments of inertia (kg m2), of the study's 49 parameters."""
+    vector = ParameterVector(truth, symmetric=True)
+    rows = (vector.values(found) - vector.values(truth)).reshape(-1, 7)
+    mass, com, inertia = (float(np.sqrt(np.mean(np.square(part)))) for part in np.split(rows, [1, 4], axis=1))
+    return mass, com, inertia

@@ -1,0 +1,107 @@
+"""The study's noise, from starts 50 % off: draws of every method, and their section of docs/accuracy.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bsp_errors import errors
+from kinertia.accuracy_study import held
+from kinertia.bsp import BodySegmentParameters, ParameterVector
+from kinertia.bsp_prior import BspPrior, with_symmetry
+from kinertia.dynamics import Motion
+from kinertia.ik import solve_ik
+from kinertia.map_terms import Observation
+from kinertia.noise import camera_noise, study_noise
+from kinertia.observation import CUTOFF_HZ, observe
+from kinertia.simultaneous import estimate_simultaneous
+from kinertia.splines import smooth
+from kinertia.study import MARGIN_S, START_SHARE
+from kinertia.synthetic import SyntheticTrial
+from kinertia.trial import Markers
+from kinertia.two_level import Window, estimate_two_level
+from measured_trials import table
+from synthetic_walks import FIRST_SEED, kinematics_of, study_walk
+
+UNIFORM_SD = 0.29
+"""Deviation of a uniform error of +/-50 %, share."""
+CAMERA_SD_M = 0.0001
+
+
+def start_prior(start: BodySegmentParameters, mass_kg: float) -> BspPrior:
+    """All the study's estimator may know: the start, uniform +/-50 %; symmetry; principal axes along segment axes."""
+    values = start.table()
+    sd = UNIFORM_SD * np.abs(values)
+    sd[:, 1:4] = np.maximum(sd[:, 1:4], 0.005)
+    sd[:, 7:] = 0.02 * values[:, 4:7].mean(axis=1, keepdims=True)
+    covariance = with_symmetry(np.diag(np.square(sd.ravel())), start.segments, 0.99)
+    return BspPrior(start, covariance, mass_kg, 0.005 * mass_kg)
+
+
+def moved_prior(prior: BspPrior) -> BspPrior:
+    """Truth given a start = truth (1 + u), u uniform +/-50 %, if any size is as likely: start / (1 + u).
+
+    Its mean is log 3 times the start, its deviation sqrt(4 / 3 - (log 3)^2) times.
+    """
+    mean, share = np.log(3.0), np.sqrt(4.0 / 3.0 - np.log(3.0) ** 2)
+    start = BodySegmentParameters.from_table(prior.mean.segments, mean * prior.mean.table())
+    return replace(prior, mean=start, covariance=prior.covariance * (share / UNIFORM_SD) ** 2)
+
+
+def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, float, float]]:
+    """Errors of every method on one draw of start and noise (the draws of `kinertia study table1`, seed 1)."""
+    trial = study_walk()
+    rng = np.random.default_rng([FIRST_SEED, number])
+    vector = ParameterVector(trial.bsp, symmetric=True)
+    truth = vector.values(trial.bsp)
+    start = vector.bsp(truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth))))
+    noisy = study_noise(trial.markers, rng)
+    prior, calibration = start_prior(start, trial.bsp.total_mass_kg), held(trial.skeleton)
+    found = {"start": start}
+    if two_level:
+        found["two-level"] = estimate_two_level(trial.skeleton, start, [_window(trial, noisy)]).bsp
+
+    def simultaneous(
+        observation: Observation, prior: BspPrior = prior, cutoff_hz: float = CUTOFF_HZ
+    ) -> BodySegmentParameters:
+        spacing_s = 1.0 / (2.0 * cutoff_hz)
+        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], spacing_s).bsp
+
+    def seen_by(markers: Markers, cutoff_hz: float = CUTOFF_HZ) -> Observation:
+        return observe(trial.skeleton, kinematics_of(trial, markers), trial.bsp.total_mass_kg, cutoff_hz)[0]
+
+    seen = seen_by(noisy)
+    found["simultaneous"] = simultaneous(seen)
+    white = np.full_like(seen.marker_sd, np.std(noisy.positions - trial.markers.positions))
+    found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white))
+    found["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
+    sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
+    found["forces three times as sure"] = simultaneous(sure)
+    found["20 Hz instead of 10 Hz"] = simultaneous(seen_by(noisy, 20.0), cutoff_hz=20.0)
+    found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
+    sharp = replace(seen_by(camera_noise(trial.markers, CAMERA_SD_M, rng)), marker_sd=np.full_like(white, CAMERA_SD_M))
+    found["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
+    return {name: errors(bsp, trial.bsp) for name, bsp in found.items()}
+
+
+def _window(trial: SyntheticTrial, noisy: Markers) -> Window:
+    ik = solve_ik(trial.skeleton, noisy)
+    spline = smooth(ik.time, ik.q, "gcv")
+    margin = round(MARGIN_S / (trial.time[1] - trial.time[0]))
+    inner = slice(margin, len(trial.time) - margin)
+    motion = Motion(*(spline(trial.time[inner], order) for order in range(3)))
+    return Window(trial.time[inner], motion, trial.window.wrench[inner])
+
+
+def study_section(draws: Sequence[dict[str, tuple[float, float, float]]]) -> str:
+    """Errors on the study's noise, mean over draws."""
+    rows = []
+    for name in draws[0]:
+        mass, com, inertia = np.mean([draw[name] for draw in draws], axis=0)
+        rows.append([name, f"{mass:.2f}", f"{1e3 * com:.1f}", f"{inertia:.3f}"])
+    rows.append(["published: Table 1, two-level", "1.71", "180", "0.382"])
+    rows.append(["published: 2007, splines and prior", "1.33", "21.6", "0.0745"])
+    rows.append(["**demanded**", "0.90", "15.0", "0.030"])
+    return table(["estimate", "mass (kg)", "CoM (mm)", "inertia (kg m2)"], rows)

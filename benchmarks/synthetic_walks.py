@@ -1,0 +1,30 @@
+"""Synthetic walks that the accuracy benchmark estimates from, and their kinematics as a laboratory would find them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.kinematics import Kinematics, solve_kinematics
+from kinertia.observation import CUTOFF_HZ
+from kinertia.study import MARGIN_S, symmetric_truth
+from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+from kinertia.trial import FootLoads, Markers, Trial
+
+STRIDE_S = 1.24
+FIRST_SEED = 1
+
+
+def study_walk(duration_s: float = STRIDE_S + 2 * MARGIN_S) -> SyntheticTrial:
+    """The study's trial with exact derivatives: the estimator's splines hold no trapezoid sums."""
+    subject = walking_subject()
+    return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), duration_s, trapezoid=False)
+
+
+def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None) -> Kinematics:
+    """Inverse kinematics and smoothing of a synthetic trial with these markers and foot loads (n, 2, 6)."""
+    loads = trial.foot_loads if loads is None else loads
+    measured = np.ones(len(trial.time), dtype=bool)
+    feet = FootLoads(trial.time, loads[..., :3], loads[..., 3:])
+    return solve_kinematics(trial.skeleton, Trial("walk", markers, feet, measured), 0.0, CUTOFF_HZ)
