@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import Path
 
@@ -97,9 +98,12 @@ def _header(path: Path, lines: list[str]) -> dict[str, str]:
 
 def _number(path: Path, header: dict[str, str], key: str) -> float:
     try:
-        return float(header[key])
+        number = float(header[key])
     except ValueError:
-        raise FileError(path, f"{key} is '{header[key]}', expected a number; export the file again", 3) from None
+        number = math.nan
+    if not math.isfinite(number):
+        raise FileError(path, f"{key} is '{header[key]}', expected a number; export the file again", 3)
+    return number
 
 
 def _count(path: Path, header: dict[str, str], key: str) -> int:
