@@ -104,6 +104,16 @@ def test_markers_may_be_absent_in_one_of_several_trials_or_in_all(skeleton):
     assert adapted.moved_m["L.Bicep"] == pytest.approx(0.02, abs=0.005)
 
 
+def test_feet_that_are_never_seen_together_are_an_error(skeleton):
+    markers = walk(skeleton)
+    half = len(markers.time) // 2
+    positions = markers.positions.copy()
+    for frames, foot in ((slice(None, half), "foot_r"), (slice(half, None), "foot_l")):
+        positions[frames, skeleton.marker_segments == skeleton.segments.index(foot)] = np.nan
+    with pytest.raises(TrialError, match="in none of the 30 frames looked at are enough markers visible"):
+        adapt(skeleton, [Markers(markers.time, markers.labels, positions)], deviations(skeleton), {})
+
+
 def test_sampling_takes_at_most_sixty_frames_a_tenth_of_a_second_apart():
     def frames(n, rate_hz):
         return Markers(np.arange(n) / rate_hz, ("a",), np.zeros((n, 1, 3)))

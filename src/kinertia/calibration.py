@@ -65,7 +65,10 @@ def adapt(
         marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
         coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
 
-    Frames whose visible markers do not determine every coordinate are left out; at least one must remain.
+    Frames whose visible markers do not determine every coordinate are left out.
+
+    Raises:
+        TrialError: no frame of any trial remains.
     """
     present = {label for trial in trials for label in trial.markers.labels}
     kept = [marker for marker in skeleton.markers if marker.label in present]
@@ -74,6 +77,12 @@ def adapt(
     measured = np.concatenate([sampled(trial.markers).arranged(base.labels) for trial in trials])
     start = np.concatenate([ik.q[:, [ik.coordinates.index(name) for name in base.coordinates]] for ik in poses])
     seen = np.isfinite(start).all(axis=1)
+    if not seen.any():
+        raise TrialError(
+            ", ".join(trial.name for trial in trials),
+            f"in none of the {len(seen)} frames looked at are enough markers visible for all coordinates; fill the "
+            f"gaps of the markers or use another trial",
+        )
     measured, moving = measured[seen], start[seen]
 
     still = list(coordinate_sd)
