@@ -75,13 +75,14 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     seen = seen_by(noisy)
     found["simultaneous"] = simultaneous(seen)
     white = np.full_like(seen.marker_sd, np.std(noisy.positions - trial.markers.positions))
-    found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white))
+    found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white, marker_autocorrelation=0.0))
     found["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
     sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
     found["forces three times as sure"] = simultaneous(sure)
     found["20 Hz instead of 10 Hz"] = simultaneous(seen_by(noisy, 20.0), cutoff_hz=20.0)
     found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
-    sharp = replace(seen_by(camera_noise(trial.markers, CAMERA_SD_M, rng)), marker_sd=np.full_like(white, CAMERA_SD_M))
+    sharp = seen_by(camera_noise(trial.markers, CAMERA_SD_M, rng))
+    sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_autocorrelation=0.0)
     found["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
     return {name: errors(bsp, trial.bsp) for name, bsp in found.items()}
 
