@@ -82,8 +82,8 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     found["20 Hz instead of 10 Hz"] = simultaneous(seen_by(noisy, 20.0), cutoff_hz=20.0)
     found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
     sharp = seen_by(camera_noise(trial.markers, CAMERA_SD_M, rng))
-    known = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_autocorrelation=0.0)
-    found["**0.1 mm of white noise instead of the study's**"] = simultaneous(known)
+    sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_autocorrelation=0.0)
+    found["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
     return {name: errors(bsp, trial.bsp) for name, bsp in found.items()}
 
 

@@ -69,6 +69,7 @@ PROOF = {
     "artefact": Scenario("skin motion linear in joint angles", Faults("artefact")),
     "study_calibration": Scenario("the study's noise, calibration errors", Faults("study", calibration=True)),
     "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
+    "strides": Scenario("skin motion, eight strides", Faults("artefact"), walk_s=10.0),
 }
 """What error bars are made for."""
 BREAKS = {
