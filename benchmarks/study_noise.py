@@ -50,13 +50,18 @@ def moved_prior(prior: BspPrior) -> BspPrior:
     return replace(prior, mean=start, covariance=prior.covariance * (share / UNIFORM_SD) ** 2)
 
 
-def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, float, float]]:
-    """Errors of every method on one draw of start and noise (the draws of `kinertia study table1`, seed 1)."""
-    trial = study_walk()
+def drawn_start(trial: SyntheticTrial, number: int) -> tuple[BodySegmentParameters, np.random.Generator]:
+    """The start of this draw (of `kinertia study table1`, seed 1), and the generator that goes on to its noise."""
     rng = np.random.default_rng([FIRST_SEED, number])
     vector = ParameterVector(trial.bsp, symmetric=True)
     truth = vector.values(trial.bsp)
-    start = vector.bsp(truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth))))
+    return vector.bsp(truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))), rng
+
+
+def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, float, float]]:
+    """Errors of every method on one draw of start and noise (the draws of `kinertia study table1`, seed 1)."""
+    trial = study_walk()
+    start, rng = drawn_start(trial, number)
     noisy = study_noise(trial.markers, rng)
     prior, calibration = start_prior(start, trial.bsp.total_mass_kg), held(trial.skeleton)
     found = {"start": start}
@@ -96,12 +101,13 @@ def _window(trial: SyntheticTrial, noisy: Markers) -> Window:
     return Window(trial.time[inner], motion, trial.window.wrench[inner])
 
 
-def study_section(draws: Sequence[dict[str, tuple[float, float, float]]]) -> str:
-    """Errors on the study's noise, mean over draws."""
+def study_section(draws: Sequence[dict[str, tuple[float, float, float]]], bounds: Sequence[list[str]]) -> str:
+    """Errors on the study's noise, mean over draws, and the lines of `study_bound.bound_rows`."""
     rows = []
     for name in draws[0]:
         mass, com, inertia = np.mean([draw[name] for draw in draws], axis=0)
         rows.append([name, f"{mass:.2f}", f"{1e3 * com:.1f}", f"{inertia:.3f}"])
+    rows += bounds
     rows.append(["published: Table 1, two-level", "1.71", "180", "0.382"])
     rows.append(["published: 2007, splines and prior", "1.33", "21.6", "0.0745"])
     rows.append(["**demanded**", "0.90", "15.0", "0.030"])

@@ -35,7 +35,7 @@ def test_page():
     page = accuracy.document(
         {
             "draws": "1",
-            "study": study_section([draw]),
+            "study": study_section([draw], [["at best", "1", "2", "3"]]),
             "calibration": calibration_section({"all three": [outcome]}),
             "measured": "",
             "pooling": pooling_section(values, sds),
@@ -46,6 +46,7 @@ def test_page():
     )
     mass, com, inertia = draw["simultaneous"]
     assert f"| simultaneous | {mass:.2f} | {1e3 * com:.1f} | {inertia:.3f} |" in page
+    assert "| at best | 1 | 2 | 3 |" in page
     assert "those of either half for 100 % of the BSPs" in page
     assert re.search(r"\| all three \| [\d.]+ / [\d.]+ \([\d.]+\)", page)
     assert re.search(rf"\| 1 s \| 101 \| {timing.iterations} \|", page)

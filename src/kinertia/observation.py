@@ -30,9 +30,10 @@ MOMENT_ARM_M = 0.3
 """Deviation of the root moment over that of the force."""
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0
-CORNER = 1.5
+CORNER = 2.0
 """Skin motion has a nearly flat spectrum up to its highest frequency; that of a first-order process as strong and as
-long falls before. One with so many times its bandwidth, as dense at zero frequency, is half as dense there."""
+long falls before. One with so many times its bandwidth, as dense at zero frequency, is two thirds as dense there. Less
+makes measured people odder and their residuals larger, more makes joint moments vaguer than they are."""
 _UNLIKE, _REPEATING = 0.05, 0.3
 """Autocorrelations below which errors count as unlike, and above which they count as coming back."""
 
