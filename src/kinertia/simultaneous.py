@@ -92,7 +92,7 @@ def estimate_simultaneous(
         there = problem.at(new_coefficients, new_values)
         gained = here.cost - there.cost
         kept = gained / promised
-        converged = damping <= 1e-3 and (promised < CONVERGED or 0.0 < gained < CONVERGED)
+        converged = damping <= 1e-3 and (promised < CONVERGED or (kept > 0.25 and gained < CONVERGED))
         if kept > 0.0:
             values, coefficients, here = new_values, new_coefficients, there
         damping = max(damping * _change_of_damping(kept), 1e-9)
