@@ -40,7 +40,7 @@ class SimultaneousResult:
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
         moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
-        converged: the last step promised to lower the cost by less than CONVERGED.
+        converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
     """
@@ -59,10 +59,10 @@ class SimultaneousResult:
     cost: tuple[float, float]
 
 
-CONVERGED = 0.25
-"""Stop after a step that promises to lower half the sum of squares by less, and is thus shorter than 0.7 standard
-deviations over all unknowns together; or that does lower it by less, where segments creep to the edge of what is
-physically possible."""
+CONVERGED_SD = 0.1
+"""Stop after a step that moves body and calibration by less, in posterior deviations of all of them together, ..."""
+CONVERGED = 1.0
+"""... and promises to lower half the sum of squares by less: what is left to the motion is below its own deviations."""
 _FIRST_DAMPING = 1e-5
 """Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
 information: 1e-3 would hold the first steps back."""
@@ -86,13 +86,12 @@ def estimate_simultaneous(
     while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
         iterations += 1
         scale = np.maximum(scale, np.diag(here.information) + sum(np.diag(normal.static) for normal in here.normals))
-        step, moves, promised = _step(here, damping, scale)
+        step, moves, promised, moved_sd = _step(here, damping, scale)
         new_values = values + problem.shortened(step)
         new_coefficients = [old + move for old, move in zip(coefficients, moves, strict=True)]
         there = problem.at(new_coefficients, new_values)
-        gained = here.cost - there.cost
-        kept = gained / promised
-        converged = damping <= 1e-3 and (promised < CONVERGED or (kept > 0.25 and gained < CONVERGED))
+        kept = (here.cost - there.cost) / promised
+        converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
         if kept > 0.0:
             values, coefficients, here = new_values, new_coefficients, there
         damping = max(damping * _change_of_damping(kept), 1e-9)
@@ -123,8 +122,10 @@ def root_of_covariance(information: np.ndarray) -> np.ndarray:
     return scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
 
 
-def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], float]:
-    """Step of the static unknowns (S,) and of each trial's coefficients, and by how much it would lower the cost."""
+def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], float, float]:
+    """Step of the static unknowns (S,) and of each trial's coefficients, by how much it would lower the cost, and how
+    long the former is in deviations.
+    """
     information, right = here.information.copy(), here.right.copy()
     parts = [reduced(normal, damping) for normal in here.normals]
     for part in parts:
@@ -132,6 +133,7 @@ def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarr
         right += part.right
     information[np.diag_indices_from(information)] += damping * scale
     step = np.linalg.solve(information, right)
+    moved_sd = float(np.sqrt(step @ information @ step))
     moves = []
     promised = 0.5 * float(here.right @ step)
     for part, normal in zip(parts, here.normals, strict=True):
@@ -139,7 +141,7 @@ def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarr
         move = part.band.backward(part.motion - part.border @ step[:, None]).reshape(-1, c)[:size]
         moves.append(move)
         promised += 0.5 * float(normal.static_right @ step + (normal.right * move).sum())
-    return step, moves, promised
+    return step, moves, promised, moved_sd
 
 
 def _result(
