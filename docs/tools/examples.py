@@ -60,7 +60,7 @@ def blocks(text: str) -> list[Block]:
 def link_measured(name: str, folder: Path) -> None:
     """Put links to measured files into a folder, one person's, as a user would have them."""
     for file in (DATA / name).iterdir():
-        if file.is_file() and not file.name.startswith("subject_b"):
+        if file.is_file() and not file.name.startswith("subject_a"):
             (folder / file.name).symlink_to(file)
 
 
