@@ -34,6 +34,8 @@ from kinertia.skeleton import Skeleton
 MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""
 _FREE_EVALUATIONS, _MAX_EVALUATIONS = 200, 400
+_EXACT = 1e-20
+"""Share of the sum of squares at the start that is rounding."""
 _SMALLEST_POSITIVE, _FARTHEST_COM_M = 1e-9, 1.0
 """Bounds: masses and moments stay positive (kg, kg m2), each CoM coordinate within 1 m of the segment's origin."""
 _SMALLEST_SCALE = 0.005
@@ -177,7 +179,8 @@ def _minimise(
     Where it creeps along a valley until its limit, Levenberg-Marquardt goes on from there.
     """
     scale = np.maximum(np.abs(theta), _SMALLEST_SCALE)
-    free = _minimise_freely(problem, theta, scale, bounds)
+    exact = _EXACT * float(np.square(problem.residuals(theta)).sum())
+    free = _minimise_freely(problem, theta, scale, bounds, exact)
     if free is not None:
         return free
     bounded = least_squares(
@@ -194,7 +197,7 @@ def _minimise(
     )
     best = bounded
     if bounded.status == 0:
-        free = _minimise_freely(problem, bounded.x, scale, bounds)
+        free = _minimise_freely(problem, bounded.x, scale, bounds, exact)
         if free is not None and free.cost < bounded.cost:
             free.nfev += bounded.nfev
             best = free
@@ -203,9 +206,13 @@ def _minimise(
 
 
 def _minimise_freely(
-    problem: TwoLevelProblem, theta: np.ndarray, scale: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+    problem: TwoLevelProblem,
+    theta: np.ndarray,
+    scale: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    exact: float,
 ) -> OptimizeResult | None:
-    """Levenberg-Marquardt without bounds; None unless it converges, and inside them."""
+    """Levenberg-Marquardt without bounds; None unless it converges, or comes down to a cost of `exact`, inside them."""
     with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
         free = least_squares(
             problem.residuals,
@@ -218,6 +225,9 @@ def _minimise_freely(
             gtol=1e-15,
             max_nfev=_FREE_EVALUATIONS,
         )
+        # at the level of rounding the tolerances may never be met
+        if free.status == 0 and free.cost < exact:
+            free.status = 2
         if free.status > 0 and np.all((free.x > bounds[0]) & (free.x < bounds[1])):
             return free
     return None
