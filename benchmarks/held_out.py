@@ -18,27 +18,12 @@ from walks import data_folder
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "held-out.md"
 
-HALVES = """
-[[trial]]
-name = "first half"
-markers = "{folder}/subject01_walk1.trc"
-forces = "{folder}/subject01_walk1_grf.mot"
-loads = "{folder}/subject01_walk1_grf.xml"
-window_s = [0.0, 1.25]
-
-[[trial]]
-name = "second half"
-markers = "{folder}/subject01_walk1.trc"
-forces = "{folder}/subject01_walk1_grf.mot"
-loads = "{folder}/subject01_walk1_grf.xml"
-window_s = [1.25, 2.5]
-"""
-SUBJECT4 = """
+TRIAL = """
 [[trial]]
 name = "{name}"
-markers = "{folder}/{name}.trc"
-forces = "{folder}/{name}_grf.mot"
-loads = "{folder}/{name}_external_forces.xml"
+markers = "{markers}.trc"
+forces = "{markers}_grf.mot"
+loads = "{markers}_{loads}.xml"
 """
 
 
@@ -46,12 +31,18 @@ def subject_files(data: Path) -> dict[str, str]:
     """Title -> text of the subject file."""
     gait, other = data / "gait2354", data / "subject4"
     person = '[subject]\nname = "gait2354"\nsex = "male"\nmass_kg = 72.6\nheight_m = 1.803\n'
+    static = f'[model]\nstatic = "{gait}/subject01_static.trc"\n'
     whole = f'[subject]\nname = "subject4"\nmass_kg = 60.0\n[model]\nosim = "{other}/addbiomechanics_scaled.osim"\n'
-    trials = "".join(SUBJECT4.format(name=name, folder=other) for name in ("walking1", "squats1", "walking2"))
+    halves = "".join(
+        TRIAL.format(name=name, markers=gait / "subject01_walk1", loads="grf") + f"window_s = {window_s}\n"
+        for name, window_s in (("first half", [0.0, 1.25]), ("second half", [1.25, 2.5]))
+    )
+    trials = "".join(
+        TRIAL.format(name=name, markers=other / name, loads="external_forces")
+        for name in ("walking1", "squats1", "walking2")
+    )
     return {
-        "gait2354, one walk in two halves": (
-            f'{person}[model]\nstatic = "{gait}/subject01_static.trc"\n{HALVES.format(folder=gait)}'
-        ),
+        "gait2354, one walk in two halves": f"{person}{static}{halves}",
         "subject4, its own OpenSim model, calibrated": f"{whole}calibrate = true\n{trials}",
     }
 

@@ -117,7 +117,7 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     seconds["inverse kinematics"], ik = best(runs, lambda: solve_ik(skeleton, trial.markers))
     seconds["smoothing"], spline = best(runs, lambda: smooth(ik.time, ik.q, "gcv"))
     motion = Motion(*(spline(ik.time, order) for order in range(3)))
-    columns = np.concatenate([trial.loads.force, trial.loads.moment], axis=-1).reshape(-1, 12)
+    columns = trial.loads.wrench.reshape(-1, 12)
     loads = smooth(trial.loads.time, columns, 10.0)(ik.time).reshape(-1, 2, 6)
     bsp = literature_bsp(one.mass_kg, one.subject.height_m or 0.0, one.subject.sex, model.geometry, "dumas")
     parts = stretches(Window(ik.time, motion, loads.sum(axis=1)))

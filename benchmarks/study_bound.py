@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.accuracy_study import SPACING_S, held
+from kinertia.accuracy_study import SPACING_S, at_truth, held
 from kinertia.bsp import block_diagonal
 from kinertia.bsp_prior import BspPrior
+from kinertia.calibration import marker_jacobian
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import MapProblem, Observation
 from kinertia.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
@@ -39,8 +40,7 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
         floor_m: white noise of the markers beside the study's.
     """
     exact = replace(
-        seen,
-        q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)],
+        at_truth(seen, trial),
         marker_sd=np.full_like(seen.marker_sd, _NOTHING_M),
         marker_autocorrelation=0.0,
         force_sd=EXACT_N,
@@ -48,18 +48,23 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
     )
     problem = MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), held(trial.skeleton), [exact], SPACING_S)
     normal = problem.normal(0, problem.start[0], problem.start_static)
-    size, reach, c, _ = normal.band.shape
-    motion = np.zeros((size, c, size, c))
-    for i in range(size):
-        for offset in range(min(reach, size - i)):
-            motion[i, :, i + offset] = normal.band[i, offset]
-            motion[i + offset, :, i] = normal.band[i, offset].T
-    motion = motion.reshape(size * c, -1) + _of_markers(problem, exact, floor_m)
+    motion = dense_band(normal.band) + _of_markers(problem, exact, floor_m)
     theta = problem.layout.theta
-    border = normal.border[..., theta].reshape(size * c, -1)
+    border = normal.border[..., theta].reshape(len(motion), -1)
     information = normal.static[theta, theta] - border.T @ np.linalg.solve(motion, border)
     chain = np.linalg.inv(block_diagonal(table_jacobian(problem.start_static[theta])))
     return chain.T @ information @ chain
+
+
+def dense_band(band: np.ndarray) -> np.ndarray:
+    """(size c, size c) the whole of a symmetric matrix from the band (size, 7, c, c) of `NormalEquations`."""
+    size, reach, c, _ = band.shape
+    whole = np.zeros((size, c, size, c))
+    for i in range(size):
+        for offset in range(min(reach, size - i)):
+            whole[i, :, i + offset] = band[i, offset]
+            whole[i + offset, :, i] = band[i, offset].T
+    return whole.reshape(size * c, -1)
 
 
 def _of_markers(problem: MapProblem, seen: Observation, floor_m: float) -> np.ndarray:
@@ -68,9 +73,7 @@ def _of_markers(problem: MapProblem, seen: Observation, floor_m: float) -> np.nd
     q = basis.evaluate(problem.start[0])[0]
     pose = skeleton.pose(q)
     positions = skeleton.marker_positions(pose)
-    linear, angular = (part.transpose(0, 2, 1) for part in (pose.jacobian[:, :3], pose.jacobian[:, 3:]))
-    moved = linear[:, None] + np.cross(angular[:, None], positions[:, :, None])
-    moved *= skeleton.support[skeleton.marker_segments][..., None]
+    moved = marker_jacobian(skeleton, pose, positions)
     apart = seen.time[:, None] - seen.time
     covariance = STUDY_AMPLITUDE_M**2 / 6.0 * np.sinc(STUDY_RATE_RAD_S * apart / np.pi)
     whiten = np.linalg.inv(np.linalg.cholesky(covariance + floor_m**2 * np.eye(len(apart))))
@@ -80,7 +83,7 @@ def _of_markers(problem: MapProblem, seen: Observation, floor_m: float) -> np.nd
     total = np.zeros((size * c, size * c))
     for m in range(positions.shape[1]):
         for axis in range(3):
-            rows = whiten @ (splines[:, :, None] * moved[:, m, None, :, axis]).reshape(len(q), -1)
+            rows = whiten @ (splines[:, :, None] * moved[:, m, axis, None]).reshape(len(q), -1)
             total += rows.T @ rows
     return total
 

@@ -6,6 +6,7 @@ import pytest
 from kinertia.log_cholesky import nearest_consistent
 from kinertia.map_terms import MapProblem
 from small_problem import curved_problem, point, residuals, small_problem
+from study_bound import dense_band
 
 
 @pytest.fixture(scope="module")
@@ -87,15 +88,10 @@ def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
     dense, gradient = jacobian.T @ jacobian, jacobian.T @ left(start)
     normal = problem.normal(0, coefficients, static)
 
-    banded = np.zeros((size, c, size, c))
-    for i in range(size):
-        for offset in range(min(7, size - i)):
-            banded[i, :, i + offset] = normal.band[i, offset]
-            banded[i + offset, :, i] = normal.band[i, offset].T
     tolerance = 1e-6 * np.sqrt(np.outer(np.diag(dense), np.diag(dense))) + 1e-6
     found = np.block(
         [
-            [banded.reshape(size * c, -1), normal.border.reshape(size * c, -1)],
+            [dense_band(normal.band), normal.border.reshape(size * c, -1)],
             [normal.border.reshape(size * c, -1).T, normal.static],
         ]
     )

@@ -7,6 +7,7 @@ from kinertia.moment_sd import joint_moment_sd, moment_derivatives
 from kinertia.normal_equations import reduced
 from kinertia.simultaneous import root_of_covariance
 from small_problem import curved_problem, point, small_problem
+from study_bound import dense_band
 
 
 @pytest.fixture(scope="module", params=["27 DOF", "curved axes"])
@@ -32,14 +33,10 @@ def moments(problem, coefficients: np.ndarray, static: np.ndarray, added: np.nda
 def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     """Information on all coefficients and static unknowns as one matrix."""
     normal = problem.normal(0, coefficients, static)
-    size, _, c, _ = normal.band.shape
-    n, s = size * c, problem.layout.size
+    band = dense_band(normal.band)
+    n, s = len(band), problem.layout.size
     full = np.zeros((n + s, n + s))
-    for i in range(size):
-        for offset in range(min(7, size - i)):
-            j = i + offset
-            full[c * i : c * i + c, c * j : c * j + c] = normal.band[i, offset]
-            full[c * j : c * j + c, c * i : c * i + c] = normal.band[i, offset].T
+    full[:n, :n] = band
     full[:n, n:] = normal.border.reshape(n, s)
     full[n:, :n] = full[:n, n:].T
     full[n:, n:] = normal.static + problem.prior_terms(static)[0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import study_bound
-from kinertia.accuracy_study import SPACING_S, held
+from kinertia.accuracy_study import SPACING_S, at_truth, held
 from kinertia.bsp_prior import literature_prior
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.predicted import Information
@@ -21,8 +21,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     monkeypatch.setattr(study_bound, "STUDY_AMPLITUDE_M", 0.0)
     found = study_bound.information_on_body(trial, seen, prior, 1e-3)
     white = replace(
-        seen,
-        q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)],
+        at_truth(seen, trial),
         marker_sd=np.full_like(seen.marker_sd, 1e-3),
         marker_autocorrelation=0.0,
         force_sd=study_bound.EXACT_N,

@@ -18,14 +18,14 @@ from kinertia.disturbed import Faults, measured
 from kinertia.dynamics import inverse_dynamics
 from kinertia.identifiability import evidence
 from kinertia.instruments import PLATE_UNKNOWNS
-from kinertia.map_terms import CalibrationPrior
+from kinertia.map_terms import CalibrationPrior, Observation
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.parallel import in_parallel
 from kinertia.predicted import Information
 from kinertia.simultaneous import estimate_simultaneous
 from kinertia.simultaneous_fit import calibration_prior
 from kinertia.skeleton import Skeleton
-from kinertia.synthetic import walk, walking_subject
+from kinertia.synthetic import SyntheticTrial, walk, walking_subject
 from kinertia.synthetic_motions import squat
 
 WALK_S = 2.5
@@ -200,11 +200,9 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     seen = [observe(skeleton, k, prior.mass_kg, CUTOFF_HZ)[0] for _, k in recorded]
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
     result = estimate_simultaneous(skeleton, prior, calibration, seen, SPACING_S)
-    at_truth = [
-        replace(o, q=truth.motion.q[np.searchsorted(truth.time, o.time - 1e-9)])
-        for o, (truth, _) in zip(seen, recorded, strict=True)
-    ]
-    there = Information.at(trial.skeleton, replace(prior, mean=person.bsp), calibration, at_truth, SPACING_S)
+    true = [at_truth(o, truth) for o, (truth, _) in zip(seen, recorded, strict=True)]
+    there = Information.at(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, SPACING_S)
+    bound = there.root(range(len(seen)))
     angles = np.flatnonzero(trial.skeleton.rotational)[3:]
     inside = np.flatnonzero(seen[0].dynamic)
     at = np.searchsorted(trial.time, kinematics.time - 1e-9)
@@ -217,13 +215,18 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
         prior.mean.table() - person.bsp.table(),
         prior.sd,
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
-        there.sd(range(len(seen))),
-        attainable(prior, there.root(range(len(seen))), of_noise),
+        np.linalg.norm(bound, axis=1).reshape(-1, 10),
+        attainable(prior, bound, of_noise),
         (_rms(off[0]), _rms(off[1])),
         (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
         _by_joint(trial.skeleton.coordinates, wrong, result.moment_sd[0]),
         result.converged,
     )
+
+
+def at_truth(seen: Observation, trial: SyntheticTrial) -> Observation:
+    """The observation with the trial's true coordinates in place of those of inverse kinematics."""
+    return replace(seen, q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)])
 
 
 def _by_joint(coordinates: Sequence[str], errors: np.ndarray, sd: np.ndarray) -> dict[str, tuple[float, float, float]]:

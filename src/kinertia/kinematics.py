@@ -85,8 +85,7 @@ class Kinematics:
         """
         loads, (start, end) = self.trial.loads, self.window_s
         near = (loads.time >= start - AROUND_WINDOW_S - 1e-9) & (loads.time <= end + AROUND_WINDOW_S + 1e-9)
-        columns = np.concatenate([loads.force, loads.moment], axis=-1)[near].reshape(-1, 12)
-        return smooth(loads.time[near], columns, cutoff_hz)
+        return smooth(loads.time[near], loads.wrench[near].reshape(-1, 12), cutoff_hz)
 
 
 def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:

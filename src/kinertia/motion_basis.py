@@ -7,6 +7,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
+from kinertia.splines import columns_alike
+
 _DEGREE = 5
 _ACTIVE = _DEGREE + 1
 _RIDGE = 1e-8
@@ -50,12 +52,10 @@ class MotionBasis:
         seen = np.isfinite(q)
         filled = np.where(seen, q, 0.0)
         coefficients = np.empty((self.size, q.shape[1]))
-        masks, column_mask = np.unique(seen, axis=1, return_inverse=True)
-        for k, mask in enumerate(masks.T):
-            columns = column_mask.ravel() == k
+        for mask, columns in columns_alike(seen):
             value = self.values[0] * mask[:, None]
             band = np.zeros((_ACTIVE, self.size))
-            right = np.zeros((self.size, int(columns.sum())))
+            right = np.zeros((self.size, len(columns)))
             for a in range(_ACTIVE):
                 np.add.at(right, self.active[:, a], value[:, a, None] * filled[:, columns])
                 for b in range(a, _ACTIVE):

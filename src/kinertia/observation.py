@@ -112,7 +112,7 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float) -> FootP
     used, carrier = np.unique(loads.carrier[nearest], return_inverse=True)
     names = tuple(loads.plates[i] for i in used)
     smoothed = kinematics.smoothed_loads(cutoff_hz)
-    raw = np.concatenate([loads.force[nearest], loads.moment[nearest]], axis=-1)
+    raw = loads.wrench[nearest]
     lost = raw - smoothed(loads.time[nearest]).reshape(raw.shape)
     return FootPlates(smoothed, lost, names, carrier.reshape(-1, 2), turn)
 

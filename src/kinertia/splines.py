@@ -162,7 +162,7 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
     system = _System.of((time - time[0]) / spacing)
     fitted = np.empty_like(columns)
     cutoff, sigma = np.empty(columns.shape[1]), np.empty(columns.shape[1])
-    for visible, group in _alike(~np.isnan(columns)):
+    for visible, group in columns_alike(~np.isnan(columns)):
         y = _filled(columns[:, group], visible)
         if smoothing == "gcv":
             chosen = _gcv_cutoffs(system, y, visible)
@@ -202,7 +202,7 @@ def _validated(
     return time, columns, values.shape[1:]
 
 
-def _alike(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.int_]]]:
+def columns_alike(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.int_]]]:
     """Each different column of `visible` (n, c), and which columns are like it."""
     groups: dict[bytes, list[int]] = {}
     for column, mask in enumerate(visible.T):

@@ -192,6 +192,11 @@ class FootLoads:
         """(k, 2) index of the plate that each foot stands on."""
         return np.tile([0, 1], (len(self.time), 1)) if self.on_plate is None else self.on_plate
 
+    @property
+    def wrench(self) -> FloatArray:
+        """(k, 2, 6) force and moment."""
+        return np.concatenate([self.force, self.moment], axis=-1)
+
     def rotated(self, rotation: FloatArray) -> FootLoads:
         """The same loads in axes turned by `rotation` (3, 3): new = rotation @ old."""
         return replace(self, force=self.force @ rotation.T, moment=self.moment @ rotation.T)

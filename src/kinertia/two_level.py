@@ -35,7 +35,7 @@ MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""
 _FREE_EVALUATIONS, _MAX_EVALUATIONS = 200, 400
 _EXACT = 1e-20
-"""Share of the sum of squares at the start that is rounding."""
+"""Share of the cost at the start that is rounding."""
 _SMALLEST_POSITIVE, _FARTHEST_COM_M = 1e-9, 1.0
 """Bounds: masses and moments stay positive (kg, kg m2), each CoM coordinate within 1 m of the segment's origin."""
 _SMALLEST_SCALE = 0.005
@@ -159,7 +159,7 @@ def estimate_two_level(
     begin = 0.5 * float(np.square(problem.residuals(theta)).sum())
     positive = vector.lower_bounds == 0.0
     bounds = (np.where(positive, _SMALLEST_POSITIVE, -_FARTHEST_COM_M), np.where(positive, np.inf, _FARTHEST_COM_M))
-    fit = _minimise(problem, theta, bounds, progress)
+    fit = _minimise(problem, theta, bounds, _EXACT * begin, progress)
     bsp = vector.bsp(fit.x)
     motions = tuple(problem.motion(bsp, window) for window in windows)
     loads = tuple(residual(skeleton, bsp, m, w.wrench) for m, w in zip(motions, windows, strict=True))
@@ -170,16 +170,16 @@ def _minimise(
     problem: TwoLevelProblem,
     theta: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
+    exact: float,
     progress: Callable[[float], None],
 ) -> OptimizeResult:
-    """Least squares within bounds.
+    """Least squares within bounds; a cost below `exact` is rounding.
 
     Without bounds first: Levenberg-Marquardt crosses them on its way, and where the data are good it ends inside. Only
     if it does not, the trust region method keeps to them from the start on; it may end on a bound short of the minimum.
     Where it creeps along a valley until its limit, Levenberg-Marquardt goes on from there.
     """
     scale = np.maximum(np.abs(theta), _SMALLEST_SCALE)
-    exact = _EXACT * float(np.square(problem.residuals(theta)).sum())
     free = _minimise_freely(problem, theta, scale, bounds, exact)
     if free is not None:
         return free
