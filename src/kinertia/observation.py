@@ -36,6 +36,8 @@ long falls before. One with so many times its bandwidth, as dense at zero freque
 makes measured people odder and their residuals larger, more makes joint moments vaguer than they are."""
 _UNLIKE, _REPEATING = 0.05, 0.3
 """Autocorrelations below which errors count as unlike, and above which they count as coming back."""
+_AS_ALIKE = 0.9
+"""Share of the largest autocorrelation between strides that marks the others."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,11 @@ def observe(
     local = (turned @ errors[..., None])[..., 0]
     shown = np.isfinite(local).any(axis=0)
     local -= np.nanmean(np.where(shown, local, 0.0), axis=0)
-    noise, effective, autocorrelation = _noise(
+    noise, effective, autocorrelation, strides = _noise(
         skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
     )
     # within the band, neighbouring frames repeat one another
-    repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
+    repeated = np.sqrt(strides * max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     return (
         Observation(
@@ -140,7 +142,7 @@ def _noise(
     )
     alike = max(1.0, frames / CORNER)
     spread = strides * _alike(skeleton, filled) * frames / alike
-    return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0)
+    return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0), strides
 
 
 def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
@@ -176,5 +178,8 @@ def _correlation_frames(errors: np.ndarray) -> tuple[float, float]:
     later = np.arange(apart, 2 * n // 3)
     if not later.size or per_pair[later].max() < _REPEATING:
         return near, 1.0
-    period = int(later[np.argmax(per_pair[later])])
+    # as alike again two strides later; the first of such peaks is one stride
+    back = later[per_pair[later] > _AS_ALIKE * per_pair[later].max()]
+    peak = back[back < back[0] + apart]
+    period = int(peak[np.argmax(per_pair[peak])])
     return near, 1.0 + 2.0 * float(np.maximum(alike[period::period], 0.0).sum())
