@@ -8,20 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsp_errors import errors
-from kinertia.accuracy_study import held
+from kinertia.accuracy_study import SPACING_S, held
 from kinertia.bsp_prior import literature_prior
 from kinertia.gait27 import HIP_OFFSETS
 from kinertia.map_terms import CalibrationPrior
 from kinertia.noise import camera_noise
-from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.simultaneous_fit import PLATE_SD
 from kinertia.splines import smooth
 from kinertia.synthetic import unlike_literature, walk, walking_subject
 from measured_trials import table
-from synthetic_walks import FIRST_SEED, kinematics_of
-
-SPACING_S = 1.0 / (2.0 * CUTOFF_HZ)
+from synthetic_walks import FIRST_SEED, observation_of
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     loads[:, 0, 3:] += np.cross([disturbance.plate_m, 0.0, 0.0], loads[:, 0, :3])
     wrong = {name: disturbance.hips_m if "_x_" in name else 0.0 for name in HIP_OFFSETS}
     off = replace(trial, skeleton=trial.skeleton.lock(wrong))
-    seen, _ = observe(off.skeleton, kinematics_of(off, noisy, loads), trial.bsp.total_mass_kg, CUTOFF_HZ)
+    seen = observation_of(off, noisy, loads)
     prior = literature_prior(person.literature)
 
     def estimate(calibration: CalibrationPrior) -> SimultaneousResult:

@@ -11,7 +11,7 @@ import pinocchio as pin
 from threadpoolctl import threadpool_limits
 
 from kinertia.bsp_prior import literature_prior
-from kinertia.noise import camera_noise, soft_tissue_artefact
+from kinertia.noise import SkinMotion, camera_noise
 from kinertia.observation import CUTOFF_HZ
 from kinertia.simultaneous_fit import fit_simultaneous
 from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
@@ -40,7 +40,8 @@ def timed(duration_s: float) -> Timing:
     rng = np.random.default_rng(FIRST_SEED)
     person = unlike_literature(walking_subject(), rng)
     trial = walk(person, duration_s, trapezoid=False)
-    moved = camera_noise(soft_tissue_artefact(trial.markers, trial.skeleton, trial.motion.q, rng), 0.0005, rng)
+    skin = SkinMotion.draw(trial.skeleton, trial.motion.q, rng)
+    moved = camera_noise(skin.moved(trial.markers, trial.skeleton, trial.motion.q), 0.0005, rng)
     kinematics = kinematics_of(trial, moved)
     with threadpool_limits(1):
         started = time.perf_counter()

@@ -17,10 +17,9 @@ from kinertia.calibration import marker_jacobian
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import MapProblem, Observation
 from kinertia.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
-from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.synthetic import SyntheticTrial
 from study_noise import drawn_start, start_prior
-from synthetic_walks import kinematics_of, study_walk
+from synthetic_walks import observation_of, study_walk
 
 EXACT_N = 0.05
 """Deviation of exact forces."""
@@ -102,7 +101,7 @@ def bound(information: np.ndarray, prior: BspPrior) -> tuple[float, float, float
 def bound_rows(draws: int) -> list[list[str]]:
     """Lines for the table of `study_noise.study_section`: mean bounds over the priors of its draws."""
     trial = study_walk()
-    seen = observe(trial.skeleton, kinematics_of(trial, trial.markers), trial.bsp.total_mass_kg, CUTOFF_HZ)[0]
+    seen = observation_of(trial, trial.markers)
     priors = [start_prior(drawn_start(trial, number)[0], trial.bsp.total_mass_kg) for number in range(draws)]
     rows = []
     for floor_m in FLOORS_M:

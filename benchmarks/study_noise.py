@@ -15,7 +15,7 @@ from kinertia.dynamics import Motion
 from kinertia.ik import solve_ik
 from kinertia.map_terms import Observation
 from kinertia.noise import camera_noise, study_noise
-from kinertia.observation import CUTOFF_HZ, observe
+from kinertia.observation import CUTOFF_HZ
 from kinertia.simultaneous import estimate_simultaneous
 from kinertia.splines import smooth
 from kinertia.study import MARGIN_S, START_SHARE
@@ -23,7 +23,7 @@ from kinertia.synthetic import SyntheticTrial
 from kinertia.trial import Markers
 from kinertia.two_level import Window, estimate_two_level
 from measured_trials import table
-from synthetic_walks import FIRST_SEED, kinematics_of, study_walk
+from synthetic_walks import FIRST_SEED, observation_of, study_walk
 
 UNIFORM_SD = 0.29
 """Deviation of a uniform error of +/-50 %, share."""
@@ -74,19 +74,16 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
         spacing_s = 1.0 / (2.0 * cutoff_hz)
         return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], spacing_s).bsp
 
-    def seen_by(markers: Markers, cutoff_hz: float = CUTOFF_HZ) -> Observation:
-        return observe(trial.skeleton, kinematics_of(trial, markers), trial.bsp.total_mass_kg, cutoff_hz)[0]
-
-    seen = seen_by(noisy)
+    seen = observation_of(trial, noisy)
     found["simultaneous"] = simultaneous(seen)
     white = np.full_like(seen.marker_sd, np.std(noisy.positions - trial.markers.positions))
     found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white, marker_autocorrelation=0.0))
     found["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
     sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
     found["forces three times as sure"] = simultaneous(sure)
-    found["20 Hz instead of 10 Hz"] = simultaneous(seen_by(noisy, 20.0), cutoff_hz=20.0)
+    found["20 Hz instead of 10 Hz"] = simultaneous(observation_of(trial, noisy, cutoff_hz=20.0), cutoff_hz=20.0)
     found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
-    sharp = seen_by(camera_noise(trial.markers, CAMERA_SD_M, rng))
+    sharp = observation_of(trial, camera_noise(trial.markers, CAMERA_SD_M, rng))
     sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_autocorrelation=0.0)
     found["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
     return {name: errors(bsp, trial.bsp) for name, bsp in found.items()}

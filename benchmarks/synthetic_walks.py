@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.kinematics import Kinematics, solve_kinematics
-from kinertia.observation import CUTOFF_HZ
+from kinertia.map_terms import Observation
+from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.study import MARGIN_S, symmetric_truth
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
 from kinertia.trial import FootLoads, Markers, Trial
@@ -28,3 +29,12 @@ def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | N
     measured = np.ones(len(trial.time), dtype=bool)
     feet = FootLoads(trial.time, loads[..., :3], loads[..., 3:])
     return solve_kinematics(trial.skeleton, Trial("walk", markers, feet, measured), 0.0, CUTOFF_HZ)
+
+
+def observation_of(
+    trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None, cutoff_hz: float = CUTOFF_HZ
+) -> Observation:
+    """The observation of a synthetic trial with these markers and foot loads (n, 2, 6)."""
+    return observe(trial.skeleton, [kinematics_of(trial, markers, loads)], trial.bsp.total_mass_kg, cutoff_hz).together[
+        0
+    ]

@@ -103,13 +103,13 @@ def test_bars_hold(key):
 
 def test_faults_are_what_they_say(trial):
     rng = np.random.default_rng
-    plain_skeleton, plain = measured(trial, Faults("artefact"), rng(1))
+    plain_skeleton, (plain,) = measured([trial], Faults("artefact"), rng(1))
     assert plain_skeleton is trial.skeleton
-    _, gained = measured(trial, Faults("artefact", gain=0.02), rng(1))
+    _, (gained,) = measured([trial], Faults("artefact", gain=0.02), rng(1))
     right, left = 0, 1
     np.testing.assert_allclose(gained.trial.loads.force[:, right], 1.02 * plain.trial.loads.force[:, right])
     np.testing.assert_allclose(gained.trial.loads.force[:, left], plain.trial.loads.force[:, left])
-    hips, _ = measured(trial, Faults("artefact", hips_m=0.015), rng(1))
+    hips, _ = measured([trial], Faults("artefact", hips_m=0.015), rng(1))
     assert hips.locked["hip_x_r"] == hips.locked["hip_x_l"] == 0.015
     tilt = tilted(trial.skeleton, np.radians(5.0), rng(1))
     pairs = [
@@ -130,15 +130,15 @@ def test_faults_are_what_they_say(trial):
 
 def test_wobbling_mass_keeps_impulse_and_weight(trial):
     """Soft tissue on springs neither adds weight nor pushes the person off: its mean force is small beside its peak."""
-    _, plain = measured(trial, Faults("artefact"), np.random.default_rng(1))
-    _, wobbled = measured(trial, Faults("artefact", wobbling=0.4), np.random.default_rng(1))
+    _, (plain,) = measured([trial], Faults("artefact"), np.random.default_rng(1))
+    _, (wobbled,) = measured([trial], Faults("artefact", wobbling=0.4), np.random.default_rng(1))
     added = (wobbled.trial.loads.force - plain.trial.loads.force).sum(axis=1)
     assert 1.0 < np.abs(added).max() < 200.0
     assert np.abs(added.mean(axis=0)).max() < 0.1 * np.abs(added).max()
 
 
 def test_calibration_errors_move_everything(trial):
-    skeleton, kinematics = measured(trial, Faults("study", calibration=True), np.random.default_rng(2))
+    skeleton, (kinematics,) = measured([trial], Faults("study", calibration=True), np.random.default_rng(2))
     assert np.std(skeleton.marker_locals - trial.skeleton.marker_locals) == pytest.approx(0.005, rel=0.2)
     assert skeleton.locked["hip_z_l"] != trial.skeleton.locked["hip_z_l"]
     share = kinematics.trial.loads.force[:, :, 1].sum() / trial.foot_loads[:, :, 1].sum()

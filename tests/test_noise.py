@@ -6,9 +6,9 @@ import pytest
 from kinertia.noise import (
     ARTEFACT_RANGE_M,
     OTHER_ARTEFACT_RANGE_M,
+    SkinMotion,
     camera_noise,
     plate_noise,
-    soft_tissue_artefact,
     study_noise,
 )
 from kinertia.synthetic import walk, walking_subject
@@ -51,8 +51,13 @@ def test_study_noise_is_one_slow_sinusoid_per_coordinate(still):
     assert np.histogram(top, bins=4, range=(0, 25 / (2 * np.pi)))[0].min() > 300
 
 
+def skin_moved(trial):
+    q = trial.motion.q
+    return SkinMotion.draw(trial.skeleton, q, np.random.default_rng(3)).moved(trial.markers, trial.skeleton, q)
+
+
 def test_artefact_is_rigid_per_segment_and_in_the_published_range(trial):
-    noisy = soft_tissue_artefact(trial.markers, trial.skeleton, trial.motion.q, np.random.default_rng(3))
+    noisy = skin_moved(trial)
     pose = trial.skeleton.pose(trial.motion.q)
     ground = noisy.positions - trial.markers.positions
     local = np.einsum("nmji,nmj->nmi", pose.rotation[:, trial.skeleton.marker_segments], ground)
@@ -66,7 +71,7 @@ def test_artefact_is_rigid_per_segment_and_in_the_published_range(trial):
 
 
 def test_artefact_is_linear_in_the_neighbouring_joint_angles(trial):
-    noisy = soft_tissue_artefact(trial.markers, trial.skeleton, trial.motion.q, np.random.default_rng(3))
+    noisy = skin_moved(trial)
     pose = trial.skeleton.pose(trial.motion.q)
     k = trial.skeleton.labels.index("R.Thigh.Front")
     rotation = pose.rotation[:, trial.skeleton.marker_segments[k]]
@@ -116,7 +121,7 @@ def test_same_seed_same_noise_other_seed_other_noise(trial):
     short = replace(trial.markers, time=trial.markers.time[:9], positions=trial.markers.positions[:9])
     models = {
         "study": lambda rng: study_noise(short, rng).positions,
-        "artefact": lambda rng: soft_tissue_artefact(short, trial.skeleton, trial.motion.q[:9], rng).positions,
+        "artefact": lambda rng: SkinMotion.draw(trial.skeleton, trial.motion.q, rng).slopes["thigh_r"],
         "camera": lambda rng: camera_noise(short, 0.001, rng).positions,
         "plate": lambda rng: plate_noise(plates(), 1.0, 1.0, 0.1, rng).force,
     }

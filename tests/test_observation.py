@@ -9,7 +9,6 @@ from kinertia.observation import (
     FORCE_SD_OF_WEIGHT,
     MOMENT_ARM_M,
     SMALLEST_MARKER_SD_M,
-    _correlation_frames,
     observe,
 )
 from kinertia.skeleton import GRAVITY_M_S2
@@ -24,7 +23,12 @@ def trial():
 
 
 def observed(trial, markers, cutoff_hz=10.0):
-    return observe(trial.skeleton, kinematics_of(trial, markers), MASS_KG, cutoff_hz)
+    return alone(trial.skeleton, kinematics_of(trial, markers), cutoff_hz)
+
+
+def alone(skeleton, kinematics, cutoff_hz=10.0):
+    seen = observe(skeleton, [kinematics], MASS_KG, cutoff_hz)
+    return seen.alone[0], seen.noise[0]
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +94,7 @@ def test_frames_stay_uniform_where_the_pelvis_is_not_seen(trial):
     gap = slice(50, 58)
     positions[gap, pelvis] = np.nan
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions))
-    seen, noise = observe(trial.skeleton, kinematics, MASS_KG, 10.0)
+    seen, noise = alone(trial.skeleton, kinematics)
     np.testing.assert_allclose(np.diff(seen.time), 0.01)
     np.testing.assert_allclose(seen.time[seen.dynamic], kinematics.time)
     here = slice(*(int(np.searchsorted(seen.time, trial.time[i] - 1e-9)) for i in (gap.start, gap.stop)))
@@ -102,7 +106,7 @@ def test_frames_stay_uniform_where_the_pelvis_is_not_seen(trial):
 
 def test_only_the_window_is_dynamic_and_its_surroundings_are_markers(trial):
     kinematics = replace(kinematics_of(trial, trial.markers), window_s=(0.4, 0.6))
-    seen, _ = observe(trial.skeleton, kinematics, MASS_KG, 10.0)
+    seen, _ = alone(trial.skeleton, kinematics)
     assert seen.time[seen.dynamic][[0, -1]] == pytest.approx([0.4, 0.6])
     assert seen.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
     assert seen.ground.loads.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
@@ -141,18 +145,8 @@ def test_markers_off_their_places_are_not_noise(trial):
     moved = trial.skeleton.with_markers(
         [replace(m, position=place) for m, place in zip(trial.skeleton.markers, places, strict=True)]
     )
-    (right, _), (wrong, _) = (observe(skeleton, kinematics, MASS_KG, 10.0) for skeleton in (trial.skeleton, moved))
+    (right, _), (wrong, _) = (alone(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
     np.testing.assert_allclose(wrong.marker_sd, right.marker_sd, rtol=1e-6)
-
-
-def test_noise_that_comes_back_with_every_stride_says_nothing_new():
-    rng = np.random.default_rng(0)
-    stride = np.cumsum(rng.normal(size=(60, 30)), axis=0)
-    stride -= np.linspace(0, 1, 60)[:, None] * (stride[-1] - stride[0]) + stride.mean(axis=0)
-    once, often = (_correlation_frames(np.tile(stride, (count, 1))) for count in (2, 8))
-    assert np.prod(often) == pytest.approx(4.0 * np.prod(once), rel=0.35)
-    white = rng.normal(size=(480, 30))
-    assert _correlation_frames(white) == pytest.approx((1.0, 1.0), abs=0.1)
 
 
 def test_the_process_is_as_dense_at_zero_frequency_as_the_errors(trial):

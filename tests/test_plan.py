@@ -24,11 +24,11 @@ def prior():
 def trials(prior):
     """A walk and squats of a person of the prior, as measured."""
     person = replace(walking_subject(), bsp=prior.draw(np.random.default_rng(2)))
-    found = []
-    for name, trial in (("walk", walk(person, 1.5, trapezoid=False)), ("squat", squat(person))):
-        _, kinematics = measured(trial, Faults("artefact"), np.random.default_rng(3))
-        found.append(replace(kinematics, trial=replace(kinematics.trial, name=name)))
-    return trial.skeleton, found
+    motions = [walk(person, 1.5, trapezoid=False), squat(person)]
+    skeleton, found = measured(motions, Faults("artefact"), np.random.default_rng(3))
+    return skeleton, [
+        replace(k, trial=replace(k.trial, name=name)) for name, k in zip(("walk", "squat"), found, strict=True)
+    ]
 
 
 @pytest.fixture(scope="module")

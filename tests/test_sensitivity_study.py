@@ -24,8 +24,8 @@ def test_answers():
 
 def test_conditions_change_one_thing_at_a_time():
     assert {f"{kind} x {a:g}" for kind in ("study", "artefact") for a in AMPLITUDES} < set(CONDITIONS)
-    assert CONDITIONS[WITH_SQUATS].squats
-    assert not CONDITIONS["artefact x 1"].squats
+    assert CONDITIONS[WITH_SQUATS].others == ("squat",)
+    assert not CONDITIONS["artefact x 1"].others
     assert CONDITIONS["strides 8"].walk_s == 8 * 1.25
     assert CONDITIONS["study x 0.25"].faults.amplitude == 0.25
 

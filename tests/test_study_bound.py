@@ -8,16 +8,16 @@ import pytest
 import study_bound
 from kinertia.accuracy_study import SPACING_S, at_truth, held
 from kinertia.bsp_prior import literature_prior
-from kinertia.observation import CUTOFF_HZ, observe
+from kinertia.map_terms import MapProblem
 from kinertia.predicted import Information
 from kinertia.synthetic import walking_subject
-from synthetic_walks import kinematics_of, study_walk
+from synthetic_walks import observation_of, study_walk
 
 
 def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     trial = study_walk(0.6)
     prior = literature_prior(walking_subject().literature)
-    seen = observe(trial.skeleton, kinematics_of(trial, trial.markers), trial.bsp.total_mass_kg, CUTOFF_HZ)[0]
+    seen = observation_of(trial, trial.markers)
     monkeypatch.setattr(study_bound, "STUDY_AMPLITUDE_M", 0.0)
     found = study_bound.information_on_body(trial, seen, prior, 1e-3)
     white = replace(
@@ -29,7 +29,9 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     )
     calibration = replace(held(trial.skeleton), marker_sd_m=np.full(len(trial.skeleton.markers), 1e-8))
     calibration = replace(calibration, plate_sd=dict.fromkeys(calibration.plate_sd, 1e-9), clock_sd_s=1e-9)
-    own = Information.at(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], SPACING_S)
+    own = Information(
+        MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], SPACING_S), np.ones((1, 1))
+    )
     ours = study_bound.bound(found, replace(prior, mean=trial.bsp))
     sd = own.sd([0])[[k for k, segment in enumerate(prior.mean.segments) if not segment.endswith("_l")]]
     theirs = [np.sqrt(np.mean(np.square(sd[:, part]))) for part in (slice(0, 1), slice(1, 4), slice(4, 7))]
@@ -39,7 +41,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
 def test_better_cameras_tell_more():
     trial = study_walk(0.6)
     prior = literature_prior(walking_subject().literature)
-    seen = observe(trial.skeleton, kinematics_of(trial, trial.markers), trial.bsp.total_mass_kg, CUTOFF_HZ)[0]
+    seen = observation_of(trial, trial.markers)
     fine, coarse = (
         study_bound.bound(study_bound.information_on_body(trial, seen, prior, floor_m), prior)
         for floor_m in (1e-4, 1e-3)

@@ -18,7 +18,7 @@ from kinertia.disturbed import Faults, measured
 from kinertia.dynamics import inverse_dynamics
 from kinertia.identifiability import evidence
 from kinertia.instruments import PLATE_UNKNOWNS
-from kinertia.map_terms import CalibrationPrior, Observation
+from kinertia.map_terms import CalibrationPrior, MapProblem, Observation
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.parallel import in_parallel
 from kinertia.predicted import Information
@@ -26,7 +26,7 @@ from kinertia.simultaneous import estimate_simultaneous
 from kinertia.simultaneous_fit import calibration_prior
 from kinertia.skeleton import Skeleton
 from kinertia.synthetic import SyntheticTrial, walk, walking_subject
-from kinertia.synthetic_motions import squat
+from kinertia.synthetic_motions import MOTIONS
 
 WALK_S = 2.5
 SPACING_S = 1.0 / (2.0 * CUTOFF_HZ)
@@ -55,13 +55,15 @@ _TRIES = 500
 
 @dataclass(frozen=True)
 class Scenario:
-    """One kind of laboratory: its faults, whether the estimator calibrates, and what was recorded."""
+    """One kind of laboratory: its faults, whether the estimator calibrates, how long a walk was recorded, and which
+    other motions (`synthetic_motions.MOTIONS`) besides.
+    """
 
     title: str
     faults: Faults
     calibrated: bool = True
     walk_s: float = WALK_S
-    squats: bool = False
+    others: tuple[str, ...] = ()
 
 
 PROOF = {
@@ -70,6 +72,12 @@ PROOF = {
     "study_calibration": Scenario("the study's noise, calibration errors", Faults("study", calibration=True)),
     "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
     "strides": Scenario("skin motion, eight strides", Faults("artefact"), walk_s=10.0),
+    "walks": Scenario("skin motion, three walks", Faults("artefact"), others=("walk", "walk")),
+    "session": Scenario(
+        "skin motion, calibration errors; squats, arm swings and trunk sway besides the walk",
+        Faults("artefact", calibration=True),
+        others=("squat", "arm swing", "trunk sway"),
+    ),
 }
 """What error bars are made for."""
 BREAKS = {
@@ -191,20 +199,17 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     subject = walking_subject()
     prior = literature_prior(subject.literature)
     person = replace(subject, bsp=prior.draw(of_person))
-    trial = walk(person, scenario.walk_s, trapezoid=False)
-    skeleton, kinematics = measured(trial, scenario.faults, of_noise)
-    recorded = [(trial, kinematics)]
-    if scenario.squats:
-        squats = squat(person)
-        recorded.append((squats, measured(squats, scenario.faults, of_noise)[1]))
-    seen = [observe(skeleton, k, prior.mass_kg, CUTOFF_HZ)[0] for _, k in recorded]
+    trials = [walk(person, scenario.walk_s, trapezoid=False), *(MOTIONS[name](person) for name in scenario.others)]
+    skeleton, recorded = measured(trials, scenario.faults, of_noise)
+    seen = observe(skeleton, recorded, prior.mass_kg, CUTOFF_HZ)
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
-    result = estimate_simultaneous(skeleton, prior, calibration, seen, SPACING_S)
-    true = [at_truth(o, truth) for o, (truth, _) in zip(seen, recorded, strict=True)]
-    there = Information.at(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, SPACING_S)
-    bound = there.root(range(len(seen)))
+    result = estimate_simultaneous(skeleton, prior, calibration, seen.together, SPACING_S)
+    trial, kinematics = trials[0], recorded[0]
+    true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
+    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, SPACING_S)
+    bound = Information(there, seen.repeats).root(range(len(true)))
     angles = np.flatnonzero(trial.skeleton.rotational)[3:]
-    inside = np.flatnonzero(seen[0].dynamic)
+    inside = np.flatnonzero(seen.alone[0].dynamic)
     at = np.searchsorted(trial.time, kinematics.time - 1e-9)
     truth = trial.motion.cut(at)
     off = [(q - truth.q)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]

@@ -6,6 +6,7 @@ skeleton. Only the latter three come out, as `Kinematics`; the estimator gets no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.freedom import JOINT_CENTRE_SD_M, MARKER_SD_M
 from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.kinematics import Kinematics, solve_kinematics
-from kinertia.noise import camera_noise, soft_tissue_artefact, study_noise
+from kinertia.noise import SkinMotion, camera_noise, study_noise
 from kinertia.simultaneous_fit import CLOCK_SD_S, PLATE_SD
 from kinertia.skeleton import GRAVITY_M_S2, Marker, Skeleton
 from kinertia.splines import smooth
@@ -34,7 +35,7 @@ class Faults:
     """What is wrong in a laboratory beside the noise of the markers.
 
     Attributes:
-        noise: "study" (`noise.study_noise`) or "artefact" (`noise.soft_tissue_artefact` and 0.5 mm of camera noise).
+        noise: "study" (`noise.study_noise`) or "artefact" (`noise.SkinMotion` and 0.5 mm of camera noise).
         amplitude: factor on that noise, but for the cameras'.
         calibration: joint centres, markers, plates and clock are off by errors drawn from the estimator's own prior.
         axes_rad: the axes of knees, ankles and elbows are tilted by this much, each in its own direction.
@@ -52,27 +53,44 @@ class Faults:
     gain: float = 0.0
 
 
-def measured(trial: SyntheticTrial, faults: Faults, rng: np.random.Generator) -> tuple[Skeleton, Kinematics]:
-    """The skeleton that the laboratory believes in, and its kinematics by that skeleton."""
-    exact = trial.markers
-    if faults.noise == "study":
-        moved, camera_sd_m = study_noise(exact, rng), 0.0
-    else:
-        moved, camera_sd_m = soft_tissue_artefact(exact, trial.skeleton, trial.motion.q, rng), CAMERA_SD_M
-    scaled = replace(exact, positions=exact.positions + faults.amplitude * (moved.positions - exact.positions))
-    markers = camera_noise(scaled, camera_sd_m, rng)
-    loads = trial.foot_loads.copy()
-    if faults.wobbling:
-        loads += _wobbled(trial, faults.wobbling)
-    skeleton = trial.skeleton
+def measured(
+    trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator
+) -> tuple[Skeleton, list[Kinematics]]:
+    """The skeleton that the laboratory believes in, and the kinematics by that skeleton of all trials of one person.
+
+    Skin, skeleton and instruments are the same in all trials; sizes of skin motion are those of the first.
+    """
+    markers, skeleton = _disturbed(trials, faults, rng), trials[0].skeleton
+    instruments = None
     if faults.calibration:
-        skeleton, loads = _miscalibrated(trial, loads, rng)
-    loads[:, 0] *= 1.0 + faults.gain
+        skeleton = _misplaced(skeleton, rng)
+        instruments = _Instruments.draw(rng)
     if faults.hips_m:
         skeleton = skeleton.lock({name: faults.hips_m for name in HIP_OFFSETS if "_x_" in name})
     if faults.axes_rad:
         skeleton = tilted(skeleton, faults.axes_rad, rng)
-    return skeleton, _kinematics(skeleton, trial.time, markers, loads)
+    found = []
+    for trial, seen in zip(trials, markers, strict=True):
+        loads = trial.foot_loads.copy()
+        if faults.wobbling:
+            loads += _wobbled(trial, faults.wobbling)
+        if instruments is not None:
+            loads = instruments.read(trial.time, loads)
+        loads[:, 0] *= 1.0 + faults.gain
+        found.append(_kinematics(skeleton, trial.time, seen, loads))
+    return skeleton, found
+
+
+def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator) -> list[Markers]:
+    """The markers of each trial with noise."""
+    skin = SkinMotion.draw(trials[0].skeleton, trials[0].motion.q, rng) if faults.noise == "artefact" else None
+    found = []
+    for trial in trials:
+        exact = trial.markers
+        moved = study_noise(exact, rng) if skin is None else skin.moved(exact, trial.skeleton, trial.motion.q)
+        scaled = replace(exact, positions=exact.positions + faults.amplitude * (moved.positions - exact.positions))
+        found.append(scaled if skin is None else camera_noise(scaled, CAMERA_SD_M, rng))
+    return found
 
 
 def _kinematics(skeleton: Skeleton, time: np.ndarray, markers: Markers, loads: np.ndarray) -> Kinematics:
@@ -80,20 +98,42 @@ def _kinematics(skeleton: Skeleton, time: np.ndarray, markers: Markers, loads: n
     return solve_kinematics(skeleton, Trial("walk", markers, feet, np.ones(len(time), dtype=bool)), 0.0, "gcv")
 
 
-def _miscalibrated(trial: SyntheticTrial, loads: np.ndarray, rng: np.random.Generator) -> tuple[Skeleton, np.ndarray]:
-    """A wrong skeleton and loads (n, 2, 6), errors drawn from the prior of `fit_simultaneous`."""
-    skeleton = trial.skeleton
+def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
+    """The skeleton with joint centres and markers off by errors drawn from the prior of `fit_simultaneous`."""
     centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
     skeleton = skeleton.lock({name: skeleton.locked[name] + rng.normal(0.0, JOINT_CENTRE_SD_M) for name in centres})
     places = skeleton.marker_locals + rng.normal(0.0, MARKER_SD_M, skeleton.marker_locals.shape)
-    placed = [Marker(m.label, m.segment, place) for m, place in zip(skeleton.markers, places, strict=True)]
-    late = smooth(trial.time, loads.reshape(len(trial.time), 12), _LOADS_HZ)(trial.time + rng.normal(0.0, CLOCK_SD_S))
-    wrong = late.reshape(loads.shape)
-    offset = rng.normal(0.0, 1.0, (2, 3)) * [PLATE_SD["x"], 0.0, PLATE_SD["z"]]
-    wrong[..., 3:] += np.cross(offset, wrong[..., :3])
-    wrong *= 1.0 + rng.normal(0.0, PLATE_SD["gain"], (2, 1))
-    wrong[..., 4] += rng.normal(0.0, PLATE_SD["free moment"], 2) * wrong[..., 1]
-    return skeleton.with_markers(placed), wrong
+    return skeleton.with_markers(
+        [Marker(m.label, m.segment, place) for m, place in zip(skeleton.markers, places, strict=True)]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Instruments:
+    """Plates and clock of a laboratory: how late forces are, and per foot's plate its offset (2, 3) m, gain (2, 1), and
+    crosstalk (2,) to the free moment.
+    """
+
+    late_s: float
+    offset_m: np.ndarray
+    gain: np.ndarray
+    free_moment: np.ndarray
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> _Instruments:
+        """From the prior of `fit_simultaneous`."""
+        late_s = rng.normal(0.0, CLOCK_SD_S)
+        offset = rng.normal(0.0, 1.0, (2, 3)) * [PLATE_SD["x"], 0.0, PLATE_SD["z"]]
+        gain = 1.0 + rng.normal(0.0, PLATE_SD["gain"], (2, 1))
+        return cls(late_s, offset, gain, rng.normal(0.0, PLATE_SD["free moment"], 2))
+
+    def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """What they make of true loads (n, 2, 6)."""
+        wrong = smooth(time, loads.reshape(len(time), 12), _LOADS_HZ)(time + self.late_s).reshape(loads.shape)
+        wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
+        wrong *= self.gain
+        wrong[..., 4] += self.free_moment * wrong[..., 1]
+        return wrong
 
 
 def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Skeleton:

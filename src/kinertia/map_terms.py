@@ -7,7 +7,7 @@ are summed knot interval by knot interval: the normal matrix is banded in the mo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -45,6 +45,7 @@ class Observation:
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
         force_sd, moment_sd: effective deviations of the root residual, N and N m.
+        repeats: by how much errors that come back have raised all variances (`repeated`).
     """
 
     time: np.ndarray
@@ -56,6 +57,18 @@ class Observation:
     ground: FootPlates
     force_sd: float
     moment_sd: float
+    repeats: float = 1.0
+
+    def repeated(self, times: float) -> Observation:
+        """The same where its errors come back so many times in all that is estimated from."""
+        more = np.sqrt(times)
+        return replace(
+            self,
+            marker_sd=more * self.marker_sd,
+            force_sd=more * self.force_sd,
+            moment_sd=more * self.moment_sd,
+            repeats=times * self.repeats,
+        )
 
 
 @dataclass(frozen=True)

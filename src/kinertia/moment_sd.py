@@ -1,10 +1,11 @@
 """Standard deviations of joint moments, from motion, body segment parameters and calibration together.
 
 Delta method: the joint moments' analytic derivatives by spline coefficients and static unknowns, times their posterior
-covariance. Of the coefficients' covariance only the blocks near the diagonal are needed, since six splines are active
-in any frame; they come from the block-banded factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what
-smoothing took off the loads under the feet, as a moving mean square: sharp forces at foot strike are lost to the
-moments of the leg.
+covariance. Errors that come back (`repetition`) make the motion no vaguer, only what many frames say of what does not
+move: what is left of the motion if that were known is that of the errors alone. Of the coefficients' covariance only
+the blocks near the diagonal are needed, since six splines are active in any frame; they come from the block-banded
+factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what smoothing took off the loads under the feet,
+as a moving mean square: sharp forces at foot strike are lost to the moments of the leg.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def joint_moment_sd(
         for first in np.unique(basis.first[chosen]):
             rows = np.flatnonzero(basis.first[chosen] == first)
             own, carried = motion.active(int(first))
-            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1)
+            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1) / problem.trials[k].repeats
             spread += np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
             variance[start + rows] = spread
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))

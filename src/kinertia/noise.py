@@ -1,13 +1,14 @@
 """Measurement errors for synthetic trials: skin motion, cameras, force plates. Every function takes its own generator.
 
 Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that moves with the neighbouring joints
-(`soft_tissue_artefact`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset
+(`SkinMotion`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset
 (`plate_noise`).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,34 +36,48 @@ def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
     return replace(markers, positions=markers.positions + amplitude * np.sin(rate * time + phase))
 
 
-def soft_tissue_artefact(markers: Markers, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator) -> Markers:
-    """Skin motion that goes with the joints: each segment's markers move together, linearly in its joints' angles.
+@dataclass(frozen=True, eq=False)
+class SkinMotion:
+    """Skin motion of a person that goes with the joints: each segment's markers move together, linearly in the angles
+    of the joints at its two ends, and in every trial alike.
 
-    The displacement, constant in the segment's frame but for the angles of the joints at its two ends, has a random
-    direction per joint angle and a peak-to-peak size drawn from `ARTEFACT_RANGE_M` (10-18 mm on the thigh, 7-17 mm on
-    the shank, 4-9 mm elsewhere, per step). Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes
-    from the review of Peters et al. (2010).
+    Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes from the review of Peters et al. (2010).
 
-    Args:
-        markers: of a trial of this skeleton.
-        skeleton: tells which marker is on which segment.
-        q: (n, c) true coordinates at the frames of `markers`.
-        rng: the random generator.
+    Attributes:
+        slopes: segment -> (k, 3) m/rad in the segment's frame, per angle of its joints.
+        reference: (c,) coordinates at which nothing is displaced.
     """
-    pose = skeleton.pose(q)
-    positions = markers.positions.copy()
-    for s, segment in enumerate(skeleton.segments):
-        labels = [marker.label for marker in skeleton.markers if marker.segment == segment]
-        columns = [markers.labels.index(label) for label in labels if label in markers.labels]
-        if not columns:
-            continue
-        angles = q[:, _neighbouring(skeleton, segment)]
-        local = (angles - angles.mean(axis=0)) @ rng.standard_normal((angles.shape[1], 3))
-        low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
-        extent = np.linalg.norm(np.ptp(local, axis=0))
-        local = local * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
-        positions[:, columns] += (pose.rotation[:, s] @ local[..., None])[:, None, :, 0]
-    return replace(markers, positions=positions)
+
+    slopes: Mapping[str, np.ndarray]
+    reference: np.ndarray
+
+    @classmethod
+    def draw(cls, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator) -> SkinMotion:
+        """Random directions per joint angle, and peak-to-peak sizes over the coordinates q (n, c) of a walk from
+        `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere.
+        """
+        reference, slopes = q.mean(axis=0), {}
+        for segment in skeleton.segments:
+            if not any(marker.segment == segment for marker in skeleton.markers):
+                continue
+            columns = _neighbouring(skeleton, segment)
+            directions = rng.standard_normal((len(columns), 3))
+            low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
+            extent = np.linalg.norm(np.ptp((q - reference)[:, columns] @ directions, axis=0))
+            slopes[segment] = directions * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
+        return cls(slopes, reference)
+
+    def moved(self, markers: Markers, skeleton: Skeleton, q: np.ndarray) -> Markers:
+        """The markers of a trial displaced; q (n, c) are its true coordinates at their frames."""
+        pose = skeleton.pose(q)
+        positions = markers.positions.copy()
+        for segment, slopes in self.slopes.items():
+            labels = [marker.label for marker in skeleton.markers if marker.segment == segment]
+            columns = [markers.labels.index(label) for label in labels if label in markers.labels]
+            local = (q - self.reference)[:, _neighbouring(skeleton, segment)] @ slopes
+            turned = pose.rotation[:, skeleton.segments.index(segment)] @ local[..., None]
+            positions[:, columns] += turned[:, None, :, 0]
+        return replace(markers, positions=positions)
 
 
 def _neighbouring(skeleton: Skeleton, segment: str) -> list[int]:

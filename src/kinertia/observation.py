@@ -4,13 +4,13 @@ are.
 Marker noise is not white (DESIGN section 6): skin motion lasts for many frames. Its deviation and correlation length
 are read from the errors that inverse kinematics leaves; the estimate takes it as a first-order autoregressive process
 (`marker_terms`). The deviation is inflated by the square root of the number of markers that err alike: those of a
-segment ride on the same skin. Inverse kinematics absorbs part of the noise; the deviation makes up for its degrees of
-freedom only on average.
+segment ride on the same skin. So are all deviations where errors come back (`repetition`). Inverse kinematics absorbs
+part of the noise; the deviation makes up for its degrees of freedom only on average.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.instruments import FootPlates
 from kinertia.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.map_terms import Observation
+from kinertia.repetition import Repetition, repeats
 from kinertia.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.trial import nearest_samples
 
@@ -34,10 +35,6 @@ CORNER = 2.0
 """Skin motion has a nearly flat spectrum up to its highest frequency; that of a first-order process as strong and as
 long falls before. One with so many times its bandwidth, as dense at zero frequency, is two thirds as dense there. Less
 makes measured people odder and their residuals larger, more makes joint moments vaguer than they are."""
-_UNLIKE, _REPEATING = 0.05, 0.3
-"""Autocorrelations below which errors count as unlike, and above which they count as coming back."""
-_AS_ALIKE = 0.9
-"""Share of the largest autocorrelation between strides that marks the others."""
 
 
 @dataclass(frozen=True)
@@ -55,17 +52,45 @@ class MarkerNoise:
     wandering: tuple[str, ...]
 
 
-def observe(
-    skeleton: Skeleton, kinematics: Kinematics, mass_kg: float, cutoff_hz: float
-) -> tuple[Observation, MarkerNoise]:
-    """The observation of one trial and the noise of its markers.
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Trials of one person.
+
+    Attributes:
+        alone: per trial, with the deviations of errors that never come back.
+        noise: per trial.
+        repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
+    """
+
+    alone: tuple[Observation, ...]
+    noise: tuple[MarkerNoise, ...]
+    repeats: np.ndarray
+
+    @property
+    def together(self) -> tuple[Observation, ...]:
+        """The trials for one estimate from all: what comes back counts once."""
+        return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
+
+
+def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cutoff_hz: float) -> Observations:
+    """The observations of trials of one person, and the noise of their markers.
 
     Args:
-        skeleton: with exactly the markers to use, in the order of the observation; a trial may lack some.
-        kinematics: of the trial.
+        skeleton: with exactly the markers to use, in the order of the observations; a trial may lack some.
+        trials: kinematics of each.
         mass_kg: for the size of force errors.
         cutoff_hz: bandwidth of the forces.
     """
+    found = [_observed(skeleton, each, mass_kg, cutoff_hz) for each in trials]
+    rates = [each.trial.markers.rate_hz for each in trials]
+    counts = repeats([errors.reshape(len(errors), -1) for _, _, errors in found], rates)
+    return Observations(tuple(o for o, _, _ in found), tuple(noise for _, noise, _ in found), counts)
+
+
+def _observed(
+    skeleton: Skeleton, kinematics: Kinematics, mass_kg: float, cutoff_hz: float
+) -> tuple[Observation, MarkerNoise, np.ndarray]:
+    """One trial on its own, and the errors (n, m, 3) of its markers in their segments, zero where they are not seen."""
     time = kinematics.trial.markers.time
     start, end = kinematics.window_s
     near = (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
@@ -85,11 +110,11 @@ def observe(
     local = (turned @ errors[..., None])[..., 0]
     shown = np.isfinite(local).any(axis=0)
     local -= np.nanmean(np.where(shown, local, 0.0), axis=0)
-    noise, effective, autocorrelation, strides = _noise(
+    noise, effective, autocorrelation = _noise(
         skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
     )
     # within the band, neighbouring frames repeat one another
-    repeated = np.sqrt(strides * max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
+    repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     return (
         Observation(
@@ -104,6 +129,7 @@ def observe(
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
         noise,
+        np.where(np.isfinite(local), local, 0.0),
     )
 
 
@@ -131,7 +157,7 @@ def _noise(
     per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
     lost = np.sqrt(per_frame / max(per_frame - unknowns, 1.0))
     sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
-    frames, strides = _correlation_frames(filled.reshape(len(errors), -1))
+    frames = Repetition.of(filled.reshape(len(errors), -1)).frames
     usual = float(np.median(sd))
     labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
     deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
@@ -141,8 +167,8 @@ def _noise(
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
     alike = max(1.0, frames / CORNER)
-    spread = strides * _alike(skeleton, filled) * frames / alike
-    return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0), strides
+    spread = _alike(skeleton, filled) * frames / alike
+    return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0)
 
 
 def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
@@ -157,29 +183,3 @@ def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
         if apart > 0:
             count[own] = max(1.0, float(np.square(errors[:, own].sum(axis=1)).sum() / apart))
     return count
-
-
-def _correlation_frames(errors: np.ndarray) -> tuple[float, float]:
-    """Over how many frames the columns (n, k) err alike, by their autocorrelation (1 for white noise), and in how many
-    strides.
-
-    Errors near in time are alike, and those of gait come back with every stride: a tenth stride says no more than the
-    ones before it.
-    """
-    power = np.square(errors).sum()
-    if not power > 0:
-        return 1.0, 1.0
-    n = len(errors)
-    spectrum = np.square(np.abs(np.fft.rfft(errors, 2 * n, axis=0))).sum(axis=1)
-    alike = np.fft.irfft(spectrum)[:n] / power
-    apart = int(np.argmax(alike < _UNLIKE)) or n
-    near = 1.0 + 2.0 * float(alike[1 : min(apart, n // 2)].sum())
-    per_pair = alike * n / (n - np.arange(n))
-    later = np.arange(apart, 2 * n // 3)
-    if not later.size or per_pair[later].max() < _REPEATING:
-        return near, 1.0
-    # as alike again two strides later; the first of such peaks is one stride
-    back = later[per_pair[later] > _AS_ALIKE * per_pair[later].max()]
-    peak = back[back < back[0] + apart]
-    period = int(peak[np.argmax(per_pair[peak])])
-    return near, 1.0 + 2.0 * float(np.maximum(alike[period::period], 0.0).sum())

@@ -2,7 +2,7 @@
 
 Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
 published size. Nothing is estimated: deviations follow from the information of each trial at the literature's
-parameters (`predicted.Information`), and those of several trials add up.
+parameters (`predicted.Information`), and those of several trials add up, but for errors that come back (`repetition`).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from kinertia.disturbed import Faults, measured
 from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import evidence
 from kinertia.kinematics import Kinematics
+from kinertia.map_terms import MapProblem
 from kinertia.observation import CUTOFF_HZ, observe
 from kinertia.predicted import Information
 from kinertia.simultaneous_fit import calibration_prior
@@ -85,8 +86,9 @@ def plan_measured(
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
     used = used.carrying(freedom.held)
     with threadpool_limits(1):
-        seen = [observe(used, k, prior.mass_kg + freedom.held_kg, cutoff)[0] for k in trials]
-        told = Information.at(used, prior, calibration_prior(used, freedom), seen, 1.0 / (2.0 * cutoff))
+        seen = observe(used, trials, prior.mass_kg + freedom.held_kg, cutoff)
+        problem = MapProblem(used, prior, calibration_prior(used, freedom), seen.alone, 1.0 / (2.0 * cutoff))
+        told = Information(problem, seen.repeats)
         names = [k.trial.name for k in trials]
         sets: list[tuple[int, ...]] = [(k,) for k in range(len(trials))]
         sets += [
@@ -102,12 +104,10 @@ def plan_synthetic() -> Plan:
     subject = walking_subject()
     prior = literature_prior(subject.literature)
     person = replace(subject, bsp=prior.mean)
-    trials = []
-    for name, made in MOTIONS.items():
-        trial = made(person)
-        _, kinematics = measured(trial, Faults("artefact"), np.random.default_rng(_SEED))
-        trials.append(replace(kinematics, trial=replace(kinematics.trial, name=name)))
-    return plan_measured(trial.skeleton, prior, trials, "gcv")
+    motions = [made(person) for made in MOTIONS.values()]
+    skeleton, trials = measured(motions, Faults("artefact"), np.random.default_rng(_SEED))
+    named = [replace(k, trial=replace(k.trial, name=name)) for name, k in zip(MOTIONS, trials, strict=True)]
+    return plan_measured(skeleton, prior, named, "gcv")
 
 
 def _gain(told: Information, prior: BspPrior, chosen: tuple[int, ...]) -> float:

@@ -7,19 +7,17 @@ is the Cramér-Rao bound of the estimator's own noise model, prior included.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from kinertia.bsp import block_diagonal
-from kinertia.bsp_prior import BspPrior
 from kinertia.log_cholesky import table_jacobian
-from kinertia.map_terms import CalibrationPrior, MapProblem, Observation
+from kinertia.map_terms import MapProblem
 from kinertia.normal_equations import reduced
 from kinertia.simultaneous import root_of_covariance
-from kinertia.skeleton import Skeleton
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,22 +25,12 @@ class Information:
     """What each of several trials of a person tells of parameters and calibration, and what the prior tells.
 
     Attributes:
-        problem: at whose start it is taken: the observations' coordinates, the prior's mean.
+        problem: at whose start it is taken: the observations' coordinates, the prior's mean. Observations are alone.
+        repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
     """
 
     problem: MapProblem
-
-    @classmethod
-    def at(
-        cls,
-        skeleton: Skeleton,
-        prior: BspPrior,
-        calibration: CalibrationPrior,
-        trials: Sequence[Observation],
-        spacing_s: float,
-    ) -> Information:
-        """The information at the prior's mean; the arguments are those of `estimate_simultaneous`."""
-        return cls(MapProblem(skeleton, prior, calibration, trials, spacing_s))
+    repeats: np.ndarray
 
     @cached_property
     def of_trials(self) -> tuple[np.ndarray, ...]:
@@ -58,7 +46,9 @@ class Information:
 
     def root(self, trials: Iterable[int]) -> np.ndarray:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
-        information = self.of_prior + sum(self.of_trials[k] for k in trials)
+        chosen = list(trials)
+        counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
+        information = self.of_prior + sum(self.of_trials[k] / n for k, n in zip(chosen, counts, strict=True))
         theta = self.problem.layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
         return chain @ root_of_covariance(information)[theta]

@@ -33,7 +33,7 @@ CONDITIONS = {
         for count in STRIDES
         if count * STRIDE_S != Scenario("", Faults("artefact")).walk_s
     },
-    WITH_SQUATS: Scenario("skin motion, two strides and two squats", Faults("artefact"), squats=True),
+    WITH_SQUATS: Scenario("skin motion, two strides and two squats", Faults("artefact"), others=("squat",)),
 }
 """Two strides (2.5 s) where not said otherwise."""
 SHOWN = PARAMETERS[:7]

@@ -101,22 +101,23 @@ def fit_simultaneous(
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
     used = used.carrying(freedom.held)
-    seen = [observe(used, k, prior.mass_kg + freedom.held_kg, cutoff) for k in trials]
+    seen = observe(used, trials, prior.mass_kg + freedom.held_kg, cutoff)
+    together = seen.together
     calibration = calibration_prior(used, freedom)
-    result = estimate_simultaneous(used, prior, calibration, [o for o, _ in seen], 1.0 / (2.0 * cutoff))
+    result = estimate_simultaneous(used, prior, calibration, together, 1.0 / (2.0 * cutoff))
     found = result.skeleton.carrying(None)
-    motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, (o, _) in zip(result.motions, seen, strict=True))
-    loads = tuple(every[o.dynamic] for every, (o, _) in zip(result.foot_loads, seen, strict=True))
+    motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
+    loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (freedom.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
         _calibration(used, freedom, result),
-        tuple(noise for _, noise in seen),
+        seen.noise,
         result.iterations,
         base_parameters(
-            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o, _ in seen]
+            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in together]
         ),
     )
     return SimultaneousFit(

@@ -18,7 +18,7 @@ from kinertia.io.c3d_write import write_c3d
 from kinertia.io.folder import complete_folder
 from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
-from kinertia.noise import camera_noise, plate_noise, soft_tissue_artefact, study_noise
+from kinertia.noise import SkinMotion, camera_noise, plate_noise, study_noise
 from kinertia.synthetic import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial, centre_of_pressure
 from kinertia.trial import FEET, LOAD_THRESHOLD_N, Markers, PlateLoads, Recording, runs
 
@@ -31,7 +31,7 @@ class LabNoise:
     """What goes wrong in measuring; the defaults are those of a careful laboratory.
 
     Attributes:
-        skin: "artefact": moves with the joints, published magnitudes (`noise.soft_tissue_artefact`); "study": the
+        skin: "artefact": moves with the joints, published magnitudes (`noise.SkinMotion`); "study": the
             study's sinusoids (`noise.study_noise`); "none".
         camera_sd_m: white noise of every marker coordinate, m.
         force_sd_n: white noise of every force component, N.
@@ -82,7 +82,8 @@ def record(
     exact = Markers(trial.time[seen], trial.markers.labels, trial.markers.positions[seen])
     moved = exact
     if noise.skin == "artefact":
-        moved = soft_tissue_artefact(exact, trial.skeleton, trial.motion.q[seen], rng)
+        q = trial.motion.q[seen]
+        moved = SkinMotion.draw(trial.skeleton, q, rng).moved(exact, trial.skeleton, q)
     elif noise.skin == "study":
         moved = study_noise(exact, rng)
     plates = plate_noise(_plates(trial, samples), noise.force_sd_n, noise.force_offset_sd_n, noise.moment_sd_nm, rng)
