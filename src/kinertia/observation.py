@@ -11,7 +11,7 @@ part of the noise; the deviation makes up for its degrees of freedom only on ave
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -81,16 +81,38 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cu
         mass_kg: for the size of force errors.
         cutoff_hz: bandwidth of the forces.
     """
-    found = [_observed(skeleton, each, mass_kg, cutoff_hz) for each in trials]
+    errors = [_errors(skeleton, each) for each in trials]
+    # what a marker is off its place in the segment all the time, in all trials, is calibration, not noise
+    everywhere = np.concatenate([each.local for each in errors])
+    shown = np.isfinite(everywhere).any(axis=0)
+    always = np.nanmean(np.where(shown, everywhere, 0.0), axis=0)
+    found = [
+        _observed(skeleton, k, replace(each, local=each.local - always), mass_kg, cutoff_hz)
+        for k, each in zip(trials, errors, strict=True)
+    ]
     rates = [each.trial.markers.rate_hz for each in trials]
     counts = repeats([errors.reshape(len(errors), -1) for _, _, errors in found], rates)
     return Observations(tuple(o for o, _, _ in found), tuple(noise for _, noise, _ in found), counts)
 
 
-def _observed(
-    skeleton: Skeleton, kinematics: Kinematics, mass_kg: float, cutoff_hz: float
-) -> tuple[Observation, MarkerNoise, np.ndarray]:
-    """One trial on its own, and the errors (n, m, 3) of its markers in their segments, zero where they are not seen."""
+@dataclass(frozen=True, eq=False)
+class _Errors:
+    """What inverse kinematics leaves of one trial.
+
+    Attributes:
+        time: (n,) s, uniform: the window and its surroundings.
+        q: (n, c) coordinates; bridged where the root was not seen.
+        measured: (n, m, 3) markers, m; NaN where not seen.
+        local: (n, m, 3) measured minus model, in the axes of each marker's segment.
+    """
+
+    time: np.ndarray
+    q: np.ndarray
+    measured: np.ndarray
+    local: np.ndarray
+
+
+def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     time = kinematics.trial.markers.time
     start, end = kinematics.window_s
     near = (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
@@ -105,11 +127,15 @@ def _observed(
     known = np.where(np.isfinite(q), q, bridged)
     pose = skeleton.pose(known)
     errors = measured - skeleton.marker_positions(pose)
-    # what a marker is off its place in the segment all the time is calibration, not noise
     turned = pose.rotation[:, skeleton.marker_segments].transpose(0, 1, 3, 2)
-    local = (turned @ errors[..., None])[..., 0]
-    shown = np.isfinite(local).any(axis=0)
-    local -= np.nanmean(np.where(shown, local, 0.0), axis=0)
+    return _Errors(time[frames], q, measured, (turned @ errors[..., None])[..., 0])
+
+
+def _observed(
+    skeleton: Skeleton, kinematics: Kinematics, errors: _Errors, mass_kg: float, cutoff_hz: float
+) -> tuple[Observation, MarkerNoise, np.ndarray]:
+    """One trial on its own, and the errors (n, m, 3) of its markers in their segments, zero where they are not seen."""
+    (start, end), time, local = kinematics.window_s, errors.time, errors.local
     noise, effective, autocorrelation = _noise(
         skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
     )
@@ -118,13 +144,13 @@ def _observed(
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     return (
         Observation(
-            time=time[frames],
-            markers=measured,
+            time=time,
+            markers=errors.measured,
             marker_sd=effective,
             marker_autocorrelation=autocorrelation,
-            q=q,
-            dynamic=(time[frames] >= start - 1e-9) & (time[frames] <= end + 1e-9),
-            ground=_ground(kinematics, time[frames], cutoff_hz),
+            q=errors.q,
+            dynamic=(time >= start - 1e-9) & (time <= end + 1e-9),
+            ground=_ground(kinematics, time, cutoff_hz),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
