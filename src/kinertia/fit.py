@@ -264,7 +264,8 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
     estimates = [
         (joined([next(motions) for _ in parts]), k.foot_loads) for k, parts in zip(ready.kinematics, cut, strict=True)
     ]
-    trials = _trial_fits(ready, ready.skeleton, result.bsp, estimates, [None] * len(estimates), started)
+    skeletons, unknown = [ready.skeleton] * len(estimates), [None] * len(estimates)
+    trials = _trial_fits(ready, skeletons, result.bsp, estimates, unknown, started)
     warnings = two_level_warnings(result)
     return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
 
@@ -279,24 +280,25 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
     fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz, ready.freedom)
     bsp, skeleton = fitted.bsp, fitted.skeleton
     estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
-    trials = _trial_fits(ready, skeleton, bsp, estimates, fitted.result.moment_sd, started)
+    trials = _trial_fits(ready, fitted.skeletons, bsp, estimates, fitted.result.moment_sd, started)
     return _Outcome(skeleton, bsp, trials, fitted.result.converged, fitted.posterior, fitted.warnings)
 
 
 def _trial_fits(
     ready: Prepared,
-    skeleton: Skeleton,
+    skeletons: Sequence[Skeleton],
     bsp: BodySegmentParameters,
     estimates: Sequence[tuple[Motion, np.ndarray]],
     moment_sds: Sequence[np.ndarray | None],
     started: float,
 ) -> tuple[TrialFit, ...]:
-    """Every trial before and after; `estimates` holds its motion and its foot loads (w, 2, 6) as estimated."""
+    """Every trial before and after; `skeletons` have the markers where they are in it, `estimates` its motion and its
+    foot loads (w, 2, 6) as estimated."""
     spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
     before, literature = ready.skeleton, ready.literature
     trials = []
-    rows = zip(ready.kinematics, ready.seconds, estimates, moment_sds, strict=True)
-    for k, seconds, (motion, loads), moment_sd in rows:
+    rows = zip(ready.kinematics, ready.seconds, skeletons, estimates, moment_sds, strict=True)
+    for k, seconds, skeleton, (motion, loads), moment_sd in rows:
         window = _window(k)
         corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
         residuals = {

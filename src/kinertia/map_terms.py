@@ -45,6 +45,7 @@ class Observation:
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
         force_sd, moment_sd: effective deviations of the root residual, N and N m.
+        displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
         repeats: by how much errors that come back have raised all variances (`repeated`).
     """
 
@@ -57,6 +58,7 @@ class Observation:
     ground: FootPlates
     force_sd: float
     moment_sd: float
+    displacement_sd_m: np.ndarray | float = 0.0
     repeats: float = 1.0
 
     def repeated(self, times: float) -> Observation:
@@ -125,11 +127,27 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
-    squares of everything.
+class Point:
+    """Values of all unknowns.
+
+    Attributes:
+        coefficients: per trial those of its motion.
+        static: (S,) what does not move.
+        displaced: per trial (3 m,) displacements of its markers (`displacement`), in prior deviations.
     """
 
+    coefficients: tuple[np.ndarray, ...]
+    static: np.ndarray
+    displaced: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
+    squares of everything. Each trial's are those of the static unknowns as they are in it.
+    """
+
+    point: Point
     normals: tuple[NormalEquations, ...]
     information: np.ndarray
     right: np.ndarray
@@ -159,6 +177,8 @@ class MapProblem:
         self.carriers = [trial.ground.columns(self.plates) for trial in trials]
         self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
         self.above = ancestor_of(self.free)
+        count = len(skeleton.markers)
+        self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
         self.start_static = np.zeros(self.layout.size)
         self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
@@ -170,6 +190,11 @@ class MapProblem:
         deviation[self.layout.plates] = [calibration.plate_sd[name] for name in PLATE_UNKNOWNS] * len(self.plates)
         deviation[self.layout.clock] = calibration.clock_sd_s
         self.weight = 1.0 / np.square(deviation)
+
+    @property
+    def beginning(self) -> Point:
+        """Where the estimate starts: the observations' coordinates, the prior's mean, no displacements."""
+        return Point(tuple(self.start), self.start_static, tuple(np.zeros_like(sd) for sd in self.displacement_sd_m))
 
     def bsp(self, static: np.ndarray) -> BodySegmentParameters:
         """Body segment parameters of the static unknowns."""
@@ -214,11 +239,22 @@ class MapProblem:
         right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
         return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
 
-    def at(self, coefficients: Sequence[np.ndarray], static: np.ndarray) -> Linearised:
+    def at(self, point: Point) -> Linearised:
         """Cost and normal equations at a point."""
-        normals = tuple(self.normal(k, part, static) for k, part in enumerate(coefficients))
-        information, right, cost = self.prior_terms(static)
-        return Linearised(normals, information, right, cost + sum(normal.cost for normal in normals))
+        normals = tuple(self.normal(k, part, self.in_trial(k, point)) for k, part in enumerate(point.coefficients))
+        information, right, cost = self.prior_terms(point.static)
+        cost += sum(0.5 * float(own @ own) for own in point.displaced)
+        return Linearised(point, normals, information, right, cost + sum(normal.cost for normal in normals))
+
+    def in_trial(self, k: int, point: Point) -> np.ndarray:
+        """(S,) static unknowns as they are in trial k: its markers displaced."""
+        static = point.static.copy()
+        static[self.layout.locals] += self.displacements_m(point)[k].ravel()
+        return static
+
+    def displacements_m(self, point: Point) -> list[np.ndarray]:
+        """Per trial (m, 3) how far its markers are from their places in the segments."""
+        return [(sd * own).reshape(-1, 3) for sd, own in zip(self.displacement_sd_m, point.displaced, strict=True)]
 
     def root_sd(self, trial: Observation) -> np.ndarray:
         """(6,) deviations of the root residual: N, N m."""

@@ -82,17 +82,31 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cu
         cutoff_hz: bandwidth of the forces.
     """
     errors = [_errors(skeleton, each) for each in trials]
-    # what a marker is off its place in the segment all the time, in all trials, is calibration, not noise
-    everywhere = np.concatenate([each.local for each in errors])
-    shown = np.isfinite(everywhere).any(axis=0)
-    always = np.nanmean(np.where(shown, everywhere, 0.0), axis=0)
-    found = [
-        _observed(skeleton, k, replace(each, local=each.local - always), mass_kg, cutoff_hz)
-        for k, each in zip(trials, errors, strict=True)
-    ]
-    rates = [each.trial.markers.rate_hz for each in trials]
-    counts = repeats([errors.reshape(len(errors), -1) for _, _, errors in found], rates)
-    return Observations(tuple(o for o, _, _ in found), tuple(noise for _, noise, _ in found), counts)
+    found = [_observed(skeleton, k, each, mass_kg, cutoff_hz) for k, each in zip(trials, errors, strict=True)]
+    displaced = _displacement_sd(skeleton, np.stack([each.displaced for each in errors]))
+    varying = [np.nan_to_num(each.varying).reshape(len(each.time), -1) for each in errors]
+    counts = repeats(varying, [each.trial.markers.rate_hz for each in trials])
+    return Observations(
+        tuple(replace(o, displacement_sd_m=displaced) for o, _ in found), tuple(noise for _, noise in found), counts
+    )
+
+
+def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
+    """(m,) deviation over trials of where markers are in their segments (t, m, 3), segment by segment; NaN where a
+    trial does not show them. Zero for a single trial.
+    """
+    seen = np.isfinite(displaced)
+    count = seen.sum(axis=0)
+    middle = np.where(seen, displaced, 0.0).sum(axis=0) / np.maximum(count, 1)
+    apart = np.where(seen, displaced - middle, 0.0)
+    alike = _alike(skeleton, apart)
+    result = np.zeros(len(alike))
+    for segment in np.unique(skeleton.marker_segments):
+        own = skeleton.marker_segments == segment
+        freedom = np.maximum(count[own] - 1, 0).sum()
+        if freedom:
+            result[own] = np.sqrt(alike[own] * np.square(apart[:, own]).sum() / freedom)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +117,15 @@ class _Errors:
         time: (n,) s, uniform: the window and its surroundings.
         q: (n, c) coordinates; bridged where the root was not seen.
         measured: (n, m, 3) markers, m; NaN where not seen.
-        local: (n, m, 3) measured minus model, in the axes of each marker's segment.
+        displaced: (m, 3) mean of measured minus model, in the axes of each marker's segment.
+        varying: (n, m, 3) the rest.
     """
 
     time: np.ndarray
     q: np.ndarray
     measured: np.ndarray
-    local: np.ndarray
+    displaced: np.ndarray
+    varying: np.ndarray
 
 
 def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
@@ -128,16 +144,20 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     pose = skeleton.pose(known)
     errors = measured - skeleton.marker_positions(pose)
     turned = pose.rotation[:, skeleton.marker_segments].transpose(0, 1, 3, 2)
-    return _Errors(time[frames], q, measured, (turned @ errors[..., None])[..., 0])
+    local = (turned @ errors[..., None])[..., 0]
+    # what a marker is off its place in the segment all the time is calibration, not noise
+    shown = np.isfinite(local).any(axis=0)
+    displaced = np.where(shown, np.nanmean(np.where(shown, local, 0.0), axis=0), np.nan)
+    return _Errors(time[frames], q, measured, displaced, local - displaced)
 
 
 def _observed(
     skeleton: Skeleton, kinematics: Kinematics, errors: _Errors, mass_kg: float, cutoff_hz: float
-) -> tuple[Observation, MarkerNoise, np.ndarray]:
-    """One trial on its own, and the errors (n, m, 3) of its markers in their segments, zero where they are not seen."""
-    (start, end), time, local = kinematics.window_s, errors.time, errors.local
+) -> tuple[Observation, MarkerNoise]:
+    """One trial on its own."""
+    (start, end), time = kinematics.window_s, errors.time
     noise, effective, autocorrelation = _noise(
-        skeleton, local, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
+        skeleton, errors.varying, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
     )
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
@@ -155,7 +175,6 @@ def _observed(
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
         noise,
-        np.where(np.isfinite(local), local, 0.0),
     )
 
 

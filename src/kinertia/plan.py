@@ -85,17 +85,23 @@ def plan_measured(
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
     used = used.carrying(freedom.held)
+
+    def told(chosen: Sequence[int]) -> Information:
+        seen = observe(used, [trials[k] for k in chosen], prior.mass_kg + freedom.held_kg, cutoff)
+        calibration = calibration_prior(used, freedom)
+        return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
+
+    everything = range(len(trials))
     with threadpool_limits(1):
-        seen = observe(used, trials, prior.mass_kg + freedom.held_kg, cutoff)
-        problem = MapProblem(used, prior, calibration_prior(used, freedom), seen.alone, 1.0 / (2.0 * cutoff))
-        told = Information(problem, seen.repeats)
-        names = [k.trial.name for k in trials]
-        sets: list[tuple[int, ...]] = [(k,) for k in range(len(trials))]
-        sets += [
-            max(combinations(range(len(trials)), size), key=lambda chosen: _gain(told, prior, chosen))
-            for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
-        ]
-        found = {tuple(names[k] for k in chosen): told.sd(chosen) for chosen in sets}
+        sets: list[tuple[int, ...]] = [(k,) for k in everything]
+        if len(trials) > 1:
+            whole = told(everything)
+            sets += [
+                max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
+                for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
+            ]
+        # how large errors are depends on what they are compared with: each set anew, as a fit of it would have them
+        found = {tuple(trials[k].trial.name for k in chosen): told(chosen).sd(range(len(chosen))) for chosen in sets}
     return Plan(prior.mean.segments, prior.sd, found)
 
 

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from kinertia.bsp import block_diagonal
+from kinertia.displacement import Displaced
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import MapProblem
 from kinertia.normal_equations import reduced
@@ -48,8 +49,15 @@ class Information:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
         chosen = list(trials)
         counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
-        information = self.of_prior + sum(self.of_trials[k] / n for k, n in zip(chosen, counts, strict=True))
-        theta = self.problem.layout.theta
+        layout, information = self.problem.layout, self.of_prior
+        for k, count in zip(chosen, counts, strict=True):
+            sd = self.problem.displacement_sd_m[k]
+            told = self.of_trials[k] / count
+            information = (
+                information
+                + Displaced.of(told, np.zeros(layout.size), layout.locals, sd, np.zeros_like(sd)).information
+            )
+        theta = layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
         return chain @ root_of_covariance(information)[theta]
 

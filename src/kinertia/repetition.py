@@ -19,8 +19,10 @@ _UNLIKE, _REPEATING = 0.05, 0.3
 """Correlations below which errors count as unlike, and above which they count as coming back."""
 _AS_ALIKE = 0.9
 """Share of the largest correlation that marks the lags at which errors come back first."""
-_SHORTEST = 1.0 / 3.0
-"""Share of the shorter of two trials that must overlap: less would be alike by chance."""
+_SHORTEST_OWN, _SHORTEST_OTHER = 1.0 / 3.0, 1.0 / 2.0
+"""Share of a trial that must overlap with itself, and of the shorter of two with the other: less would be alike by
+chance, or because two trials cut from one have frames in common.
+"""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Repetition:
         apart = int(np.argmax(alike < _UNLIKE)) or n
         frames = 1.0 + 2.0 * float(alike[1 : min(apart, n // 2)].sum())
         later = np.arange(apart, n)
-        later = later[overlap[later] >= _SHORTEST * n]
+        later = later[overlap[later] >= _SHORTEST_OWN * n]
         peak = _first_peak(alike[later] * n / overlap[later], apart)
         if peak is None:
             return cls(frames, None, 1.0)
@@ -82,7 +84,7 @@ def _in_other(errors: np.ndarray, other: np.ndarray, period: int | None) -> floa
     if not alike.any():
         return 0.0
     shortest = min(len(errors), len(other))
-    lags = np.flatnonzero(overlap >= _SHORTEST * shortest)
+    lags = np.flatnonzero(overlap >= _SHORTEST_OTHER * shortest)
     peak = _first_peak(alike[lags] * len(errors) / overlap[lags], period or shortest)
     if peak is None:
         return 0.0

@@ -2,7 +2,8 @@
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
-segments, what is wrong with each plate (`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is
+segments, how far they are from these in each of several trials (`displacement`), what is wrong with each plate
+(`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is
 the sum of squares, each over its deviation, of: marker errors, root residuals, and departures from the priors.
 Gauss-Newton with Levenberg damping, all derivatives analytic. The normal matrix is block tridiagonal in time with a
 border of static unknowns (`block_band`); its Schur complement is the information on them, and its inverse their
@@ -18,11 +19,12 @@ import numpy as np
 
 from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
+from kinertia.displacement import Displaced, information_in_trial
 from kinertia.dynamics import Motion
 from kinertia.log_cholesky import table_jacobian
-from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation
+from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation, Point
 from kinertia.moment_sd import joint_moment_sd
-from kinertia.normal_equations import reduced
+from kinertia.normal_equations import Reduced, reduced
 from kinertia.skeleton import Skeleton
 
 
@@ -39,6 +41,7 @@ class SimultaneousResult:
         clock_s: the time offset and its posterior deviation, s.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
+        displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
         moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
@@ -53,6 +56,7 @@ class SimultaneousResult:
     clock_s: tuple[float, float]
     foot_loads: tuple[np.ndarray, ...]
     motions: tuple[Motion, ...]
+    displacements_m: tuple[np.ndarray, ...]
     moment_sd: tuple[np.ndarray, ...]
     converged: bool
     iterations: int
@@ -78,31 +82,45 @@ def estimate_simultaneous(
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
-    coefficients = [start.copy() for start in problem.start]
-    values = problem.start_static.copy()
-    here = problem.at(coefficients, values)
+    here = problem.at(problem.beginning)
     begin, damping, iterations, converged = here.cost, _FIRST_DAMPING, 0, False
-    scale = np.zeros(len(values))
+    scale = np.zeros(problem.layout.size)
     while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
         iterations += 1
         scale = np.maximum(scale, np.diag(here.information) + sum(np.diag(normal.static) for normal in here.normals))
-        step, moves, promised, moved_sd = _step(here, damping, scale)
-        new_values = values + problem.shortened(step)
-        new_coefficients = [old + move for old, move in zip(coefficients, moves, strict=True)]
-        there = problem.at(new_coefficients, new_values)
+        there, promised, moved_sd = _step(problem, here, damping, scale)
         kept = (here.cost - there.cost) / promised
         converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
         if kept > 0.0:
-            values, coefficients, here = new_values, new_coefficients, there
+            here = there
         damping = max(damping * _change_of_damping(kept), 1e-9)
-    parts = [reduced(normal, 0.0) for normal in here.normals]
-    root = root_of_covariance(here.information + sum(part.information for part in parts))
-    moment_sd = tuple(
-        joint_moment_sd(problem, k, motion, values, part, root)
-        for k, (motion, part) in enumerate(zip(coefficients, parts, strict=True))
-    )
-    covariance = root @ root.T
-    return _result(problem, coefficients, values, covariance, moment_sd, converged, iterations, (begin, here.cost))
+    covariance, moment_sd = _deviations(problem, here)
+    return _result(problem, here.point, covariance, moment_sd, converged, iterations, (begin, here.cost))
+
+
+def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """Posterior covariance (S, S) of the static unknowns, and deviations of the joint moments of every trial."""
+    parts, displaced = _eliminated(problem, here, 0.0)
+    told = [each.information for each in displaced]
+    root = root_of_covariance(here.information + sum(told))
+    moment_sd = []
+    for k, (motion, part) in enumerate(zip(here.point.coefficients, parts, strict=True)):
+        in_trial, sd = root, problem.displacement_sd_m[k]
+        if sd.any():
+            elsewhere = here.information + sum(told[:k] + told[k + 1 :])
+            known = information_in_trial(part.information, elsewhere, problem.layout.locals, sd)
+            in_trial = root_of_covariance(known)
+        static = problem.in_trial(k, here.point)
+        moment_sd.append(joint_moment_sd(problem, k, motion, static, part, in_trial))
+    return root @ root.T, tuple(moment_sd)
+
+
+def _eliminated(problem: MapProblem, here: Linearised, damping: float) -> tuple[list[Reduced], list[Displaced]]:
+    """Normal equations of all trials without motion, and without motion and displacements."""
+    parts = [reduced(normal, damping) for normal in here.normals]
+    rows = zip(parts, problem.displacement_sd_m, here.point.displaced, strict=True)
+    places = problem.layout.locals
+    return parts, [Displaced.of(part.information, part.right, places, sd, own) for part, sd, own in rows]
 
 
 def _change_of_damping(kept: float) -> float:
@@ -122,39 +140,41 @@ def root_of_covariance(information: np.ndarray) -> np.ndarray:
     return scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
 
 
-def _step(here: Linearised, damping: float, scale: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], float, float]:
-    """Step of the static unknowns (S,) and of each trial's coefficients, by how much it would lower the cost, and how
-    long the former is in deviations.
+def _step(problem: MapProblem, here: Linearised, damping: float, scale: np.ndarray) -> tuple[Linearised, float, float]:
+    """Where a step leads, by how much it promises to lower the cost, and how far body and calibration move, in
+    deviations of all of them together.
     """
-    information, right = here.information.copy(), here.right.copy()
-    parts = [reduced(normal, damping) for normal in here.normals]
-    for part in parts:
-        information += part.information
-        right += part.right
+    parts, displaced = _eliminated(problem, here, damping)
+    information = here.information + sum(each.information for each in displaced)
+    right = here.right + sum(each.right for each in displaced)
     information[np.diag_indices_from(information)] += damping * scale
     step = np.linalg.solve(information, right)
     moved_sd = float(np.sqrt(step @ information @ step))
-    moves = []
+    coefficients, moved = [], []
     promised = 0.5 * float(here.right @ step)
-    for part, normal in zip(parts, here.normals, strict=True):
+    for k, (part, normal) in enumerate(zip(parts, here.normals, strict=True)):
         size, c = normal.right.shape
-        move = part.band.backward(part.motion - part.border @ step[:, None]).reshape(-1, c)[:size]
-        moves.append(move)
-        promised += 0.5 * float(normal.static_right @ step + (normal.right * move).sum())
-    return step, moves, promised, moved_sd
+        old, own = here.point.displaced[k], displaced[k].step(step)
+        in_trial = step.copy()
+        in_trial[problem.layout.locals] += problem.displacement_sd_m[k] * own
+        move = part.band.backward(part.motion - part.border @ in_trial[:, None]).reshape(-1, c)[:size]
+        coefficients.append(here.point.coefficients[k] + move)
+        moved.append(old + own)
+        promised += 0.5 * float(normal.static_right @ in_trial + (normal.right * move).sum() - old @ own)
+    point = Point(tuple(coefficients), here.point.static + problem.shortened(step), tuple(moved))
+    return problem.at(point), promised, moved_sd
 
 
 def _result(
     problem: MapProblem,
-    coefficients: Sequence[np.ndarray],
-    values: np.ndarray,
+    point: Point,
     covariance: np.ndarray,
     moment_sd: tuple[np.ndarray, ...],
     converged: bool,
     iterations: int,
     cost: tuple[float, float],
 ) -> SimultaneousResult:
-    layout = problem.layout
+    layout, values = problem.layout, point.static
     bsp = problem.bsp(values)
     chain = block_diagonal(table_jacobian(values[layout.theta]))
     sd = np.sqrt(np.diag(covariance))
@@ -174,7 +194,11 @@ def _result(
         dict(zip(problem.plates, plates, strict=True)),
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
-        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, coefficients, strict=True)),
+        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
+        tuple(
+            sd.reshape(-1, 3) * own.reshape(-1, 3)
+            for sd, own in zip(problem.displacement_sd_m, point.displaced, strict=True)
+        ),
         moment_sd,
         converged,
         iterations,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,7 @@ class SimultaneousFit:
         result: of the estimator.
         bsp: all segments, those that are held included.
         skeleton: with the estimated marker positions and static coordinates.
+        skeletons: the same per trial, with the markers where they are in it.
         posterior: deviations and calibration.
         motions: per trial, at the frames of its measured window.
         foot_loads: per trial (w, 2, 6) at the corrected place and time.
@@ -75,6 +76,7 @@ class SimultaneousFit:
     result: SimultaneousResult
     bsp: BodySegmentParameters
     skeleton: Skeleton
+    skeletons: tuple[Skeleton, ...]
     posterior: Posterior
     motions: tuple[Motion, ...]
     foot_loads: tuple[np.ndarray, ...]
@@ -106,6 +108,8 @@ def fit_simultaneous(
     calibration = calibration_prior(used, freedom)
     result = estimate_simultaneous(used, prior, calibration, together, 1.0 / (2.0 * cutoff))
     found = result.skeleton.carrying(None)
+    if freedom.marker_sd_m is None:
+        found = found.with_markers(used.markers)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (freedom.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
@@ -123,12 +127,19 @@ def fit_simultaneous(
     return SimultaneousFit(
         result,
         freedom.whole(result.bsp),
-        found.with_markers(used.markers) if freedom.marker_sd_m is None else found,
+        found,
+        tuple(_displaced(found, moved) for moved in result.displacements_m),
         posterior,
         motions,
         loads,
         tuple(_warnings(prior, freedom, result, posterior, trials)),
     )
+
+
+def _displaced(skeleton: Skeleton, moved_m: np.ndarray) -> Skeleton:
+    """The skeleton with its markers moved (m, 3) in their segments."""
+    rows = zip(skeleton.markers, skeleton.marker_locals + moved_m, strict=True)
+    return skeleton.with_markers([replace(marker, position=place) for marker, place in rows])
 
 
 def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
