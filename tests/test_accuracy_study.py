@@ -17,7 +17,7 @@ from kinertia.accuracy_study import (
     summarised,
 )
 from kinertia.bsp_prior import literature_prior
-from kinertia.disturbed import Faults, measured, tilted
+from kinertia.disturbed import CAMERA_SD_M, Faults, measured, tilted
 from kinertia.synthetic import walk, walking_subject
 
 
@@ -126,6 +126,16 @@ def test_faults_are_what_they_say(trial):
     }
     angles = [np.degrees(np.arccos(np.dot(one.direction, other.direction))) for one, other in pairs]
     assert angles == pytest.approx([5.0] * 8)
+
+
+def test_all_trials_of_a_person_have_the_same_skin_skeleton_and_instruments(trial):
+    twice = [trial, trial]
+    skeleton, (one, other) = measured(twice, Faults("artefact", calibration=True), np.random.default_rng(1))
+    assert skeleton is not trial.skeleton
+    apart = one.trial.markers.positions - other.trial.markers.positions
+    assert np.std(apart) == pytest.approx(np.sqrt(2.0) * CAMERA_SD_M, rel=0.02)
+    np.testing.assert_array_equal(one.trial.loads.force, other.trial.loads.force)
+    np.testing.assert_array_equal(one.trial.loads.moment, other.trial.loads.moment)
 
 
 def test_wobbling_mass_keeps_impulse_and_weight(trial):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.log_cholesky import nearest_consistent
-from kinertia.map_terms import MapProblem
+from kinertia.map_terms import MapProblem, Point
 from small_problem import curved_problem, point, residuals, small_problem
 from study_bound import dense_band
 
@@ -29,7 +29,7 @@ def here(problem):
 
 
 def cost(problem: MapProblem, coefficients: np.ndarray, static: np.ndarray) -> float:
-    return problem.at([coefficients], static).cost
+    return problem.at(Point((coefficients,), static, problem.beginning.displaced)).cost
 
 
 def sloped(function, size: float) -> float:
@@ -172,6 +172,23 @@ def test_trials_share_plates_by_name_and_the_clock():
             own = np.abs(static_terms[pair.layout.plates][4 * i : 4 * i + 4]).max(axis=1)
             assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
         assert static_terms[pair.layout.clock, pair.layout.clock] > 0
+
+
+def test_displacements_move_the_markers_of_their_trial_only(problem, here):
+    coefficients, static = here
+    trial = problem.trials[0]
+    sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
+    displaced = replace(trial, displacement_sd_m=sd)
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial], 0.1)
+    own = np.random.default_rng(0).normal(size=(len(sd), 3))
+    at = Point((coefficients, coefficients), static, (own.ravel(), np.zeros(own.size)))
+    moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - static[pair.layout.locals].reshape(-1, 3)
+    np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
+    np.testing.assert_array_equal(pair.in_trial(1, at), static)
+    together = pair.at(at)
+    assert together.normals[1].cost == pytest.approx(problem.normal(0, coefficients, static).cost)
+    expected = sum(normal.cost for normal in together.normals) + problem.prior_terms(static)[2]
+    assert together.cost == pytest.approx(expected + 0.5 * np.square(own).sum())
 
 
 def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):

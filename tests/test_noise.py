@@ -84,6 +84,17 @@ def test_artefact_is_linear_in_the_neighbouring_joint_angles(trial):
     assert np.ptp(local, axis=0).max() > 0.001
 
 
+def test_skin_moves_alike_in_every_trial(trial):
+    """What another motion's angles make of the same skin; nothing at the reference pose."""
+    skin = SkinMotion.draw(trial.skeleton, trial.motion.q, np.random.default_rng(3))
+    bent = skin.reference + np.outer([0.0, 1.0, 2.0], np.radians(20.0) * trial.skeleton.rotational)
+    exact = Markers(np.arange(3.0), trial.skeleton.labels, trial.skeleton.marker_positions(trial.skeleton.pose(bent)))
+    away = np.linalg.norm(skin.moved(exact, trial.skeleton, bent).positions - exact.positions, axis=2)
+    assert not away[0].any()
+    np.testing.assert_allclose(away[2], 2.0 * away[1])
+    assert away[1, trial.skeleton.labels.index("R.Thigh.Front")] > 0.001
+
+
 def test_camera_noise_is_white(still):
     error = camera_noise(still, 0.0005, np.random.default_rng(0)).positions
     assert error.std() == pytest.approx(0.0005, rel=0.01)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.noise import camera_noise, study_noise
+from kinertia.noise import SkinMotion, camera_noise, study_noise
 from kinertia.observation import (
     AROUND_WINDOW_S,
     FORCE_SD_OF_WEIGHT,
@@ -147,6 +147,32 @@ def test_markers_off_their_places_are_not_noise(trial):
     )
     (right, _), (wrong, _) = (alone(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
     np.testing.assert_allclose(wrong.marker_sd, right.marker_sd, rtol=1e-6)
+
+
+def test_trials_of_one_person(trial):
+    """The same walk twice, markers of the right thigh elsewhere in the second."""
+    rng = np.random.default_rng(0)
+    q = trial.motion.q
+    skin = SkinMotion.draw(trial.skeleton, q, rng)
+    walks = [camera_noise(skin.moved(trial.markers, trial.skeleton, q), 0.0005, rng) for _ in range(2)]
+    thigh = trial.skeleton.marker_segments == trial.skeleton.segments.index("thigh_r")
+    turned = trial.skeleton.pose(q).rotation[:, trial.skeleton.marker_segments[thigh]]
+    positions = walks[1].positions.copy()
+    positions[:, thigh] += (turned @ [0.0, 0.0, 0.015])[:, :]
+    kinematics = [kinematics_of(trial, each) for each in (walks[0], replace(walks[1], positions=positions))]
+    seen = observe(trial.skeleton, kinematics, MASS_KG, 10.0)
+    assert seen.repeats == pytest.approx(np.ones((2, 2)), abs=0.25)
+    assert [o.repeats for o in seen.together] == pytest.approx(seen.repeats.sum(axis=1))
+    for one, both in zip(seen.alone, seen.together, strict=True):
+        assert both.marker_sd == pytest.approx(np.sqrt(both.repeats) * one.marker_sd)
+        assert both.force_sd == pytest.approx(np.sqrt(both.repeats) * one.force_sd)
+        assert both.moment_sd == pytest.approx(np.sqrt(both.repeats) * one.moment_sd)
+        displaced = np.asarray(both.displacement_sd_m)
+        assert displaced[thigh].min() > 0.003
+        assert np.median(displaced[~thigh]) < 0.2 * displaced[thigh].min()
+    (single,) = observe(trial.skeleton, kinematics[:1], MASS_KG, 10.0).together
+    assert not np.any(single.displacement_sd_m)
+    assert single.repeats == 1.0
 
 
 def test_the_process_is_as_dense_at_zero_frequency_as_the_errors(trial):

@@ -115,6 +115,30 @@ def test_two_trials_tell_more_than_either(trial, prior, calibration):
         assert ratio.mean() < 0.99
 
 
+def test_markers_displaced_in_one_trial_are_found_and_hurt_nothing(trial, prior, calibration):
+    """Thigh markers 10 mm forward in the second of two trials: without displacements of its own, it bends the first."""
+    first, second = (observation(trial, noise_m=0.001, seed=seed) for seed in (1, 2))
+    thighs = np.isin(trial.skeleton.marker_segments, [trial.skeleton.segments.index(f"thigh_{s}") for s in "rl"])
+    moved_m = np.where(thighs[:, None], [0.01, 0.0, 0.0], 0.0)
+    turned = trial.skeleton.pose(trial.motion.q).rotation[:, trial.skeleton.marker_segments]
+    second = replace(second, markers=second.markers + (turned @ moved_m[..., None])[..., 0])
+
+    def estimate(sd_m):
+        trials = [replace(each, displacement_sd_m=np.where(thighs, sd_m, 0.0)) for each in (first, second)]
+        return estimate_simultaneous(trial.skeleton, prior, calibration, trials, SPACING_S)
+
+    free, stiff = estimate(0.01), estimate(0.0)
+    assert free.converged
+    apart = free.displacements_m[1] - free.displacements_m[0]
+    assert apart[thighs].mean(axis=0) == pytest.approx([0.01, 0.0, 0.0], abs=0.003)
+    assert not apart[~thighs].any()
+    assert not np.any(stiff.displacements_m)
+    assert free.cost[1] < 0.9 * stiff.cost[1]
+    hips = [i for i, name in enumerate(trial.skeleton.coordinates) if name.startswith("hip_flexion")]
+    off = [np.abs(result.motions[0].q - trial.motion.q)[:, hips].mean() for result in (free, stiff)]
+    assert off[0] < 0.5 * off[1]
+
+
 def test_halves_pooled_give_about_the_whole(person, prior, calibration):
     trial = walk(person, 1.6, 60.0, trapezoid=False)
     middle = len(trial.time) // 2

@@ -11,7 +11,7 @@ part of the noise; the deviation makes up for its degrees of freedom only on ave
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -45,11 +45,15 @@ class MarkerNoise:
         sd_m: per label, deviation of one coordinate in one frame, m.
         correlation_s: time over which errors are alike.
         wandering: labels whose deviation is more than three times the usual; they count accordingly less.
+        repeats: how often they come back in all trials together (`repetition`).
+        displacement_sd_m: per label, deviation of its displacement in this trial (`displacement`), m; 0 for one trial.
     """
 
     sd_m: Mapping[str, float]
     correlation_s: float
     wandering: tuple[str, ...]
+    repeats: float = 1.0
+    displacement_sd_m: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +90,12 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cu
     displaced = _displacement_sd(skeleton, np.stack([each.displaced for each in errors]))
     varying = [np.nan_to_num(each.varying).reshape(len(each.time), -1) for each in errors]
     counts = repeats(varying, [each.trial.markers.rate_hz for each in trials])
-    return Observations(
-        tuple(replace(o, displacement_sd_m=displaced) for o, _ in found), tuple(noise for _, noise in found), counts
-    )
+    by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))
+    noise = [
+        replace(one, repeats=float(count), displacement_sd_m={label: by_label[label] for label in one.sd_m})
+        for (_, one), count in zip(found, counts.sum(axis=1), strict=True)
+    ]
+    return Observations(tuple(replace(o, displacement_sd_m=displaced) for o, _ in found), tuple(noise), counts)
 
 
 def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:

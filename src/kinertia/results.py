@@ -118,10 +118,7 @@ def summary(fit: Fit) -> dict[str, Any]:
 def _posterior_summary(fit: Fit) -> dict[str, Any]:
     if fit.posterior is None:
         return {}
-    noise = {
-        trial.name: {"correlation_s": noise.correlation_s, "sd_m": dict(noise.sd_m), "wandering": list(noise.wandering)}
-        for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)
-    }
+    noise = {trial.name: asdict(noise) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
     return {
         "iterations": fit.posterior.iterations,
         "calibration": {name: dict(told) for name, told in fit.posterior.calibration.items()},
