@@ -51,12 +51,9 @@ class Information:
         counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
         layout, information = self.problem.layout, self.of_prior
         for k, count in zip(chosen, counts, strict=True):
-            sd = self.problem.displacement_sd_m[k]
-            told = self.of_trials[k] / count
-            information = (
-                information
-                + Displaced.of(told, np.zeros(layout.size), layout.locals, sd, np.zeros_like(sd)).information
-            )
+            sd, nothing = self.problem.displacement_sd_m[k], np.zeros(layout.size)
+            told = Displaced.of(self.of_trials[k] / count, nothing, layout.locals, sd, np.zeros_like(sd))
+            information = information + told.information
         theta = layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
         return chain @ root_of_covariance(information)[theta]
