@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.displacement import Displaced, information_in_trial
+from kinertia.displacement import Displaced, as_displaced
 
 PLACES = slice(4, 10)
 SIZE = 10
@@ -41,7 +41,7 @@ def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(told):
     information, right, elsewhere, sd, own = told
     whole, _, chain = together(information, right, elsewhere, sd, own)
     expected = chain @ np.linalg.inv(whole) @ chain.T
-    found = information_in_trial(information, elsewhere, PLACES, sd)
+    found = information + as_displaced(elsewhere, PLACES, sd)
     np.testing.assert_allclose(np.linalg.inv(found), expected, rtol=1e-9, atol=1e-12)
 
 

@@ -57,15 +57,8 @@ class Displaced:
         return self.rest + self.gain @ step
 
 
-def information_in_trial(information: np.ndarray, elsewhere: np.ndarray, places: slice, sd_m: np.ndarray) -> np.ndarray:
-    """(S, S) information on the static unknowns as they are in a trial.
-
-    Args:
-        information: of the trial itself.
-        elsewhere: of priors and all other trials, on those of the person.
-        places: of the marker positions among them.
-        sd_m: (k,) prior deviations of the trial's displacements.
+def as_displaced(information: np.ndarray, places: slice, sd_m: np.ndarray) -> np.ndarray:
+    """(S, S) what information on the static unknowns says of the same with the places displaced by unknown amounts: of
+    a trial about the person, or of everything else about a trial. The arguments are those of `Displaced.of`.
     """
-    covariance = np.linalg.inv(elsewhere)
-    covariance[places, places] += np.diag(np.square(sd_m))
-    return information + np.linalg.inv(covariance)
+    return Displaced.of(information, np.zeros(len(information)), places, sd_m, np.zeros_like(sd_m)).information

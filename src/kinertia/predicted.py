@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from kinertia.bsp import block_diagonal
-from kinertia.displacement import Displaced
+from kinertia.displacement import as_displaced
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import MapProblem
 from kinertia.normal_equations import reduced
@@ -51,9 +51,8 @@ class Information:
         counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
         layout, information = self.problem.layout, self.of_prior
         for k, count in zip(chosen, counts, strict=True):
-            sd, nothing = self.problem.displacement_sd_m[k], np.zeros(layout.size)
-            told = Displaced.of(self.of_trials[k] / count, nothing, layout.locals, sd, np.zeros_like(sd))
-            information = information + told.information
+            sd = self.problem.displacement_sd_m[k]
+            information = information + as_displaced(self.of_trials[k] / count, layout.locals, sd)
         theta = layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
         return chain @ root_of_covariance(information)[theta]

@@ -19,7 +19,7 @@ import numpy as np
 
 from kinertia.bsp import BodySegmentParameters, block_diagonal
 from kinertia.bsp_prior import BspPrior
-from kinertia.displacement import Displaced, information_in_trial
+from kinertia.displacement import Displaced, as_displaced
 from kinertia.dynamics import Motion
 from kinertia.log_cholesky import table_jacobian
 from kinertia.map_terms import CalibrationPrior, Linearised, MapProblem, Observation, Point
@@ -108,8 +108,7 @@ def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tupl
         in_trial, sd = root, problem.displacement_sd_m[k]
         if sd.any():
             elsewhere = here.information + sum(told[:k] + told[k + 1 :])
-            known = information_in_trial(part.information, elsewhere, problem.layout.locals, sd)
-            in_trial = root_of_covariance(known)
+            in_trial = root_of_covariance(part.information + as_displaced(elsewhere, problem.layout.locals, sd))
         static = problem.in_trial(k, here.point)
         moment_sd.append(joint_moment_sd(problem, k, motion, static, part, in_trial))
     return root @ root.T, tuple(moment_sd)
@@ -195,10 +194,7 @@ def _result(
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
-        tuple(
-            sd.reshape(-1, 3) * own.reshape(-1, 3)
-            for sd, own in zip(problem.displacement_sd_m, point.displaced, strict=True)
-        ),
+        tuple(problem.displacements_m(point)),
         moment_sd,
         converged,
         iterations,
