@@ -88,7 +88,7 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cu
     errors = [_errors(skeleton, each) for each in trials]
     found = [_observed(skeleton, k, each, mass_kg, cutoff_hz) for k, each in zip(trials, errors, strict=True)]
     displaced = _displacement_sd(skeleton, np.stack([each.displaced for each in errors]))
-    varying = [np.nan_to_num(each.varying).reshape(len(each.time), -1) for each in errors]
+    varying = [_columns(each.varying, o.marker_sd) for each, (o, _) in zip(errors, found, strict=True)]
     counts = repeats(varying, [each.trial.markers.rate_hz for each in trials])
     by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))
     noise = [
@@ -209,7 +209,7 @@ def _noise(
     per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
     lost = np.sqrt(per_frame / max(per_frame - unknowns, 1.0))
     sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
-    frames = Repetition.of(filled.reshape(len(errors), -1)).frames
+    frames = Repetition.of(_columns(errors, sd)).frames
     usual = float(np.median(sd))
     labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
     deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
@@ -221,6 +221,11 @@ def _noise(
     alike = max(1.0, frames / CORNER)
     spread = _alike(skeleton, filled) * frames / alike
     return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0)
+
+
+def _columns(errors: np.ndarray, sd_m: np.ndarray) -> np.ndarray:
+    """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
+    return np.nan_to_num(errors / sd_m[:, None]).reshape(len(errors), -1)
 
 
 def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
