@@ -28,6 +28,14 @@ def test_noise_that_comes_back_with_every_stride_says_nothing_new(stride, count)
     assert found.strides == pytest.approx(count, rel=0.1)
 
 
+def test_noise_of_the_cameras_hides_no_repeats(stride):
+    rng = np.random.default_rng(1)
+    noisy = [steps(stride, 3) + 0.5 * stride.std() * rng.normal(size=(3 * STRIDE, 30)) for _ in range(2)]
+    found = repeats(noisy, [100.0, 100.0])
+    assert found == pytest.approx(np.full((2, 2), 3.0), rel=0.12)
+    assert Repetition.of(noisy[0]).slow == pytest.approx(0.8, abs=0.08)
+
+
 def test_white_noise_is_alike_over_one_frame_and_never_comes_back():
     found = Repetition.of(np.random.default_rng(0).normal(size=(480, 30)))
     assert (found.frames, found.strides) == pytest.approx((1.0, 1.0), abs=0.1)
@@ -35,7 +43,7 @@ def test_white_noise_is_alike_over_one_frame_and_never_comes_back():
 
 
 def test_nothing_to_see():
-    assert Repetition.of(np.zeros((20, 3))) == Repetition(1.0, None, 1.0)
+    assert Repetition.of(np.zeros((20, 3))) == Repetition(1.0, None, 1.0, 0.0)
     assert repeats([np.zeros((20, 3)), np.ones((20, 3))], [100.0, 100.0]) == pytest.approx(np.eye(2))
 
 

@@ -5,7 +5,8 @@ average out. Neither do those of a rigid model, which go with the same strides. 
 counts once: the deviations of markers and forces are raised by the root of the number of repeats.
 
 Whether errors come back is read from their correlation, summed over all marker coordinates; a repeat counts as much as
-it is alike. A gait's errors are those of another only at the same phase, so the best lag is looked for.
+it is alike. A gait's errors are those of another only at the same phase, so the best lag is looked for. The cameras'
+noise never comes back, but averages out in a few frames: repeats are over what one frame shares with the next.
 """
 
 from __future__ import annotations
@@ -33,11 +34,13 @@ class Repetition:
         frames: over how many neighbouring frames they are alike; 1 for white noise.
         period: frames from one stride to the next; None where errors do not come back.
         strides: in how many strides they are alike; 1 where they do not come back.
+        slow: share of their variance that one frame shares with the next.
     """
 
     frames: float
     period: int | None
     strides: float
+    slow: float
 
     @classmethod
     def of(cls, errors: np.ndarray) -> Repetition:
@@ -46,16 +49,18 @@ class Repetition:
         alike, overlap = _correlation(errors, errors)
         alike, overlap = alike[n - 1 :], overlap[n - 1 :]
         if not alike[0] > 0:
-            return cls(1.0, None, 1.0)
+            return cls(1.0, None, 1.0, 0.0)
         apart = int(np.argmax(alike < _UNLIKE)) or n
         frames = 1.0 + 2.0 * float(alike[1 : min(apart, n // 2)].sum())
+        slow = max(float(alike[1]) * n / (n - 1), 0.0) if n > 1 else 0.0
         later = np.arange(apart, n)
         later = later[overlap[later] >= _SHORTEST_OWN * n]
         peak = _first_peak(alike[later] * n / overlap[later], apart)
         if peak is None:
-            return cls(frames, None, 1.0)
+            return cls(frames, None, 1.0, slow)
         period = int(later[peak])
-        return cls(frames, period, 1.0 + 2.0 * float(np.maximum(alike[period::period], 0.0).sum()))
+        back = np.maximum(alike[period::period], 0.0) / slow
+        return cls(frames, period, 1.0 + 2.0 * float(back.sum()), slow)
 
 
 def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarray:
@@ -74,7 +79,8 @@ def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarr
     own = [Repetition.of(each) for each in alike]
     found = np.diag([each.strides for each in own])
     for a, b in np.argwhere(~np.eye(len(own), dtype=bool)):
-        found[a, b] = _in_other(alike[a], alike[b], own[a].period or own[b].period)
+        times = _in_other(alike[a], alike[b], own[a].period or own[b].period)
+        found[a, b] = times / np.sqrt(own[a].slow * own[b].slow) if times else 0.0
     return found
 
 
