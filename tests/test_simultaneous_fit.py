@@ -131,6 +131,22 @@ def test_a_wandering_marker_is_named(trial):
     assert any("wandering markers" in w and "R.Bicep (" in w for w in fitted(trial, disturb=wander).warnings)
 
 
+def test_a_marker_attached_anew_between_trials_is_named(trial):
+    at = trial.markers.labels.index("R.Thigh.Front")
+    turned = trial.skeleton.pose(trial.motion.q).rotation[:, trial.skeleton.marker_segments[at]]
+    positions = [camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions for seed in (0, 1)]
+    positions[1][:, at] += turned @ [0.0, -0.05, 0.0]
+    kinematics = [kinematics_of(trial, replace(trial.markers, positions=each), trial.foot_loads) for each in positions]
+    with threadpool_limits(1, user_api="blas"):
+        outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics, "gcv")
+    (said,) = outcome.warnings
+    assert "attached anew" in said
+    assert "R.Thigh.Front (" in said
+    assert said.count(" mm)") == 1
+    places = [skeleton.markers[skeleton.labels.index("R.Thigh.Front")].position[1] for skeleton in outcome.skeletons]
+    assert places[1] - places[0] == pytest.approx(-0.05, abs=0.01)
+
+
 def test_a_model_that_is_contradicted_is_called_so(trial):
     literature = walking_subject().literature
     com = literature.com_m.copy()

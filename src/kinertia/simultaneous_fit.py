@@ -26,6 +26,7 @@ CLOCK_SD_S = 0.005
 _STAYING_SD_M = 1e-6
 """Of markers that stay where they are."""
 _NOTABLE = 2.0
+_DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
 """A parameter this many prior deviations from the literature contradicts the model."""
 
@@ -197,6 +198,15 @@ def _warnings(
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
+    places = np.array(result.displacements_m)
+    apart = np.linalg.norm(places[:, None] - places, axis=-1).max(axis=(0, 1))
+    if (apart > _DISPLACED_M).any():
+        rows = zip(result.skeleton.labels, apart, strict=True)
+        listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in rows if value > _DISPLACED_M)
+        found.append(
+            f"markers sit elsewhere in their segments from trial to trial (up to {_DISPLACED_M * 1e3:.0f} mm is taken "
+            f"for skin motion): {listed}; attached anew, or labels swapped?"
+        )
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
     far = [
         f"{PARAMETERS[k]} of {result.bsp.segments[i]} {away[i, k]:+.1f}"
