@@ -71,6 +71,34 @@ def test_trials_with_errors_of_their_own_do_not_count():
     assert repeats(slow, [100.0, 100.0]) == pytest.approx(np.eye(2), abs=1e-12)
 
 
+@pytest.mark.parametrize("pace", [1.02, 1.06, 1.2])
+@pytest.mark.parametrize("count", [2, 4, 8])
+def test_pace_may_differ(stride, pace, count):
+    """A phase of the stride errs as in the other walk, whenever it comes."""
+    walks = []
+    for speed in (1.0, pace):
+        phase = speed * np.arange(round(count * STRIDE / speed))
+        walks.append(
+            np.stack([np.interp(phase, np.arange(STRIDE + 1), [*c, c[0]], period=STRIDE) for c in stride.T], 1)
+        )
+    found = repeats(walks, [100.0, 100.0])
+    assert found == pytest.approx(np.full((2, 2), float(count)), rel=0.15)
+
+
+def test_white_noise_and_flicker_never_come_back():
+    noise = np.random.default_rng(0).normal(size=(120, 90))
+    assert repeats([noise, noise], [100.0, 100.0]) == pytest.approx(np.eye(2))
+    flicker = np.where(np.arange(120) % 2, 1.0, -1.0)[:, None] * noise[0]
+    assert Repetition.of(flicker).strides == 1.0
+
+
+def test_the_same_trial_twice_counts_twice(stride):
+    """Never more, however little of the errors is slow."""
+    rng = np.random.default_rng(1)
+    noisy = steps(stride, 1) + 2.0 * stride.std() * rng.normal(size=(STRIDE, 30))
+    assert repeats([noisy, noisy], [100.0, 100.0]) == pytest.approx(np.ones((2, 2)))
+
+
 def test_rates_may_differ(stride):
     fast = np.repeat(steps(stride, 2), 2, axis=0)
     assert repeats([steps(stride, 2), fast], [100.0, 200.0])[0, 1] == pytest.approx(2.0, rel=0.1)

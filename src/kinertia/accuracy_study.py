@@ -71,7 +71,7 @@ PROOF = {
     "artefact": Scenario("skin motion linear in joint angles", Faults("artefact")),
     "study_calibration": Scenario("the study's noise, calibration errors", Faults("study", calibration=True)),
     "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
-    "walks": Scenario("skin motion, ten strides in three walks", Faults("artefact"), others=("walk", "walk")),
+    "walks": Scenario("skin motion, twelve strides at two paces", Faults("artefact"), others=("walk", "fast walk")),
     "session": Scenario(
         "skin motion, calibration errors; squats, arm swings and trunk sway besides the walk",
         Faults("artefact", calibration=True),

@@ -58,7 +58,8 @@ def measured(
 ) -> tuple[Skeleton, list[Kinematics]]:
     """The skeleton that the laboratory believes in, and the kinematics by that skeleton of all trials of one person.
 
-    Skin, skeleton and instruments are the same in all trials; sizes of skin motion are those of the first.
+    Skin that goes with the joints, skeleton and instruments are the same in all trials; the study's noise is not.
+    Sizes of skin motion are those of the first.
     """
     markers, skeleton = _disturbed(trials, faults, rng), trials[0].skeleton
     instruments = None
@@ -83,7 +84,8 @@ def measured(
 
 def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator) -> list[Markers]:
     """The markers of each trial with noise."""
-    skin = SkinMotion.draw(trials[0].skeleton, trials[0].motion.q, rng) if faults.noise == "artefact" else None
+    first, *others = (trial.motion.q for trial in trials)
+    skin = SkinMotion.draw(trials[0].skeleton, first, rng, others) if faults.noise == "artefact" else None
     found = []
     for trial in trials:
         exact = trial.markers

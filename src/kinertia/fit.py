@@ -39,6 +39,7 @@ class TrialFit:
 
     Attributes:
         kinematics: markers, coordinates and ground reactions before estimation.
+        skeleton: with the markers where they are in this trial (`displacement`).
         motion: coordinates (rad, m) and derivatives that go with the estimate.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
             "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
@@ -49,6 +50,7 @@ class TrialFit:
     """
 
     kinematics: Kinematics
+    skeleton: Skeleton
     motion: Motion
     residuals: Mapping[str, np.ndarray]
     moments: Mapping[str, np.ndarray]
@@ -313,7 +315,7 @@ def _trial_fits(
         errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
         timing = {**seconds, "estimate": spent * len(k.time)}
         timing["total"] = sum(timing.values())
-        trials.append(TrialFit(k, motion, residuals, moments, moment_sd, errors, timing))
+        trials.append(TrialFit(k, skeleton, motion, residuals, moments, moment_sd, errors, timing))
     return tuple(trials)
 
 

@@ -7,7 +7,7 @@ Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that move
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,18 +52,22 @@ class SkinMotion:
     reference: np.ndarray
 
     @classmethod
-    def draw(cls, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator) -> SkinMotion:
+    def draw(
+        cls, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator, others: Sequence[np.ndarray] = ()
+    ) -> SkinMotion:
         """Random directions per joint angle, and peak-to-peak sizes over the coordinates q (n, c) of a walk from
-        `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere.
+        `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere; less where the person's other
+        motions (each n, c) would draw the skin more than twice as far (no source).
         """
-        reference, slopes = q.mean(axis=0), {}
+        reference, slopes, every = q.mean(axis=0), {}, np.concatenate([q, *others])
         for segment in skeleton.segments:
             if not any(marker.segment == segment for marker in skeleton.markers):
                 continue
             columns = _neighbouring(skeleton, segment)
             directions = rng.standard_normal((len(columns), 3))
             low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
-            extent = np.linalg.norm(np.ptp((q - reference)[:, columns] @ directions, axis=0))
+            extent, *more = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
+            extent = max(extent, *(wider / 2.0 for wider in more))
             slopes[segment] = directions * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
         return cls(slopes, reference)
 

@@ -45,7 +45,7 @@ class MarkerNoise:
         sd_m: per label, deviation of one coordinate in one frame, m.
         correlation_s: time over which errors are alike.
         wandering: labels whose deviation is more than three times the usual; they count accordingly less.
-        repeats: how often they come back in all trials together (`repetition`).
+        repeats: in how many strides of all trials together they are alike (`repetition`); 1: they never come back.
         displacement_sd_m: per label, deviation of its displacement in this trial (`displacement`), m; 0 for one trial.
     """
 
@@ -76,7 +76,9 @@ class Observations:
         return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
 
 
-def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cutoff_hz: float) -> Observations:
+def observe(
+    skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cutoff_hz: float, staying: bool = False
+) -> Observations:
     """The observations of trials of one person, and the noise of their markers.
 
     Args:
@@ -84,10 +86,13 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cu
         trials: kinematics of each.
         mass_kg: for the size of force errors.
         cutoff_hz: bandwidth of the forces.
+        staying: markers stay where the skeleton has them, in all trials: no displacements.
     """
     errors = [_errors(skeleton, each) for each in trials]
     found = [_observed(skeleton, k, each, mass_kg, cutoff_hz) for k, each in zip(trials, errors, strict=True)]
     displaced = _displacement_sd(skeleton, np.stack([each.displaced for each in errors]))
+    if staying:
+        displaced = np.zeros_like(displaced)
     varying = [_columns(each.varying, o.marker_sd) for each, (o, _) in zip(errors, found, strict=True)]
     counts = repeats(varying, [each.trial.markers.rate_hz for each in trials])
     by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))

@@ -87,7 +87,8 @@ def plan_measured(
     used = used.carrying(freedom.held)
 
     def told(chosen: Sequence[int]) -> Information:
-        seen = observe(used, [trials[k] for k in chosen], prior.mass_kg + freedom.held_kg, cutoff)
+        mass_kg, staying = prior.mass_kg + freedom.held_kg, freedom.marker_sd_m is None
+        seen = observe(used, [trials[k] for k in chosen], mass_kg, cutoff, staying)
         calibration = calibration_prior(used, freedom)
         return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
 

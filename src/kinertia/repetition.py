@@ -24,6 +24,8 @@ _SHORTEST_OWN, _SHORTEST_OTHER = 1.0 / 3.0, 1.0 / 2.0
 """Share of a trial that must overlap with itself, and of the shorter of two with the other: less would be alike by
 chance, or because two trials cut from one have frames in common.
 """
+_WHITE = 0.1
+"""Share of the variance that one frame shares with the next below which errors are the cameras' noise."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Repetition:
     """
 
     frames: float
-    period: int | None
+    period: float | None
     strides: float
     slow: float
 
@@ -46,57 +48,84 @@ class Repetition:
     def of(cls, errors: np.ndarray) -> Repetition:
         """Of errors (n, k), zero where a marker is not seen."""
         n = len(errors)
-        alike, overlap = _correlation(errors, errors)
-        alike, overlap = alike[n - 1 :], overlap[n - 1 :]
-        if not alike[0] > 0:
+        alike, overlap = (part[n - 1 :] for part in _correlation(errors, errors))
+        if n < 2 or not alike[0] > 0:
             return cls(1.0, None, 1.0, 0.0)
         apart = int(np.argmax(alike < _UNLIKE)) or n
         frames = 1.0 + 2.0 * float(alike[1 : min(apart, n // 2)].sum())
-        slow = max(float(alike[1]) * n / (n - 1), 0.0) if n > 1 else 0.0
+        per_pair = alike * n / overlap
+        slow = max(float(per_pair[1]), 0.0)
         later = np.arange(apart, n)
         later = later[overlap[later] >= _SHORTEST_OWN * n]
-        peak = _first_peak(alike[later] * n / overlap[later], apart)
-        if peak is None:
+        peak = _first_peak(per_pair[later], apart)
+        if peak is None or slow < _WHITE:
             return cls(frames, None, 1.0, slow)
-        period = int(later[peak])
-        back = np.maximum(alike[period::period], 0.0) / slow
-        return cls(frames, period, 1.0 + 2.0 * float(back.sum()), slow)
+        period = _refined(alike, int(later[peak]))
+        every = np.round(np.arange(period, n - 0.5, period)).astype(int)
+        back = _counted(per_pair[every] / slow, overlap[every] / n)
+        return cls(frames, period, 1.0 + 2.0 * back, slow)
 
 
 def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarray:
     """(t, t) how often the errors of each trial (rows) come back in each (columns): its strides on the diagonal, zero
     for trials that err in other ways. Sums over trials that are used together are what their information counts for.
 
+    Of trials with two strides and more, the pace may differ. Few markers, or errors of few kinds, may be alike by
+    chance; they then count for less than they say.
+
     Args:
         errors: per trial (n, k) of the same columns, zero where a marker is not seen.
         rates_hz: per trial.
     """
     slowest = min(rates_hz)
-    alike = [
-        each[np.round(np.arange(int((len(each) - 1) * slowest / rate) + 1) * rate / slowest).astype(int)]
-        for each, rate in zip(errors, rates_hz, strict=True)
-    ]
+    alike = [_resampled(each, rate / slowest) for each, rate in zip(errors, rates_hz, strict=True)]
     own = [Repetition.of(each) for each in alike]
     found = np.diag([each.strides for each in own])
     for a, b in np.argwhere(~np.eye(len(own), dtype=bool)):
-        times = _in_other(alike[a], alike[b], own[a].period or own[b].period)
-        found[a, b] = times / np.sqrt(own[a].slow * own[b].slow) if times else 0.0
+        first, second = own[a].period, own[b].period
+        other = alike[b] if first is None or second is None else _resampled(alike[b], second / first)
+        slow = float(np.sqrt(own[a].slow * own[b].slow))
+        found[a, b] = _in_other(alike[a], other, first or second, slow)
     return found
 
 
-def _in_other(errors: np.ndarray, other: np.ndarray, period: int | None) -> float:
+def _in_other(errors: np.ndarray, other: np.ndarray, period: float | None, slow: float) -> float:
     """How often errors (n, k) come back in those of another trial (m, k)."""
+    n, shortest = len(errors), min(len(errors), len(other))
     alike, overlap = _correlation(errors, other)
-    if not alike.any():
-        return 0.0
-    shortest = min(len(errors), len(other))
+    per_pair = alike * n / overlap
     lags = np.flatnonzero(overlap >= _SHORTEST_OTHER * shortest)
-    peak = _first_peak(alike[lags] * len(errors) / overlap[lags], period or shortest)
-    if peak is None:
+    peak = _first_peak(per_pair[lags], round(period or shortest))
+    if peak is None or slow < _WHITE:
         return 0.0
-    first = int(lags[peak])
-    every = np.arange(first % period, len(alike), period) if period else np.array([first])
-    return float(np.maximum(alike[every], 0.0).sum())
+    every = lags[peak : peak + 1]
+    if period is not None:
+        every = np.round(np.arange(every[0] % period, len(alike) - 0.5, period)).astype(int)
+    return _counted(per_pair[every] / slow, overlap[every] / n)
+
+
+def _counted(alike: np.ndarray, share: np.ndarray) -> float:
+    """Repeats that are alike by so much, over such shares of the errors' frames."""
+    return float((np.clip(alike, 0.0, 1.0) * share).sum())
+
+
+def _resampled(errors: np.ndarray, step: float) -> np.ndarray:
+    """Errors (n, k) at every so many frames."""
+    at = np.arange(0.0, len(errors) - 1 + 1e-9, step)
+    before = np.minimum(at.astype(int), len(errors) - 1)
+    after = np.minimum(before + 1, len(errors) - 1)
+    share = (at - before)[:, None]
+    return (1.0 - share) * errors[before] + share * errors[after]
+
+
+def _refined(alike: np.ndarray, period: int) -> float:
+    """The period by the last of its multiples that still shows a peak: a frame matters after ten strides."""
+    found, k = float(period), 2
+    while round(found * k) + 2 < len(alike) and alike[round(found * k)] > 0:
+        near = round(found * k) + np.arange(-2, 3)
+        found = float(near[np.argmax(alike[near])]) / k
+        k += 1
+    return found
 
 
 def _first_peak(alike: np.ndarray, wide: int) -> int | None:

@@ -155,11 +155,18 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "mass_from_force_kg": mass_from_force_kg(fit.literature, trial),
         "seconds": {stage: round(value, 4) for stage, value in trial.seconds.items()},
         "marker_rms_m": {stage: _rms(values[..., None]) for stage, values in trial.marker_errors_m.items()},
+        "marker_displacements_m": _displacements(fit, trial),
         "residual_force_rms_N": _each(force, _rms),
         "residual_force_max_N": _each(force, _max),
         "residual_moment_rms_Nm": _each(moment, _rms),
         "residual_moment_max_Nm": _each(moment, _max),
     }
+
+
+def _displacements(fit: Fit, trial: TrialFit) -> dict[str, list[float]]:
+    """How far markers of this trial are from where the model has them, in their segments; only those that are."""
+    moved = trial.skeleton.marker_locals - fit.skeleton.marker_locals
+    return {label: row.tolist() for label, row in zip(fit.skeleton.labels, moved, strict=True) if row.any()}
 
 
 def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float]:

@@ -104,12 +104,13 @@ def fit_simultaneous(
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
     used = used.carrying(freedom.held)
-    seen = observe(used, trials, prior.mass_kg + freedom.held_kg, cutoff)
+    staying = freedom.marker_sd_m is None
+    seen = observe(used, trials, prior.mass_kg + freedom.held_kg, cutoff, staying)
     together = seen.together
     calibration = calibration_prior(used, freedom)
     result = estimate_simultaneous(used, prior, calibration, together, 1.0 / (2.0 * cutoff))
     found = result.skeleton.carrying(None)
-    if freedom.marker_sd_m is None:
+    if staying:
         found = found.with_markers(used.markers)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
@@ -198,15 +199,7 @@ def _warnings(
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
-    places = np.array(result.displacements_m)
-    apart = np.linalg.norm(places[:, None] - places, axis=-1).max(axis=(0, 1))
-    if (apart > _DISPLACED_M).any():
-        rows = zip(result.skeleton.labels, apart, strict=True)
-        listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in rows if value > _DISPLACED_M)
-        found.append(
-            f"markers sit elsewhere in their segments from trial to trial (up to {_DISPLACED_M * 1e3:.0f} mm is taken "
-            f"for skin motion): {listed}; attached anew, or labels swapped?"
-        )
+    found += _attached_anew(result, trials)
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
     far = [
         f"{PARAMETERS[k]} of {result.bsp.segments[i]} {away[i, k]:+.1f}"
@@ -217,4 +210,28 @@ def _warnings(
             f"the data contradict the model: {', '.join(far)} prior deviations from {freedom.source}; a wrong joint, "
             f"plate or marker is likelier than an odd person"
         )
+    return found
+
+
+def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:
+    """Markers that sit farther from where they are in the other trials than skin moves."""
+    labels = result.skeleton.labels
+    shown = np.array([np.isin(labels, k.ik.labels) for k in trials])
+    places = np.where(shown[..., None], result.displacements_m, np.nan)
+    found = []
+    for k, kinematics in enumerate(trials):
+        others = [other for other in range(len(trials)) if other != k and shown[other].any()]
+        if not others:
+            continue
+        with np.errstate(invalid="ignore"):
+            away = np.linalg.norm(places[k] - places[others], axis=-1)
+        closest = np.where(np.isnan(away), np.inf, away).min(axis=0)
+        far = [(label, value) for label, value in zip(labels, closest, strict=True) if _DISPLACED_M < value < np.inf]
+        if far:
+            listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in far)
+            found.append(
+                f"{kinematics.trial.name}: markers sit elsewhere in their segments than in the other trials: {listed}; "
+                f"skin moves up to some {_DISPLACED_M * 1e3:.0f} mm; correct their labels, or fit trials before and "
+                "after they were attached anew separately"
+            )
     return found

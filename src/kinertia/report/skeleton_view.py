@@ -61,7 +61,7 @@ def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
     """What the view of a trial shows: the window, at most `most_frames` frames of it."""
     chosen = slice(None, None, -(-len(trial.time) // most_frames))
     labels = trial.kinematics.ik.labels
-    skeleton = fit.skeleton.with_markers([m for m in fit.skeleton.markers if m.label in labels])
+    skeleton = trial.skeleton.with_markers([m for m in trial.skeleton.markers if m.label in labels])
     pose = skeleton.pose(trial.motion.q[chosen])
     bones, sides, points = _bones(skeleton, pose.rotation, pose.translation)
     frames = trial.kinematics.frames[chosen]
