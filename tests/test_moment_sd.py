@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kinertia.block_band import BlockBand
 from kinertia.dynamics import Motion, inverse_dynamics
+from kinertia.map_terms import MapProblem, Point
 from kinertia.moment_sd import joint_moment_sd, moment_derivatives
 from kinertia.normal_equations import reduced
-from kinertia.simultaneous import root_of_covariance
+from kinertia.simultaneous import _deviations, _step, root_of_covariance
 from small_problem import curved_problem, point, small_problem
 from study_bound import dense_band
 
@@ -90,6 +93,70 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     found = joint_moment_sd(problem, 0, coefficients, static, part, root)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
+    """The first counts for two: what its motion leaves open is that of the errors alone."""
+    problem, coefficients, static = estimate
+    (trial,) = problem.trials
+    sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
+    trials = [replace(trial, displacement_sd_m=sd).repeated(2.0), replace(trial, displacement_sd_m=sd[::-1].copy())]
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials, 0.1)
+    rng = np.random.default_rng(0)
+    here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
+    chains, information, right = dense_pair(pair, here)
+    covariance = inverse(information)
+    found, moment_sd = _deviations(pair, here)
+    s = pair.layout.size
+    scale = np.sqrt(np.diag(found))
+    np.testing.assert_allclose(found / np.outer(scale, scale), covariance[:s, :s] / np.outer(scale, scale), atol=1e-6)
+    _, promised, _ = _step(pair, here, 0.0, np.zeros(s))
+    assert promised == pytest.approx(0.5 * right @ covariance @ right, rel=1e-6)
+
+    in_trial = pair.in_trial(0, here.point)
+    by = dense_derivative(problem, coefficients, in_trial)
+    n = coefficients.size
+    motion = inverse(dense_band(here.normals[0].band))
+    carried = -motion @ here.normals[0].border.reshape(n, s)
+    through = by[..., n:] + by[..., :n] @ carried
+    expected = np.einsum("dri,ij,drj->dr", by[..., :n], motion / 2.0, by[..., :n], optimize=True)
+    of_static = chains[0] @ covariance @ chains[0].T
+    expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
+    expected = np.sqrt(expected + lost(problem, coefficients, in_trial))
+    np.testing.assert_allclose(moment_sd[0], expected, rtol=1e-3)
+
+
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    return scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale
+
+
+def dense_pair(pair, here) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """Static unknowns, displacements and motions of two trials in one matrix: per trial the derivative of its static
+    unknowns by all, information, right-hand side.
+    """
+    s, wide = pair.layout.size, len(here.point.displaced[0])
+    sizes = [normal.right.size for normal in here.normals]
+    ends = s + 2 * wide + np.cumsum(sizes)
+    information, right = np.zeros((ends[-1],) * 2), np.zeros(ends[-1])
+    information[:s, :s], right[:s] = here.information, here.right
+    chains = []
+    for k, normal in enumerate(here.normals):
+        own, moving = slice(s + k * wide, s + (k + 1) * wide), slice(ends[k] - sizes[k], ends[k])
+        chain = np.zeros((s, ends[-1]))
+        chain[:, :s] = np.eye(s)
+        chain[pair.layout.locals, own] = np.diag(pair.displacement_sd_m[k])
+        across = normal.border.reshape(-1, s) @ chain
+        information += chain.T @ normal.static @ chain
+        information[moving] += across
+        information[:, moving] += across.T
+        information[moving, moving] += dense_band(normal.band)
+        information[own, own] += np.eye(wide)
+        right += chain.T @ normal.static_right
+        right[moving] += normal.right.ravel()
+        right[own] -= here.point.displaced[k]
+        chains.append(chain)
+    return chains, information, right
 
 
 def lost(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from kinertia.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.kinematics import Kinematics, solve_kinematics
 from kinertia.noise import SkinMotion, camera_noise, study_noise
 from kinertia.simultaneous_fit import CLOCK_SD_S, PLATE_SD
-from kinertia.skeleton import GRAVITY_M_S2, Marker, Skeleton
+from kinertia.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.splines import smooth
 from kinertia.synthetic import SyntheticTrial
 from kinertia.trial import FootLoads, Markers, Trial
@@ -105,9 +105,7 @@ def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
     centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
     skeleton = skeleton.lock({name: skeleton.locked[name] + rng.normal(0.0, JOINT_CENTRE_SD_M) for name in centres})
     places = skeleton.marker_locals + rng.normal(0.0, MARKER_SD_M, skeleton.marker_locals.shape)
-    return skeleton.with_markers(
-        [Marker(m.label, m.segment, place) for m, place in zip(skeleton.markers, places, strict=True)]
-    )
+    return skeleton.with_places(places)
 
 
 @dataclass(frozen=True, eq=False)

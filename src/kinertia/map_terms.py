@@ -26,7 +26,7 @@ from kinertia.log_cholesky import (
 from kinertia.marker_terms import marker_terms
 from kinertia.motion_basis import MotionBasis
 from kinertia.normal_equations import NormalEquations, assemble
-from kinertia.skeleton import Marker, Skeleton
+from kinertia.skeleton import Skeleton
 
 COEFFICIENT_SD = 1.0
 """Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
@@ -202,9 +202,7 @@ class MapProblem:
 
     def placed(self, static: np.ndarray) -> Skeleton:
         """The freed skeleton with markers where the static unknowns put them."""
-        positions = static[self.layout.locals].reshape(-1, 3)
-        markers = [Marker(m.label, m.segment, p) for m, p in zip(self.skeleton.markers, positions, strict=True)]
-        return self.free.with_markers(markers)
+        return self.free.with_places(static[self.layout.locals].reshape(-1, 3))
 
     def shortened(self, step: np.ndarray) -> np.ndarray:
         """The step with no logarithm (mass, second moments) changing by more than one."""

@@ -92,18 +92,19 @@ def plan_measured(
         calibration = calibration_prior(used, freedom)
         return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
 
-    everything = range(len(trials))
+    everything = tuple(range(len(trials)))
     with threadpool_limits(1):
+        whole = told(everything)
         sets: list[tuple[int, ...]] = [(k,) for k in everything]
-        if len(trials) > 1:
-            whole = told(everything)
-            sets += [
-                max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
-                for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
-            ]
-        # how large errors are depends on what they are compared with: each set anew, as a fit of it would have them
-        found = {tuple(trials[k].trial.name for k in chosen): told(chosen).sd(range(len(chosen))) for chosen in sets}
-    return Plan(prior.mean.segments, prior.sd, found)
+        sets += [
+            max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
+            for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
+        ]
+        # chosen by the errors of all trials; each set's own errors are what a fit of it would have
+        of_sets = {chosen: whole if chosen == everything else told(chosen) for chosen in sets}
+        found = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
+    names = [k.trial.name for k in trials]
+    return Plan(prior.mean.segments, prior.sd, {tuple(names[k] for k in chosen): sd for chosen, sd in found.items()})
 
 
 def plan_synthetic() -> Plan:

@@ -26,7 +26,8 @@ class Information:
     """What each of several trials of a person tells of parameters and calibration, and what the prior tells.
 
     Attributes:
-        problem: at whose start it is taken: the observations' coordinates, the prior's mean. Observations are alone.
+        problem: at whose start it is taken: the observations' coordinates, the prior's mean. Of observations as they
+            are alone (`observation.Observations`): repeats are counted here.
         repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
     """
 

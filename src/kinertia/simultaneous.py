@@ -3,11 +3,10 @@
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
 segments, how far they are from these in each of several trials (`displacement`), what is wrong with each plate
-(`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is
-the sum of squares, each over its deviation, of: marker errors, root residuals, and departures from the priors.
-Gauss-Newton with Levenberg damping, all derivatives analytic. The normal matrix is block tridiagonal in time with a
-border of static unknowns (`block_band`); its Schur complement is the information on them, and its inverse their
-covariance.
+(`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
+deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg damping, all
+derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`);
+its Schur complement is the information on them, and its inverse their covariance.
 """
 
 from __future__ import annotations

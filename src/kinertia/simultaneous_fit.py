@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -130,18 +130,12 @@ def fit_simultaneous(
         result,
         freedom.whole(result.bsp),
         found,
-        tuple(_displaced(found, moved) for moved in result.displacements_m),
+        tuple(found.with_places(found.marker_locals + moved) for moved in result.displacements_m),
         posterior,
         motions,
         loads,
         tuple(_warnings(prior, freedom, result, posterior, trials)),
     )
-
-
-def _displaced(skeleton: Skeleton, moved_m: np.ndarray) -> Skeleton:
-    """The skeleton with its markers moved (m, 3) in their segments."""
-    rows = zip(skeleton.markers, skeleton.marker_locals + moved_m, strict=True)
-    return skeleton.with_markers([replace(marker, position=place) for marker, place in rows])
 
 
 def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:

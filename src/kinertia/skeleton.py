@@ -178,6 +178,11 @@ class Skeleton:
         """The same skeleton with other markers."""
         return replace(self, markers=tuple(markers))
 
+    def with_places(self, positions: np.ndarray) -> Skeleton:
+        """The same skeleton with its markers at these positions (m, 3) in their segments."""
+        rows = zip(self.markers, positions, strict=True)
+        return self.with_markers([replace(marker, position=place) for marker, place in rows])
+
     def carrying(self, bsp: BodySegmentParameters | None) -> Skeleton:
         """The same skeleton with these parameters given once and for all."""
         return replace(self, carried=bsp)
