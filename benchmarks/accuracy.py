@@ -78,9 +78,9 @@ The gait2354 walk, cut in two: differences of the BSPs from the estimate of the 
 
 The halves together give the estimate of the whole, well within its error bars; what is left is what the cut takes away
 (the dynamics of the frames beside it). Most errors of one half come back in the other and count once, so that both
-together say little more than the better half. That takes the calibration of the left plate's free moment: it turns the person
-to the left by some 7 N m per kN of vertical force, which over a whole walk would spin anybody round. Without this
-unknown, the halves together are off by 0.40 deviations (RMS; 1.9 at most), since each half explains the moment by
+together say little more than the better half. That takes the calibration of the left plate's free moment: it turns
+the person to the left by some 7 N m per kN of vertical force, which over a whole walk would spin anybody round. Without
+this unknown, the halves together are off by 0.40 deviations (RMS; 1.9 at most), since each half explains the moment by
 another initial rate of turning and by CoMs moved to the side.
 
 ## Error bars
