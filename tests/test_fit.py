@@ -58,9 +58,10 @@ def test_unmeasured_steps_are_left_out(fit_of, name):
 
 
 @walks
-def test_pelvis_correction_stays_near_the_measured_motion(fit_of, name):
+def test_estimated_motion_stays_near_the_markers(fit_of, name):
+    """Hardly farther than inverse kinematics, or nearer: the estimate calibrates where they sit."""
     markers = fit_of(name).trial["marker_rms_m"]
-    assert markers["ik"] < markers["final"] < 0.015
+    assert 0.8 * markers["ik"] < markers["final"] < min(1.3 * markers["ik"], 0.012)
 
 
 @walks
