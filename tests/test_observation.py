@@ -142,9 +142,7 @@ def test_markers_off_their_places_are_not_noise(trial):
     noisy = camera_noise(trial.markers, 0.002, rng)
     kinematics = kinematics_of(trial, noisy)
     places = trial.skeleton.marker_locals + rng.normal(0.0, 0.01, trial.skeleton.marker_locals.shape)
-    moved = trial.skeleton.with_markers(
-        [replace(m, position=place) for m, place in zip(trial.skeleton.markers, places, strict=True)]
-    )
+    moved = trial.skeleton.with_places(places)
     (right, _), (wrong, _) = (alone(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
     np.testing.assert_allclose(wrong.marker_sd, right.marker_sd, rtol=1e-6)
 

@@ -6,7 +6,7 @@ of each marker from its place in the segment, with a prior deviation that is rea
 trial has no displacements.
 
 A trial's normal equations are those of places in the trial; its displacements are eliminated from them here. They are
-counted in their prior deviations, so that a deviation of zero needs no exception.
+counted in their prior deviations, so that a deviation may be zero.
 """
 
 from __future__ import annotations

@@ -295,7 +295,8 @@ def _trial_fits(
     started: float,
 ) -> tuple[TrialFit, ...]:
     """Every trial before and after; `skeletons` have the markers where they are in it, `estimates` its motion and its
-    foot loads (w, 2, 6) as estimated."""
+    foot loads (w, 2, 6) as estimated.
+    """
     spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
     before, literature = ready.skeleton, ready.literature
     trials = []

@@ -247,12 +247,8 @@ class MapProblem:
     def in_trial(self, k: int, point: Point) -> np.ndarray:
         """(S,) static unknowns as they are in trial k: its markers displaced."""
         static = point.static.copy()
-        static[self.layout.locals] += self.displacements_m(point)[k].ravel()
+        static[self.layout.locals] += self.displacement_sd_m[k] * point.displaced[k]
         return static
-
-    def displacements_m(self, point: Point) -> list[np.ndarray]:
-        """Per trial (m, 3) how far its markers are from their places in the segments."""
-        return [(sd * own).reshape(-1, 3) for sd, own in zip(self.displacement_sd_m, point.displaced, strict=True)]
 
     def root_sd(self, trial: Observation) -> np.ndarray:
         """(6,) deviations of the root residual: N, N m."""

@@ -66,8 +66,8 @@ class SkinMotion:
             columns = _neighbouring(skeleton, segment)
             directions = rng.standard_normal((len(columns), 3))
             low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
-            extent, *more = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
-            extent = max(extent, *(wider / 2.0 for wider in more))
+            walking, overall = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
+            extent = max(walking, overall / 2.0)
             slopes[segment] = directions * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
         return cls(slopes, reference)
 

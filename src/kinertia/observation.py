@@ -90,9 +90,8 @@ def observe(
     """
     errors = [_errors(skeleton, each) for each in trials]
     found = [_observed(skeleton, k, each, mass_kg, cutoff_hz) for k, each in zip(trials, errors, strict=True)]
-    displaced = _displacement_sd(skeleton, np.stack([each.displaced for each in errors]))
-    if staying:
-        displaced = np.zeros_like(displaced)
+    places = np.stack([each.displaced for each in errors])
+    displaced = np.zeros(places.shape[1]) if staying else _displacement_sd(skeleton, places)
     varying = [_columns(each.varying, o.marker_sd) for each, (o, _) in zip(errors, found, strict=True)]
     counts = repeats(varying, [each.trial.markers.rate_hz for each in trials])
     by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))

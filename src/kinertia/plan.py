@@ -1,8 +1,9 @@
 """What to record: the error bar that every body segment parameter would have after candidate motions.
 
 Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
-published size. Nothing is estimated: deviations follow from the information of each trial at the literature's
-parameters (`predicted.Information`), and those of several trials add up, but for errors that come back (`repetition`).
+published size in the walk, up to twice that in the others. Nothing is estimated: deviations follow from the information
+of each trial at the literature's parameters (`predicted.Information`), and those of several trials add up, but for
+errors that come back (`repetition`).
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import evidence
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import MapProblem
-from kinertia.observation import CUTOFF_HZ, observe
+from kinertia.observation import CUTOFF_HZ
 from kinertia.predicted import Information
-from kinertia.simultaneous_fit import calibration_prior
+from kinertia.simultaneous_fit import calibration_prior, observed, used_skeleton
 from kinertia.skeleton import Skeleton
 from kinertia.synthetic import walking_subject
 from kinertia.synthetic_motions import MOTIONS
@@ -82,13 +83,10 @@ def plan_measured(
 ) -> Plan:
     """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
-    shown = {label for k in trials for label in k.ik.labels}
-    used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    used = used.carrying(freedom.held)
+    used = used_skeleton(skeleton, trials, freedom)
 
     def told(chosen: Sequence[int]) -> Information:
-        mass_kg, staying = prior.mass_kg + freedom.held_kg, freedom.marker_sd_m is None
-        seen = observe(used, [trials[k] for k in chosen], mass_kg, cutoff, staying)
+        seen = observed(used, prior, [trials[k] for k in chosen], cutoff, freedom)
         calibration = calibration_prior(used, freedom)
         return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
 

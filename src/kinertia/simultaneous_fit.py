@@ -15,7 +15,7 @@ from kinertia.identifiability import BaseParameters, base_parameters
 from kinertia.instruments import PLATE_UNKNOWNS
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import CalibrationPrior
-from kinertia.observation import CUTOFF_HZ, MarkerNoise, observe
+from kinertia.observation import CUTOFF_HZ, MarkerNoise, Observations, observe
 from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
 from kinertia.skeleton import Skeleton
 
@@ -101,16 +101,13 @@ def fit_simultaneous(
         freedom: what may move beside these segments.
     """
     cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
-    shown = {label for k in trials for label in k.ik.labels}
-    used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    used = used.carrying(freedom.held)
-    staying = freedom.marker_sd_m is None
-    seen = observe(used, trials, prior.mass_kg + freedom.held_kg, cutoff, staying)
+    used = used_skeleton(skeleton, trials, freedom)
+    seen = observed(used, prior, trials, cutoff, freedom)
     together = seen.together
     calibration = calibration_prior(used, freedom)
     result = estimate_simultaneous(used, prior, calibration, together, 1.0 / (2.0 * cutoff))
     found = result.skeleton.carrying(None)
-    if staying:
+    if freedom.marker_sd_m is None:
         found = found.with_markers(used.markers)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
@@ -136,6 +133,21 @@ def fit_simultaneous(
         loads,
         tuple(_warnings(prior, freedom, result, posterior, trials)),
     )
+
+
+def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], freedom: Freedom) -> Skeleton:
+    """The skeleton with the markers that any of the trials shows, and the segments that are held."""
+    shown = {label for k in trials for label in k.ik.labels}
+    used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
+    return used.carrying(freedom.held)
+
+
+def observed(
+    skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], cutoff_hz: float, freedom: Freedom
+) -> Observations:
+    """What the estimate sees of trials of a `used_skeleton`."""
+    staying = freedom.marker_sd_m is None
+    return observe(skeleton, trials, prior.mass_kg + freedom.held_kg, cutoff_hz, staying)
 
 
 def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
@@ -214,12 +226,8 @@ def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> 
     places = np.where(shown[..., None], result.displacements_m, np.nan)
     found = []
     for k, kinematics in enumerate(trials):
-        others = [other for other in range(len(trials)) if other != k and shown[other].any()]
-        if not others:
-            continue
-        with np.errstate(invalid="ignore"):
-            away = np.linalg.norm(places[k] - places[others], axis=-1)
-        closest = np.where(np.isnan(away), np.inf, away).min(axis=0)
+        away = np.linalg.norm(places[k] - np.delete(places, k, axis=0), axis=-1)
+        closest = np.where(np.isnan(away), np.inf, away).min(axis=0, initial=np.inf)
         far = [(label, value) for label, value in zip(labels, closest, strict=True) if _DISPLACED_M < value < np.inf]
         if far:
             listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in far)
