@@ -15,8 +15,8 @@ from threadpoolctl import threadpool_limits
 
 from calibration_errors import DISTURBANCES, Calibrated, calibrated, calibration_section
 from estimate_speed import speed_section, timed
-from kinertia.accuracy_report import accuracy_markdown
-from kinertia.accuracy_study import SCENARIOS, run_accuracy
+from kinertia.report.accuracy import accuracy_markdown
+from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from measured_walks import measured_section, measured_walk
 from pooling import pooled, pooling_section
 from study_bound import bound_rows

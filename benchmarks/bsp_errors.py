@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.bsp import BodySegmentParameters, ParameterVector
+from kinertia.model.bsp import BodySegmentParameters, ParameterVector
 
 
 def errors(found: BodySegmentParameters, truth: BodySegmentParameters) -> tuple[float, float, float]:

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsp_errors import errors
-from kinertia.accuracy_study import SPACING_S, held
-from kinertia.bsp_prior import literature_prior
-from kinertia.gait27 import HIP_OFFSETS
-from kinertia.map_terms import CalibrationPrior
-from kinertia.noise import camera_noise
-from kinertia.simultaneous import SimultaneousResult, estimate_simultaneous
-from kinertia.simultaneous_fit import PLATE_SD
-from kinertia.splines import smooth
-from kinertia.synthetic import unlike_literature, walk, walking_subject
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.fit import PLATE_SD
+from kinertia.estimation.simultaneous.problem import CalibrationPrior
+from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.model.gait27 import HIP_OFFSETS
+from kinertia.motion.smoothing import smooth
+from kinertia.studies.accuracy import SPACING_S, held
+from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 from measured_trials import table
 from synthetic_walks import FIRST_SEED, observation_of
 

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 from threadpoolctl import threadpool_limits
 
-from kinertia.bsp_prior import literature_prior
-from kinertia.noise import SkinMotion, camera_noise
-from kinertia.observation import CUTOFF_HZ
-from kinertia.simultaneous_fit import fit_simultaneous
-from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
+from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from measured_trials import table
 from synthetic_walks import FIRST_SEED, kinematics_of
 

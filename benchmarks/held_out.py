@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from kinertia.cli import main as kinertia
+from kinertia.cli.app import main as kinertia
 from measured_trials import table
 from walks import data_folder
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinertia.cli import main as kinertia
+from kinertia.cli.app import main as kinertia
 from walks import WALKS, data_folder, fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "measured-trials.md"

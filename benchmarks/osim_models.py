@@ -15,7 +15,7 @@ from typing import Any
 
 import pandas as pd
 
-from kinertia.cli import main as kinertia
+from kinertia.cli.app import main as kinertia
 from measured_trials import STAGES, farthest, table
 from walks import data_folder
 
@@ -135,8 +135,8 @@ motion. *Corrected*: the same with pelvis correction. *Estimate*: motion, parame
 
 ## Body segment parameters
 
-Prior deviations (sd) are those of `kinertia.bsp_prior` around the model's own parameters. Each parameter beyond three
-of them has its warning below. Seconds are this machine's.
+Prior deviations (sd) are those of `kinertia.estimation.prior` around the model's own parameters. Each parameter beyond
+three of them has its warning below. Seconds are this machine's.
 
 {estimates}
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.config import Settings, Subject
-from kinertia.fit import estimate_bsp
+from kinertia.estimation.estimate import estimate_bsp
+from kinertia.estimation.prepare import TrialInput
 from kinertia.io.recording import read_recording
-from kinertia.prepare import TrialInput
+from kinertia.settings import Settings, Subject
 from measured_trials import table
 from walks import data_folder
 

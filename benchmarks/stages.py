@@ -22,20 +22,20 @@ import opensim
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from kinertia.anthropometry import literature_bsp
-from kinertia.bsp import ParameterVector
-from kinertia.config import Subject
-from kinertia.contacts import build_trial
-from kinertia.dynamics import Motion, inverse_dynamics
-from kinertia.ik import solve_ik
+from kinertia.estimation.prepare import calibrate
+from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
-from kinertia.marker_set import MarkerSet, choose_marker_set
-from kinertia.prepare import calibrate
-from kinertia.splines import smooth
-from kinertia.trial import Markers
-from kinertia.two_level import TwoLevelProblem, Window, stretches
+from kinertia.model.anthropometry import literature_bsp
+from kinertia.model.bsp import ParameterVector
+from kinertia.model.marker_set import MarkerSet, choose_marker_set
+from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.smoothing import smooth
+from kinertia.settings import Subject
+from kinertia.trial.data import Markers
+from kinertia.trial.plate_assignment import build_trial
 from measured_trials import table
 from walks import WALKS, data_folder, fit_arguments
 

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.accuracy_study import SPACING_S, at_truth, held
-from kinertia.bsp import block_diagonal
-from kinertia.bsp_prior import BspPrior
-from kinertia.calibration import marker_jacobian
-from kinertia.log_cholesky import table_jacobian
-from kinertia.map_terms import MapProblem, Observation
-from kinertia.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
-from kinertia.synthetic import SyntheticTrial
+from kinertia.estimation.calibration import marker_jacobian
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.problem import MapProblem, Observation
+from kinertia.model.bsp import block_diagonal
+from kinertia.model.log_cholesky import table_jacobian
+from kinertia.studies.accuracy import SPACING_S, at_truth, held
+from kinertia.synthetic.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
+from kinertia.synthetic.walk import SyntheticTrial
 from study_noise import drawn_start, start_prior
 from synthetic_walks import observation_of, study_walk
 

@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 
 from bsp_errors import errors
-from kinertia.accuracy_study import held
-from kinertia.bsp import BodySegmentParameters, ParameterVector
-from kinertia.bsp_prior import BspPrior, with_symmetry
-from kinertia.dynamics import Motion
-from kinertia.ik import solve_ik
-from kinertia.map_terms import Observation
-from kinertia.noise import camera_noise, study_noise
-from kinertia.observation import CUTOFF_HZ
-from kinertia.simultaneous import estimate_simultaneous
-from kinertia.splines import smooth
-from kinertia.study import MARGIN_S, START_SHARE
-from kinertia.synthetic import SyntheticTrial
-from kinertia.trial import Markers
-from kinertia.two_level import Window, estimate_two_level
+from kinertia.estimation.prior import BspPrior, with_symmetry
+from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
+from kinertia.estimation.simultaneous.problem import Observation
+from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.two_level import Window, estimate_two_level
+from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.smoothing import smooth
+from kinertia.studies.accuracy import held
+from kinertia.studies.table1 import MARGIN_S, START_SHARE
+from kinertia.synthetic.noise import camera_noise, study_noise
+from kinertia.synthetic.walk import SyntheticTrial
+from kinertia.trial.data import Markers
 from measured_trials import table
 from synthetic_walks import FIRST_SEED, observation_of, study_walk
 

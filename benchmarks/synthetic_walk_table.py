@@ -1,4 +1,4 @@
-"""Makes the package's synthetic walk: `src/kinertia/data/standing.csv` and `walk.csv`, from the measured gait2354 walk.
+"""Makes the package's synthetic walk, `src/kinertia/synthetic/data/*.csv`, from the measured gait2354 walk.
 
 The walk is a truncated Fourier series of every coordinate, fitted to the inverse kinematics of two treadmill strides
 of OpenSim's gait2354 example; then, as in the study, the pelvis is modified until the motion asks for the measured
@@ -18,22 +18,22 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize_scalar
 
-from kinertia.config import Subject
-from kinertia.contacts import build_trial
-from kinertia.dynamics import Motion, residual, root_derivatives
+from kinertia.estimation.prepare import calibrate
 from kinertia.io.recording import read_recording
-from kinertia.kinematics import Kinematics, solve_kinematics
-from kinertia.marker_set import read_marker_set
-from kinertia.prepare import calibrate
-from kinertia.skeleton import Skeleton
-from kinertia.synthetic import walking_subject
-from kinertia.trial import Recording, Trial, runs
+from kinertia.model.marker_set import read_marker_set
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, residual, root_derivatives
+from kinertia.motion.kinematics import Kinematics, solve_kinematics
+from kinertia.settings import Subject
+from kinertia.synthetic.walk import walking_subject
+from kinertia.trial.data import Recording, Trial, runs
+from kinertia.trial.plate_assignment import build_trial
 
 HARMONICS = 8
 STANDING = {"elbow_flex_r": 1.2, "elbow_flex_l": 1.2, "arm_add_r": -0.25, "arm_add_l": -0.25}
 PELVIS_SD_M, PELVIS_SD_RAD = 0.01, 0.02
 FORCE_SD_N, MOMENT_SD_NM = 3.0, 1.0
-DATA = Path(__file__).parents[1] / "src" / "kinertia" / "data"
+DATA = Path(__file__).parents[1] / "src" / "kinertia" / "synthetic" / "data"
 
 
 def basis(time: np.ndarray, period_s: float, order: int = 0) -> np.ndarray:

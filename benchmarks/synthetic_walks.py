@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.kinematics import Kinematics, solve_kinematics
-from kinertia.map_terms import Observation
-from kinertia.observation import CUTOFF_HZ, observe
-from kinertia.study import MARGIN_S, symmetric_truth
-from kinertia.synthetic import SyntheticTrial, walk, walking_subject
-from kinertia.trial import FootLoads, Markers, Trial
+from kinertia.estimation.simultaneous.observation import CUTOFF_HZ, observe
+from kinertia.estimation.simultaneous.problem import Observation
+from kinertia.motion.kinematics import Kinematics, solve_kinematics
+from kinertia.studies.table1 import MARGIN_S, symmetric_truth
+from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
+from kinertia.trial.data import FootLoads, Markers, Trial
 
 STRIDE_S = 1.24
 FIRST_SEED = 1

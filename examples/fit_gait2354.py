@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from kinertia import Subject, read_recording
-from kinertia.anthropometry import literature_bsp
-from kinertia.bsp import BodySegmentParameters
-from kinertia.contacts import build_trial
-from kinertia.dynamics import joined, residual
-from kinertia.ik import rms
-from kinertia.kinematics import facing, solve_kinematics
-from kinertia.marker_set import choose_marker_set
-from kinertia.prepare import calibrate
-from kinertia.two_level import Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.estimation.prepare import calibrate
+from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.model.anthropometry import literature_bsp
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.marker_set import choose_marker_set
+from kinertia.motion.dynamics import joined, residual
+from kinertia.motion.inverse_kinematics import rms
+from kinertia.motion.kinematics import facing, solve_kinematics
+from kinertia.trial.plate_assignment import build_trial
 
 
 def show(title: str, load: np.ndarray) -> None:

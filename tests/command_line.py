@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinertia.cli import main
+from kinertia.cli.app import main
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import settings
 
 from command_line import fitted
-from kinertia.config import Settings, Subject
-from kinertia.demo import Demo, run_demo
-from kinertia.fit import estimate_bsp
+from kinertia.cli.demo import Demo, run_demo
+from kinertia.estimation.estimate import estimate_bsp
+from kinertia.estimation.prepare import TrialInput
 from kinertia.io.recording import read_recording
-from kinertia.prepare import TrialInput
-from kinertia.two_level import TwoLevelResult, correct_pelvis
+from kinertia.settings import Settings, Subject
+from quick_two_level import given_back
 from walks import fit_arguments
 
 # no test judges time: machines are busy
@@ -55,23 +55,18 @@ def fit_of(shared_data, tmp_path_factory):
     return get
 
 
-def given_back(skeleton, start, windows, symmetric=True, progress=None):
-    """In place of the two-level estimate: its start, without the seconds of iterating."""
-    return TwoLevelResult(start, tuple(correct_pelvis(skeleton, start, w) for w in windows), (), (0.0, 0.0), 1, True)
-
-
 @pytest.fixture(scope="session")
 def demo_run(tmp_path_factory) -> tuple[Demo, Path]:
     """Outcome of `run_demo` and its folder, with a two-level estimate that stays at its start."""
     folder = tmp_path_factory.mktemp("demo") / "out"
-    with mock.patch("kinertia.fit.estimate_two_level", given_back):
+    with mock.patch("kinertia.estimation.estimate.estimate_two_level", given_back):
         return run_demo(folder), folder
 
 
 @pytest.fixture
 def few_evaluations(monkeypatch):
     """Stops the estimate early: enough for tests of everything around it."""
-    monkeypatch.setattr("kinertia.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS)
+    monkeypatch.setattr("kinertia.estimation.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS)
 
 
 @pytest.fixture(scope="session")
@@ -82,7 +77,7 @@ def short_fit(shared_data):
         TrialInput(replace(walk, name=name), window, 0.25)
         for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
     ]
-    with mock.patch("kinertia.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
+    with mock.patch("kinertia.estimation.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
         return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
 
 

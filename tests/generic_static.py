@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.dynamics import Motion, residual
-from kinertia.gait27 import Gait27, build_gait27
-from kinertia.marker_set import read_marker_set
-from kinertia.trial import Markers, Recording
+from kinertia.model.gait27 import Gait27, build_gait27
+from kinertia.model.marker_set import read_marker_set
+from kinertia.motion.dynamics import Motion, residual
+from kinertia.trial.data import Markers, Recording
 
 # (x forward, y up, z right) in shares of the stature; right side of those that come in pairs
 _MIDDLE = {"V.Sacral": (-0.065, 0.56, 0.0), "Sternum": (0.06, 0.75, 0.0), "Top.Head": (0.0, 1.0, 0.0)}

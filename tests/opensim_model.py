@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import opensim as osim
 
-from kinertia.bsp import BodySegmentParameters
-from kinertia.io.osim_export import export_osim
-from kinertia.skeleton import Skeleton
+from kinertia.io.osim.exporter import export_osim
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
 
 osim.Logger.removeFileSink()
 osim.Logger.setLevelString("Off")

@@ -115,3 +115,46 @@ def model(
 </Model>
 </OpenSimDocument>
 """
+
+
+def old_body(name: str, mass: str, joint_text: str) -> str:
+    names = [f"inertia_{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    moments = zip(names, (0.02, 0.01, 0.03, 0.001, -0.002, 0.003), strict=True)
+    tensor = "".join(f"<{tag}>{value}</{tag}>" for tag, value in moments)
+    return (
+        f'<Body name="{name}"><mass>{mass}</mass><mass_center>0.02 -0.1 0.03</mass_center>{tensor}'
+        f"<Joint>{joint_text}</Joint></Body>"
+    )
+
+
+def old_joint(kind: str, name: str, parent: str, coordinates: str, place: str, inside: str = "") -> str:
+    held = "".join(
+        f'<Coordinate name="{c}"><motion_type>rotational</motion_type><default_value>0</default_value>'
+        f"<range>-3 3</range><clamped>false</clamped><locked>false</locked></Coordinate>"
+        for c in coordinates.split()
+    )
+    return (
+        f'<{kind} name="{name}"><parent_body>{parent}</parent_body>{place}'
+        f'<CoordinateSet name=""><objects>{held}</objects></CoordinateSet><reverse>false</reverse>{inside}</{kind}>'
+    )
+
+
+def old_model() -> str:
+    standing = "<location_in_parent>0 0 0</location_in_parent><orientation_in_parent>0 0 0</orientation_in_parent>"
+    standing += "<location>0 0 0</location><orientation>0 0 0</orientation>"
+    turned = "<location_in_parent>0.1 -0.2 0.3</location_in_parent><orientation_in_parent>0.1 0.2 0.3"
+    turned += "</orientation_in_parent><location>0 0.2 0</location><orientation>0.2 -0.1 0</orientation>"
+    names = "tilt list turn tx ty tz"
+    directions = ("0 0 1", "1 0 0", "0 1 0", "1 0 0", "0 1 0", "0 0 1")
+    wrapped = f"<function>{LINEAR}</function>"
+    root = transform([(name, axis, wrapped) for name, axis in zip(names.split(), directions, strict=True)])
+    bodies = old_body("pelvis", "10", old_joint("CustomJoint", "root", "ground", names, standing, root))
+    bodies += old_body("leg", "3", old_joint("PinJoint", "hip", "pelvis", "flexion", turned))
+    marker = '<Marker name="M"><body>leg</body><location>0.1 -0.2 0.05</location><fixed>false</fixed></Marker>'
+    return f"""<?xml version="1.0" encoding="UTF-8" ?>
+<OpenSimDocument Version="30000"><Model name="old"><gravity> 0 -9.81 0</gravity>
+<BodySet name=""><objects><Body name="ground"><mass>0</mass><mass_center>0 0 0</mass_center><inertia_xx>0</inertia_xx>
+<inertia_yy>0</inertia_yy><inertia_zz>0</inertia_zz><inertia_xy>0</inertia_xy><inertia_xz>0</inertia_xz>
+<inertia_yz>0</inertia_yz><Joint /></Body>{bodies}</objects></BodySet>
+<ConstraintSet name=""><objects /></ConstraintSet>
+<MarkerSet name=""><objects>{marker}</objects></MarkerSet></Model></OpenSimDocument>"""

@@ -10,13 +10,13 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
-from kinertia.bsp_prior import BspPrior, literature_prior
-from kinertia.gait27 import HIP_OFFSETS
-from kinertia.instruments import FootPlates
-from kinertia.io.osim import read_osim
-from kinertia.map_terms import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
-from kinertia.splines import smooth
-from kinertia.synthetic import SyntheticTrial, walk, walking_subject
+from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.plates import FootPlates
+from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
+from kinertia.io.osim.reader import read_osim
+from kinertia.model.gait27 import HIP_OFFSETS
+from kinertia.motion.smoothing import smooth
+from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")

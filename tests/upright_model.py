@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.anthropometry import BodyGeometry, literature_bsp, reference_lengths
-from kinertia.bsp import BodySegmentParameters
-from kinertia.joint_centres import lumbar_in_pelvis
-from kinertia.skeleton import Axis, Joint, Marker, Skeleton
+from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.joint_centres import lumbar_in_pelvis
+from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
 MASS_KG, HEIGHT_M, SEX = 75.0, 1.77, "male"
 WIDTH_M = (0.085 - 0.0073) / 0.33  # of a pelvis with the hips at 0.085 m, by Harrington

@@ -14,8 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from kinertia.skeleton import Pose
-from kinertia.synthetic import SyntheticTrial, centre_of_pressure, walk, walking_subject
+from kinertia.model.skeleton import Pose
+from kinertia.synthetic.walk import SyntheticTrial, centre_of_pressure, walk, walking_subject
 
 FOLDER = Path(__file__).resolve().parents[1] / "figures"
 # Okabe and Ito: told apart by everybody

@@ -14,9 +14,9 @@ from typing import Any
 
 import typer
 
-from kinertia.cli import app
-from kinertia.config import Model, Settings, Subject, Table, TrialFiles
-from kinertia.marker_set import LANDMARKS, SEGMENTS, WIDTHS
+from kinertia.cli.app import app
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
+from kinertia.settings import Model, Settings, Subject, Table, TrialFiles
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))

@@ -7,15 +7,15 @@ from importlib.metadata import version
 
 __version__ = version("kinertia")
 
-# `kinertia.results` writes the version, so it must be there before the imports
-from kinertia.bsp import BodySegmentParameters
-from kinertia.config import Settings, Subject, read_subject
+# `kinertia.report.files` writes the version, so it must be there before the imports
 from kinertia.errors import KinertiaError
-from kinertia.fit import Fit, TrialFit, estimate_bsp
+from kinertia.estimation.estimate import Fit, TrialFit, estimate_bsp
+from kinertia.estimation.prepare import TrialInput
 from kinertia.io.recording import read_recording
-from kinertia.marker_set import read_marker_set
-from kinertia.prepare import TrialInput
-from kinertia.results import save_fit
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.marker_set import read_marker_set
+from kinertia.report.files import save_fit
+from kinertia.settings import Settings, Subject, read_subject
 
 __all__ = [
     "BodySegmentParameters",

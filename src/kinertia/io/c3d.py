@@ -19,9 +19,9 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.io.c3d_plates import LabPlates, lab_plates, to_ground_plates
-from kinertia.io.rows import expect_file
+from kinertia.io.number_table import expect_file
 from kinertia.io.trc import METRES_PER_UNIT
-from kinertia.trial import BoolArray, FloatArray, Markers, Recording
+from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
 _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
 _BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.trial import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
-from kinertia.trial import FloatArray, PlateLoads, Recording
+from kinertia.trial.data import FloatArray, PlateLoads, Recording
 
 _TO_LAB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Ground axes (Y up) to lab axes (Z up): x stays, lab y points to the person's left."""

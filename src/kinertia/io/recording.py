@@ -7,10 +7,10 @@ from pathlib import Path
 
 from kinertia.errors import FileError, TrialError
 from kinertia.io.c3d import read_c3d
-from kinertia.io.loads import read_forces_with_notes
-from kinertia.io.rows import expect_file
+from kinertia.io.ground_forces import read_forces_with_notes
+from kinertia.io.number_table import expect_file
 from kinertia.io.trc import read_trc_recording
-from kinertia.trial import Recording
+from kinertia.trial.data import Recording
 
 
 def read_recording(

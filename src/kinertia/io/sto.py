@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from kinertia.errors import FileError
-from kinertia.io.rows import read_lines, read_rows
+from kinertia.io.number_table import read_lines, read_rows
 
 _ROW_KEYS = ("nrows", "datarows")
 _COLUMN_KEYS = ("ncolumns", "datacolumns")

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.bsp import PARAMETERS
-from kinertia.fit import Fit
+from kinertia.estimation.estimate import Fit
+from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.model.bsp import PARAMETERS
 from kinertia.report import style
 from kinertia.report.panels import Panel, base_layout, compact, small_multiples
 from kinertia.report.wording import decimals, fixed, read_in, start_of
-from kinertia.simultaneous_fit import Posterior
 
 DEPARTURE_SD = 2.0
 """Estimates further from where they started than this many prior deviations are pointed out."""

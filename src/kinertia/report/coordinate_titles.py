@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinertia.skeleton import Skeleton
+from kinertia.model.skeleton import Skeleton
 
 _GAIT27 = {
     "pelvis_tx": "Pelvis forward",
@@ -27,7 +27,7 @@ _GAIT27 = {
     "arm_add": "Shoulder adduction +",
     "elbow_flex": "Elbow flexion +",
 }
-"""Signs as in `kinertia.gait27`; other models may have others, so their coordinates keep their names."""
+"""Signs as in `kinertia.model.gait27`; other models may have others, so their coordinates keep their names."""
 
 
 @dataclass(frozen=True)

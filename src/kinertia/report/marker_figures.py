@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.fit import TrialFit
+from kinertia.estimation.estimate import TrialFit
 from kinertia.report import style
 from kinertia.report.panels import base_layout, compact, plain
-from kinertia.trial import runs
+from kinertia.trial.data import runs
 
 _ROW_PX = 17
 _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.fit import Fit, TrialFit
-from kinertia.ik import rms
+from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.motion.inverse_kinematics import rms
+from kinertia.report.headline import words
 from kinertia.report.page import bsp_rows, rendered, residual_rows
-from kinertia.report.verdict import words
 from kinertia.report.wording import start_of
-from kinertia.trial import LOAD_THRESHOLD_N, Markers, Recording, Trial
+from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial
 
 
 def fit_html(fit: Fit) -> str:

@@ -17,11 +17,13 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from kinertia import __version__
-from kinertia.bsp import PARAMETERS
-from kinertia.fit import Fit, TrialFit
-from kinertia.identifiability import evidence
-from kinertia.provenance import Provenance, versions
+from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
+from kinertia.io.provenance import Provenance, versions
+from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
+from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
 from kinertia.report.time_figures import (
@@ -32,10 +34,8 @@ from kinertia.report.time_figures import (
     residual_figure,
     rms_length,
 )
-from kinertia.report.verdict import held_sentence, hidden_combinations, words
 from kinertia.report.wording import decimals, fixed, read_in, start_of
-from kinertia.simultaneous_fit import SHOWN_UNIT
-from kinertia.trial import runs
+from kinertia.trial.data import runs
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""

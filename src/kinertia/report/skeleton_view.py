@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.bsp import BodySegmentParameters
-from kinertia.fit import Fit, TrialFit
-from kinertia.kinematics import Kinematics
+from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.bsp_figures import segment_name
 from kinertia.report.panels import base_layout
-from kinertia.skeleton import Skeleton
-from kinertia.trial import LOAD_THRESHOLD_N
+from kinertia.trial.data import LOAD_THRESHOLD_N
 
 _PLOTLY_FRAMES = 60
 """Plotly redraws the whole scene for every frame."""

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.fit import TrialFit
-from kinertia.ik import rms
-from kinertia.kinematics import Kinematics
+from kinertia.estimation.estimate import TrialFit
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.inverse_kinematics import rms
+from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate, panels_of
-from kinertia.report.gait_events import GaitEvent, gait_events
 from kinertia.report.panels import Panel, compact, small_multiples
 from kinertia.report.wording import LITERATURE, Start
-from kinertia.skeleton import Skeleton
+from kinertia.trial.gait_events import GaitEvent, gait_events
 
 MOST_FRAMES = 1600
 """Drawn per curve."""

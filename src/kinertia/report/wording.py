@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from kinertia.bsp import UNITS
-from kinertia.fit import Fit
+from kinertia.estimation.estimate import Fit
+from kinertia.model.bsp import UNITS
 
 _READ_IN = {"m": ("mm", 1e3)}
 _DECIMALS = {"kg": 2, "m": 1}
@@ -38,7 +38,7 @@ def start_of(fit: Fit) -> Start:
 
 
 def read_in(k: int) -> tuple[str, float]:
-    """Unit in which people read parameter k of `kinertia.bsp.PARAMETERS` (kg, mm, kg m2), and the factor to it."""
+    """Unit in which people read parameter k of `PARAMETERS` (kg, mm, kg m2), and the factor to it."""
     return _READ_IN.get(UNITS[k], (UNITS[k], 1.0))
 
 

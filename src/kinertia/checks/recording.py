@@ -1,0 +1,363 @@
+"""Is a recording fit for a fit? What its files hold, and verdicts in words, before any model is built."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
+from kinertia.checks.verdict import Verdict
+from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
+from kinertia.estimation.input_checks import CONTRADICTING_MASS, FORCE_MASS_TOLERANCE
+from kinertia.io.osim.reader import OsimModel
+from kinertia.model.anatomy import segment_of
+from kinertia.model.gait27 import build_gait27
+from kinertia.model.marker_set import MarkerSet, check_marker_set, choose_marker_set, nearest_labels, nearest_preset
+from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
+from kinertia.trial.data import Markers, Recording, Trial
+from kinertia.trial.free_moment import mean_turning
+from kinertia.trial.ground_contact import FootMarkers
+from kinertia.trial.marker_quality import Travel, Visibility, axes_trouble, extent_m, travel, visibility
+from kinertia.trial.plate_assignment import build_trial
+
+OFF_PLATE_SHARE = 0.05
+"""More of the firm load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
+_RARE = 0.5
+_LISTED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerSetMatch:
+    """Which labels of a marker set a recording has.
+
+    Attributes:
+        name: of the set.
+        fits: whether it is the recording's set; if not, it is the nearest preset.
+        missing: labels of the set that the recording lacks, each with those of `others` that look most alike.
+        n_labels: of the set.
+        others: labels of the recording that are not in the set and stay unused.
+        of_model: whether the set is the markers of an OpenSim model.
+    """
+
+    name: str
+    fits: bool
+    missing: dict[str, list[str]]
+    n_labels: int
+    others: tuple[str, ...]
+    of_model: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingCheck:
+    """Findings about one recording; times in s on its own clock.
+
+    Attributes:
+        recording: what was read.
+        marker_set: how its labels fit.
+        markers: visibility, over the whole recording, of the set's markers, or of all where no set fits.
+        travel: what the person does.
+        plates: one entry per plate; empty without forces.
+        windows: stretches in which every foot on the ground stands on a plate, longest first.
+        mass: by the vertical force, or None.
+        scale_kg: body mass as given or as the file tells, or None.
+        verdicts: what speaks for and against a fit with this recording.
+        notes: assumptions made while reading and sorting the loads.
+    """
+
+    recording: Recording
+    marker_set: MarkerSetMatch
+    markers: tuple[Visibility, ...]
+    travel: Travel
+    plates: tuple[PlateCheck, ...]
+    windows: tuple[tuple[float, float], ...]
+    mass: ForceMass | None
+    scale_kg: float | None
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...]
+
+    def facts(self) -> list[tuple[str, str]]:
+        """What was measured and how, as pairs of a name and a sentence."""
+        markers, plates, match = self.recording.markers, self.recording.plates, self.marker_set
+        rate = "" if len(markers.time) < 2 else f" at {markers.rate_hz:g} Hz, {markers.time[0]:.3f} to "
+        axes = f"lengths in {self.recording.length_unit}, {self.recording.vertical} up; read as m, Y up"
+        had = match.n_labels - len(match.missing)
+        named = f"{match.name}{'' if match.fits else ' (the nearest preset)'}: {had} of its {match.n_labels} labels"
+        missing = [label + (f" ({' or '.join(near)}?)" if near else "") for label, near in match.missing.items()]
+        told = [
+            ("frames", f"{len(markers.time)}{rate}{markers.time[-1]:.3f} s" if rate else "1"),
+            ("in the file", axes),
+            ("the person", self.travel.sentence()),
+            ("labels", f"{len(markers.labels)}, {len(match.others)} of them not of the set"),
+            ("marker set", named if had else "none known"),
+        ]
+        if missing and had:
+            told.append(("missing labels", ", ".join(missing)))
+        if plates is None:
+            return [*told, ("forces", "none")]
+        rate_hz = (len(plates.time) - 1) / (plates.time[-1] - plates.time[0])
+        told.append(("forces", f"{len(plates.names)} plates at {rate_hz:.6g} Hz"))
+        spans = [f"{start:.3f} to {end:.3f} s" for start, end in self.windows]
+        told.append(("all contact measured", ", ".join(spans) or "nowhere, or unknown"))
+        if self.mass is not None:
+            mass = self.mass
+            told.append(
+                (
+                    "vertical force",
+                    f"{mass.mass_kg:.1f} kg, mean over {mass.over} ({mass.start_s:.2f} to {mass.end_s:.2f} s)",
+                )
+            )
+        return told
+
+
+def check_recording(
+    recording: Recording,
+    marker_set: MarkerSet | None = None,
+    mass_kg: float | None = None,
+    window_s: tuple[float, float] | None = None,
+) -> RecordingCheck:
+    """Look at one recording as a fit would, up to the first model.
+
+    Args:
+        recording: markers, and forces where there are any.
+        marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
+        mass_kg: by the scale; the file's own if None.
+        window_s: the stretch that the user vouches for.
+    """
+    match, used = _match(recording.markers.labels, marker_set)
+    own = recording.markers
+    if used is not None:
+        own = own.select([label for label in used.labels if label in own.labels])
+    moves, seen = travel(own), visibility(own)
+    standing = moves.kind == "stands still"
+    found, feet = [*_axes(own), *_labels(match)], None
+    if used is not None:
+        feet, trouble = _feet(recording.markers.labels, used)
+        found += trouble
+        if used.landmarks:
+            found += _facing(recording.markers, used, moves)
+            found += _static(recording, used) if standing else []
+    plates = check_plates(recording, feet)
+    trial, notes, told = _trial(recording, feet, window_s, standing)
+    windows = () if trial is None else tuple(trial.windows())
+    within = own.cut(*windows[0]) if windows else own
+    mass = None if trial is None else mass_by_strides(trial, standing)
+    scale = recording.mass_kg if mass_kg is None else mass_kg
+    found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
+    found += [] if trial is None or used is None else _turning(trial, used)
+    return RecordingCheck(recording, match, seen, moves, plates, windows, mass, scale, tuple(found), tuple(notes))
+
+
+def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
+    """The preset that a fit would choose for one of these recordings of one person; None if for none."""
+    for recording in recordings:
+        with suppress(MarkerSetError):
+            return choose_marker_set(recording.markers.labels)
+    return None
+
+
+def markers_of_model(model: OsimModel) -> MarkerSet:
+    """The markers of an OpenSim model by segment, without landmarks: no model is built from them.
+
+    Raises:
+        OsimError: there are none.
+    """
+    markers = model.skeleton.markers
+    if not markers:
+        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
+    names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
+    segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}
+    return MarkerSet(model.path.name, {}, segments, {})
+
+
+def _match(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:
+    """How the labels fit the set, or the nearest preset; and the set if it is theirs."""
+    wanted = nearest_preset(labels) if marker_set is None else marker_set
+    used: MarkerSet | None = wanted
+    try:
+        if marker_set is None:
+            choose_marker_set(labels)
+        elif marker_set.landmarks:
+            check_marker_set(marker_set, labels)
+        elif not set(marker_set.labels) & set(labels):
+            used = None
+    except MarkerSetError:
+        used = None
+    others = tuple(label for label in labels if label not in wanted.labels)
+    missing = nearest_labels([label for label in wanted.labels if label not in labels], others)
+    return MarkerSetMatch(
+        wanted.name, used is not None, missing, len(wanted.labels), others, not wanted.landmarks
+    ), used
+
+
+def _axes(markers: Markers) -> list[Verdict]:
+    trouble = axes_trouble(extent_m(markers))
+    return [Verdict("against", trouble)] if trouble else []
+
+
+def _labels(match: MarkerSetMatch) -> list[Verdict]:
+    had = match.n_labels - len(match.missing)
+    if match.fits:
+        return [Verdict("good", f"{had} of the {match.n_labels} labels of the marker set {match.name} are there")]
+    if match.of_model:
+        return [Verdict("against", f"no label of the model {match.name} is in the file; expected its markers' names")]
+    nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are there"
+    nearest = nearest if had else "no preset shares a label with the file"
+    return [
+        Verdict(
+            "against",
+            f"no marker set fits ({nearest}), so it is unknown which markers are on which foot; write a marker set as "
+            f"TOML and name it with --markers",
+        )
+    ]
+
+
+def _never(seen: Sequence[Visibility], known: bool) -> list[Verdict]:
+    """Markers of the set that no frame shows; a fit refuses them."""
+    never = [one.label for one in seen if one.share == 0.0]
+    if not never:
+        return []
+    told = f"in no frame: {_some(never)}; label them, or remove them from the file if they were not worn"
+    return [Verdict("against" if known else "okay", told)]
+
+
+def _gaps(markers: Markers) -> list[Verdict]:
+    """Gaps of the markers within the frames that a fit would use."""
+    shown = [one for one in visibility(markers) if one.share > 0.0]
+    rare = [f"{one.label} ({100 * one.share:.0f} %)" for one in shown if one.share < _RARE]
+    long = [
+        f"{one.label} ({one.longest_gap_s:.2f} s)"
+        for one in shown
+        if one.share >= _RARE and one.longest_gap_s > LONGEST_BRIDGE_S
+    ]
+    where = f"from {markers.time[0]:.3f} to {markers.time[-1]:.3f} s"
+    found = []
+    if rare:
+        found.append(Verdict("okay", f"seen in less than half of the frames {where}: {_some(rare)}"))
+    if long:
+        found.append(Verdict("okay", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {_some(long)}"))
+    return found or [Verdict("good", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first few of a list, and how many more there are."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | None, list[Verdict]]:
+    """Labels on each foot, None unless both have one; and what else a fit would refuse for want of markers."""
+    feet = {side: [label for label in own if label in labels] for side, own in marker_set.foot_labels().items()}
+    arms = ("upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l")
+    needed = set(marker_set.segments) - set(arms) if marker_set.landmarks else {"foot_r", "foot_l"}
+    bare = [
+        segment
+        for segment, own in marker_set.segments.items()
+        if segment in needed and (own or not marker_set.landmarks) and not set(own) & set(labels)
+    ]
+    found = []
+    if bare:
+        found.append(Verdict("against", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
+    return (feet if all(feet.values()) else None), found
+
+
+def _facing(markers: Markers, marker_set: MarkerSet, moves: Travel) -> list[Verdict]:
+    try:
+        rotation, _ = facing(markers, marker_set)
+    except MarkerSetError as error:
+        return [Verdict("against", str(error))]
+    if moves.kind != "walks":
+        return []
+    angle = np.radians(moves.direction_deg)
+    forward = rotation.T @ np.array([1.0, 0.0, 0.0])
+    if forward @ np.array([np.cos(angle), 0.0, -np.sin(angle)]) > 0:
+        return []
+    return [
+        Verdict(
+            "okay", "by the pelvis markers the person walks backwards; if not so, left and right labels are swapped"
+        )
+    ]
+
+
+def _static(recording: Recording, marker_set: MarkerSet) -> list[Verdict]:
+    """Whether the model can be built from this static trial; that depends on neither stature nor sex."""
+    try:
+        build_gait27(recording, marker_set, 1.7, "male")
+    except KinertiaError as error:
+        return [Verdict("against", f"no model can be built from this static trial: {error}")]
+    return [Verdict("good", "the person stands still, with all landmarks that the model needs: a static trial")]
+
+
+def _trial(
+    recording: Recording, feet: FootMarkers | None, window_s: tuple[float, float] | None, standing: bool
+) -> tuple[Trial | None, tuple[str, ...], list[Verdict]]:
+    """The loads sorted by foot, notes, and whether all ground contact is known somewhere."""
+    if recording.plates is None:
+        told = "no forces: a fit needs them; name the force file too, or a C3D file with plates"
+        return None, recording.notes, [] if standing else [Verdict("okay", told)]
+    if feet is None:
+        return None, recording.notes, []
+    try:
+        trial = build_trial(recording, feet, window_s)
+    except KinertiaError as error:
+        problem = error.problem if isinstance(error, TrialError) else str(error)
+        return None, recording.notes, [] if standing else [Verdict("against", problem)]
+    return trial, trial.notes, [] if standing else [_measured(trial, window_s is not None)]
+
+
+def _measured(trial: Trial, by_user: bool) -> Verdict:
+    start, end = trial.windows()[0]
+    frames = len(trial.markers.cut(start, end).time)
+    what = "the window given by the user goes" if by_user else "every foot on the ground stands on a plate"
+    told = f"{what} from {start:.3f} to {end:.3f} s ({frames} frames)"
+    if frames < FEWEST_FRAMES:
+        return Verdict("against", f"{told}; a fit needs at least {FEWEST_FRAMES} frames")
+    return Verdict("good", told)
+
+
+def _pressure(plates: Sequence[PlateCheck]) -> list[Verdict]:
+    known = [plate for plate in plates if plate.outside_share is not None]
+    off = [(plate, plate.outside_share) for plate in known if (plate.outside_share or 0.0) > OFF_PLATE_SHARE]
+    if known and not off:
+        return [Verdict("good", "the centres of pressure lie on the plates")]
+    return [
+        Verdict(
+            "against" if share > 0.5 else "okay",
+            f"{plate.name}: the centre of pressure is off the plate in {100 * share:.0f} % of the loaded samples, by "
+            f"up to {100 * plate.outside_m:.0f} cm; check the plate's corners, origin and units",
+        )
+        for plate, share in off
+        if share is not None
+    ]
+
+
+def _turning(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
+    markers = trial.markers.cut(*trial.windows()[0])
+    worn = [label for label in marker_set.segments.get("pelvis", ()) if label in markers.labels]
+    pelvis = markers.select(worn).positions
+    seen = np.isfinite(pelvis).all(axis=(1, 2))
+    if not worn or not seen.any():
+        return []
+    found = mean_turning(trial.loads, markers.time[seen], pelvis[seen].mean(axis=1))
+    return [] if found is None else [Verdict("okay" if found.contradicts else "good", found.sentence())]
+
+
+def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
+    if mass is None or scale_kg is None:
+        return []
+    off = mass.mass_kg / scale_kg - 1
+    told = (
+        f"the vertical force carries {mass.mass_kg:.1f} kg (mean over {mass.over}), the scale says {scale_kg:.1f} kg "
+        f"({100 * off:+.1f} %)"
+    )
+    if abs(off) <= FORCE_MASS_TOLERANCE:
+        return [Verdict("good", told)]
+    return [
+        Verdict(
+            "against" if abs(off) > CONTRADICTING_MASS else "okay",
+            f"{told}; check the mass, and the gain and zero of the plates",
+        )
+    ]

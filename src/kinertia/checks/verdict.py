@@ -1,0 +1,147 @@
+"""Can this result be used? Verdicts in words on a finished fit; the thresholds stand here and nowhere else.
+
+Residuals are judged by OpenSim's published guideline for residual reduction ("Simulation with OpenSim - Best Practices"
+and Hicks et al. 2015, J Biomech Eng 137:020905), which also wants the peak force below 5 % of the largest external
+force. OpenSim judges each axis on its own; here it is the length of the vector, as in `fit.json`, which is stricter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from kinertia.estimation.input_checks import CONTRADICTING_COM_M
+from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, second_moments
+
+if TYPE_CHECKING:
+    from kinertia.estimation.estimate import Fit, TrialFit
+
+Level = Literal["good", "okay", "against"]
+
+GOOD_FORCE_N, OKAY_FORCE_N = (5.0, 10.0), (10.0, 25.0)
+"""Residual force: largest RMS, largest peak."""
+GOOD_MOMENT_NM, OKAY_MOMENT_NM = (30.0, 50.0), (50.0, 75.0)
+"""Residual moment: largest RMS, largest peak."""
+PEAK_FORCE_SHARE = 0.05
+"""Largest share of the peak external force that the peak residual force may have."""
+
+GOOD_MARKERS_M, OKAY_MARKERS_M = 0.012, 0.020
+"""RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
+
+_ROUNDING = 1e-6
+_NAMED = 4
+
+
+class Verdict(NamedTuple):
+    """One judgement: "good", "okay" or "against" using the numbers, and why, in one sentence."""
+
+    level: Level
+    sentence: str
+
+
+def verdicts(fit: Fit) -> list[Verdict]:
+    """What speaks for and against using a fit: convergence, physics, the literature, residuals and markers of every
+    trial.
+    """
+    found = [_convergence(fit), _physics(fit.estimate), _literature(fit)]
+    for trial in fit.trials:
+        found += [*_residuals(trial), _markers(fit, trial)]
+    return found
+
+
+def stands_against(found: Iterable[Verdict]) -> bool:
+    """Whether any verdict is against: exit status 1."""
+    return any(verdict.level == "against" for verdict in found)
+
+
+def _convergence(fit: Fit) -> Verdict:
+    if fit.converged:
+        return Verdict("good", "the estimate converged")
+    return Verdict("against", "the estimate did not converge: the best step is reported")
+
+
+def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
+    """Segments that no distribution of mass can have.
+
+    Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
+    the triangle inequality, as rounded inertias have it) is let pass.
+    """
+    table, second = bsp.table(), np.linalg.eigvalsh(second_moments(bsp.inertia_kgm2))
+    there = table[:, [0, *range(4, 10)]].any(axis=1)
+    wrong = (bsp.mass_kg <= 0) | (second[:, 0] < -_ROUNDING * np.abs(second).max(axis=1))
+    return [bsp.segments[i] for i in np.flatnonzero(there & wrong)]
+
+
+def _physics(bsp: BodySegmentParameters) -> Verdict:
+    impossible = impossible_segments(bsp)
+    if not impossible:
+        return Verdict("good", "every segment is physically possible")
+    named = ", ".join(impossible[:_NAMED]) + (f" and {len(impossible) - _NAMED} more" if impossible[_NAMED:] else "")
+    return Verdict("against", f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({named})")
+
+
+def _literature(fit: Fit) -> Verdict:
+    """The estimate against what it was expected to be near: by prior deviations where there are any."""
+    change = fit.estimate.table() - fit.literature.table()
+    if fit.posterior is None:
+        moved = np.linalg.norm(change[:, 1:4], axis=1)
+        worst = int(np.argmax(moved))
+        far = int((moved > CONTRADICTING_COM_M).sum())
+        what = f"centres of mass more than {CONTRADICTING_COM_M * 1e3:g} mm"
+        told = f"{fit.estimate.segments[worst]}: {moved[worst] * 1e3:.0f} mm"
+    else:
+        away = np.abs(change) / np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
+        row, column = np.unravel_index(int(np.argmax(away)), away.shape)
+        far = int((away > CONTRADICTION_SD).sum())
+        what = f"parameters more than {CONTRADICTION_SD:g} prior deviations"
+        told = f"{PARAMETERS[column]} of {fit.estimate.segments[row]}: {away[row, column]:.1f}"
+    source = "the literature" if fit.file is None else "the model's own"
+    said = f"{what} from {source}: {far or 'none'} (farthest, {told})"
+    if not far:
+        return Verdict("good", said)
+    return Verdict("against", f"{said}: the data contradict the model")
+
+
+def _residuals(trial: TrialFit) -> list[Verdict]:
+    force, moment = (np.linalg.norm(part, axis=1) for part in np.hsplit(trial.residuals["estimate"], 2))
+    external = float(np.linalg.norm(trial.kinematics.foot_loads[:, :, :3].sum(axis=1), axis=1).max())
+    share = float(force.max()) / external
+    small: Level = "good" if share <= PEAK_FORCE_SHARE else "against"
+    return [
+        _by_guideline(f"{trial.name}: residual force", "N", force, GOOD_FORCE_N, OKAY_FORCE_N),
+        _by_guideline(f"{trial.name}: residual moment", "N m", moment, GOOD_MOMENT_NM, OKAY_MOMENT_NM),
+        Verdict(
+            small,
+            f"{trial.name}: the peak residual force is {100 * share:.1f} % of the peak external force "
+            f"({external:.0f} N); at most {100 * PEAK_FORCE_SHARE:g} % is acceptable",
+        ),
+    ]
+
+
+def _markers(fit: Fit, trial: TrialFit) -> Verdict:
+    """How far the model's markers are from the measured ones, at the motion that the forces go with."""
+    rms = float(np.sqrt(np.nanmean(np.square(trial.marker_errors_m["final"]))))
+    told = f"{trial.name}: model and measured markers are {rms * 1e3:.1f} mm apart (RMS)"
+    if rms <= GOOD_MARKERS_M:
+        return Verdict("good", f"{told}; at most {GOOD_MARKERS_M * 1e3:g} mm is good")
+    if rms <= OKAY_MARKERS_M:
+        return Verdict("okay", f"{told}; at most {OKAY_MARKERS_M * 1e3:g} mm is okay by OpenSim's guideline")
+    advice = "" if fit.file is None else "; let markers and joint centres move (--calibrate)"
+    return Verdict("against", f"{told}, beyond OpenSim's guideline ({OKAY_MARKERS_M * 1e3:g} mm){advice}")
+
+
+def _by_guideline(
+    what: str, unit: str, size: np.ndarray, good: tuple[float, float], okay: tuple[float, float]
+) -> Verdict:
+    """Verdict on vector lengths (w,) by limits of RMS and peak."""
+    rms, peak = float(np.sqrt(np.mean(np.square(size)))), float(size.max())
+    told = f"{what} RMS {rms:.1f} {unit}, peak {peak:.1f} {unit}"
+    levels: tuple[tuple[Level, tuple[float, float]], ...] = (("good", good), ("okay", okay))
+    for level, limits in levels:
+        if rms <= limits[0] and peak <= limits[1]:
+            at_most = f"at most {limits[0]:g} and {limits[1]:g} {unit}"
+            return Verdict(level, f"{told}: {level} by OpenSim's guideline ({at_most})")
+    return Verdict("against", f"{told}: beyond OpenSim's guideline (okay up to {okay[0]:g} and {okay[1]:g} {unit})")

@@ -1,0 +1,30 @@
+"""Options that several commands share, and what they do at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.terminal import be_quiet
+from kinertia.io.output_folder import check_folder, expect_own_folder
+
+
+def results_folder(folder: Path, force: bool) -> None:
+    """Refuse, before any work, a folder that results cannot or may not go to.
+
+    Raises:
+        FileError: it cannot be written to, or holds somebody else's files and `force` is False.
+    """
+    check_folder(folder)
+    if not force:
+        expect_own_folder(folder)
+
+
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
+Force = Annotated[bool, typer.Option("--force", help="Write into a folder that holds other files, too.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Show errors only; the exit status says the rest.")
+]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every assumption and detail as well.")]

@@ -1,0 +1,240 @@
+"""The commands on synthetic data: `kinertia demo`, `kinertia study ...`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from kinertia.cli.demo import Demo, run_demo
+from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.report.accuracy import HEADINGS, accuracy_rows, angles_sentence, moments_sentence, save_accuracy
+from kinertia.report.sensitivity import save_sensitivity
+from kinertia.report.table1 import save_table1, table1_rows
+from kinertia.settings import read_subject
+from kinertia.studies.accuracy import SCENARIOS, run_accuracy
+from kinertia.studies.sensitivity import KINDS, run_sensitivity
+from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
+
+study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
+
+
+def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
+    """Show what Kinertia does; needs no files.
+
+    A synthetic person walks through a synthetic laboratory; the files it leaves are estimated from, and the estimate is
+    compared with the truth.
+
+    [bold]Example[/]
+
+    kinertia demo -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        result = run_demo(output, progress=progress)
+    _report_demo(result, output)
+
+
+def _report_demo(result: Demo, folder: Path) -> None:
+    fit = result.fit
+    bodies = {
+        "truth": result.truth,
+        "literature": fit.literature,
+        "estimate": fit.estimate,
+        "two-level": result.two_level.estimate,
+    }
+    trial = fit.trials[0]
+    out.print(
+        "\nA synthetic person (72.6 kg, 1.803 m) whose body differs from the literature by 10 % in masses, 10 mm in "
+        "centres of mass and 10 % in moments of inertia (standard deviations) walked over two force plates. Measured "
+        "with: skin motion that follows the joints (10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere), "
+        f"cameras 0.5 mm, plates 1 N. {len(trial.time)} frames with all ground contact on the plates were used.\n"
+    )
+    table = plain_table("segment", "", "mass\n(kg)", "CoM off by\n(mm)", "Ixx\n(kg m2)", "Iyy", "Izz")
+    for i, segment in enumerate(result.truth.segments):
+        if segment.endswith("_l"):
+            continue
+        name = segment.removesuffix("_r")
+        for source, bsp in bodies.items():
+            off = np.linalg.norm(bsp.com_m[i] - result.truth.com_m[i])
+            moments = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
+            gap = "-" if source == "truth" else f"{off * 1e3:.0f}"
+            table.add_row(name, source, f"{bsp.mass_kg[i]:.2f}", gap, *moments)
+            name = ""
+    out.print(table)
+    sources = list(bodies)[1:]
+    errors = plain_table("RMS error against the truth", "", *sources)
+    found = [result.rms_errors(bodies[source]) for source in sources]
+    named = (
+        ("mass", "kg", ".2f", 1.0),
+        ("centre of mass", "mm", ".0f", 1e3),
+        ("moments of inertia", "kg m2", ".4f", 1.0),
+    )
+    for k, (what, unit, form, factor) in enumerate(named):
+        errors.add_row(what, unit, *(f"{values[k] * factor:{form}}" for values in found))
+    out.print(errors)
+    loads = {**trial.residuals, "two-level": result.two_level.trials[0].residuals["estimate"]}
+    out.print(
+        "residual at the pelvis, RMS: "
+        + "; ".join(f"{stage} {_rms(load[:, :3]):.1f} N, {_rms(load[:, 3:]):.1f} N m" for stage, load in loads.items())
+        + "\n"
+    )
+    out.print(_verdict(found[0], found[1]) + "\n")
+    out.print(_two_level_verdict(found[0], found[2]) + "\n")
+    for name, one in (("estimate", fit), ("two-level", result.two_level)):
+        for warning in one.warnings:
+            out.print(f"warning ({name}): {warning}")
+    out.print(
+        f"results in {folder}, the laboratory's files in {folder / 'lab'}, truth against estimate in "
+        f"{folder / 'bsp_truth.csv'}\n"
+        f"next, with your own files: kinertia init FOLDER, then kinertia fit FOLDER/subject.toml -o out"
+    )
+
+
+def _rms(load: np.ndarray) -> float:
+    """Root mean square length of the vectors (w, 3), as in fit.json."""
+    return float(np.sqrt(np.mean(np.square(load).sum(axis=1))))
+
+
+def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """How the estimate compares with the literature, by the numbers of this run."""
+    shares = ", ".join(
+        f"{what} {100 * (other / one - 1):+.0f} %"
+        for what, one, other in zip(("mass", "centre of mass", "inertia"), before, after, strict=True)
+    )
+    return (
+        f"The simultaneous estimate changes the literature's errors by: {shares}. It weighs "
+        "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says "
+        "per parameter how much was measured."
+    )
+
+
+def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
+    """What the comparison with two-level shows, by the numbers of this run."""
+    worse = sum(one < other for one, other in zip(before, after, strict=True))
+    if worse == len(before):
+        finding = "Two-level explains the forces far better, yet every class of parameters is further from the truth"
+    elif worse:
+        finding = f"Two-level explains the forces far better, yet {worse} of 3 classes of parameters are further off"
+    else:
+        return (
+            "Two-level is nearer to the truth than the literature in this run. With skin motion that is luck "
+            "rather than the rule: see docs/study.md."
+        )
+    return (
+        f"{finding} than the literature: with skin motion, small residuals do not mean right body segment parameters. "
+        "That is the finding of the study whose two-level method this is (docs/study.md); without noise the same "
+        "method finds them exactly (kinertia study table1)."
+    )
+
+
+@study.command()
+def table1(
+    repeats: Annotated[int, typer.Option(min=1, help="Independent draws of start and noise.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")] = 1,
+    trial: Annotated[
+        Path | None,
+        typer.Option(help="Subject file of a measured trial to start from; the package's walk if left out."),
+    ] = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
+
+    [bold]Examples[/]
+
+    kinertia study table1 -o out
+
+    kinertia study table1 --repeats 3 --trial subject.toml -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        if trial is None:
+            source, name = study_trial(), "synthetic walk"
+        else:
+            source, name = measured_trial(read_subject(trial), progress)
+        table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
+    _report_table1(table, source.deviation)
+    save_table1(table, output)
+    out.print(f"results in {output}: report.html, table1.json, table1.csv, table1.png")
+
+
+def _report_table1(table: Table1, deviation: np.ndarray) -> None:
+    moved = f"{deviation[:3].max() * 1e3:.2g} mm and {np.degrees(deviation[3:]).max():.2g} degrees"
+    out.print(
+        f"\n{table.trial}; seed {table.seed}; {len(table.draws)} draws. The pelvis was moved by at most {moved} so "
+        "that the root equations hold exactly. RMS / max error: mean over the draws, spread (standard deviation), and "
+        "the published value.\n"
+    )
+    shown = plain_table("error", *(heading.replace(", ", ",\n") for heading in CONDITIONS.values()))
+    for row in table1_rows(table):
+        shown.add_row(*row)
+    out.print(shown)
+    stopped = {c: sum(not draw.converged[c] for draw in table.draws) for c in CONDITIONS}
+    for condition, count in stopped.items():
+        if count:
+            out.print(
+                f"{CONDITIONS[condition]}: {count} of {len(table.draws)} draws stopped at the limit of evaluations"
+            )
+
+
+@study.command()
+def accuracy(
+    draws: Annotated[int, typer.Option(min=2, help="People in each scenario.")] = 100,
+    seed: Seed = 1,
+    workers: Workers = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Do the error bars hold? People drawn from the literature's prior, measured with faults, estimated.
+
+    [bold]Example[/]
+
+    kinertia study accuracy -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        found = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
+    for scenario in found.values():
+        out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
+        shown = plain_table(*HEADINGS)
+        for row in accuracy_rows(scenario):
+            shown.add_row(*row)
+        out.print(shown)
+        out.print(angles_sentence(scenario))
+        out.print(moments_sentence(scenario))
+    save_accuracy(found, seed, output)
+    out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
+
+
+@study.command()
+def sensitivity(
+    draws: Annotated[int, typer.Option(min=2, help="People in each condition.")] = 24,
+    seed: Seed = 1,
+    workers: Workers = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Which BSPs are not highly sensitive to noisy kinematics? Errors against noise, strides and squats.
+
+    [bold]Example[/]
+
+    kinertia study sensitivity -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        found = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
+    for kind, title in KINDS.items():
+        listed = ", ".join(found.insensitive(kind)) or "none"
+        out.print(f"small errors up to twice the amplitude of {title}: {listed}")
+    out.print(f"shown by no condition: {', '.join(found.never()) or 'none'}")
+    save_sensitivity(found, output)
+    out.print(f"results in {output}: sensitivity.md, sensitivity.png, sensitivity.json, sensitivity.csv")

@@ -1,0 +1,86 @@
+"""What all commands share on a terminal: results on one stream, progress and errors on the other, plain tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from kinertia.checks.verdict import Verdict
+
+# names of files and trials may contain what rich takes for markup
+out = Console(markup=False, emoji=False, highlight=False)
+err = Console(markup=False, emoji=False, highlight=False, stderr=True)
+_COLOURS = {"good": "green", "okay": "yellow", "against": "bold red"}
+
+
+def be_quiet(quiet: bool) -> bool:
+    """Silence results and progress, or not; errors are always shown."""
+    out.quiet = quiet
+    return quiet
+
+
+def show_error(message: str) -> None:
+    """One line for one mistake."""
+    text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
+    err.print(text, soft_wrap=True)
+
+
+def show_verdicts(verdicts: Iterable[Verdict]) -> None:
+    """One paragraph each, the level first."""
+    for level, sentence in verdicts:
+        out.print(Text(f"{level}: ", style=_COLOURS[level]).append(sentence, style="not bold default"))
+
+
+class _TimeLeftColumn(TimeRemainingColumn):
+    """The time left, said to be that; nothing as long as nobody knows."""
+
+    def render(self, task: Task) -> Text:
+        return super().render(task).append(" left") if task.time_remaining else Text()
+
+
+@contextmanager
+def shown_progress() -> Iterator[Callable[[str, float], None]]:
+    """Progress of the stage at work: a bar with the time left on a terminal, a line per stage elsewhere.
+
+    Yields a function that takes the stage's name and its share done.
+    """
+    seen: list[str] = []
+    if out.quiet:
+        yield lambda stage, share: None
+        return
+    if not err.is_terminal:
+
+        def line(stage: str, share: float) -> None:
+            if stage not in seen:
+                seen.append(stage)
+                err.print(stage)
+
+        yield line
+        return
+    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn(), _TimeLeftColumn())
+    with Progress(*columns, console=err, transient=True) as bar:
+
+        def move(stage: str, share: float) -> None:
+            if seen[-1:] != [stage]:
+                seen.append(stage)
+                for task in bar.task_ids:
+                    bar.remove_task(task)
+                bar.add_task(stage, total=None)  # a task of its own, or the time left would be that of all stages
+            if share > 0:
+                bar.update(bar.task_ids[-1], total=1.0, completed=share)
+
+        yield move
+
+
+def plain_table(*headings: str) -> Table:
+    """First two columns to the left if the second has no heading, the numbers to the right."""
+    table = Table(box=box.SIMPLE_HEAD, padding=0)
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if k == 0 or not heading else "right", overflow="fold")
+    return table

@@ -1,0 +1,1 @@
+"""From recordings to body segment parameters: preparation, the two estimators, and the result."""

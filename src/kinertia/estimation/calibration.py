@@ -1,0 +1,218 @@
+"""Adapting a static model to the trials it will be used for: marker positions and coordinates that stand still.
+
+A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the
+acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and
+calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
+by Gauss-Newton; the static trial is the prior. Frames are eliminated one by one (Schur complement), so the cost grows
+linearly with their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.errors import TrialError
+from kinertia.model.skeleton import Marker, Pose, Skeleton
+from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
+from kinertia.trial.data import Markers, Trial
+
+MARKER_NOISE_M = 0.01
+"""Deviation of one marker coordinate in one frame; the frames used stand 0.1 s apart and count as independent."""
+FRAME_SPACING_S = 0.1
+_MAX_FRAMES = 60
+_STEPS = 15
+_TOLERANCE_M = 1e-5
+_ENOUGH_M2 = 1e-6
+"""Square of a millimetre."""
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """Outcome of `adapt`.
+
+    Attributes:
+        skeleton: with adapted markers and locked coordinates.
+        moved_m: per marker label, how far it moved in its segment.
+        coordinates: per adapted locked coordinate, its value (rad or m).
+    """
+
+    skeleton: Skeleton
+    moved_m: Mapping[str, float]
+    coordinates: Mapping[str, float]
+
+
+def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKinematics]:
+    """Poses of the `sampled` frames of each trial, good to a millimetre: what `hold_uninformed` and `adapt` go by."""
+    return [solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2) for trial in trials]
+
+
+def adapt(
+    skeleton: Skeleton,
+    trials: Sequence[Trial],
+    poses: Sequence[InverseKinematics],
+    marker_sd_m: Mapping[str, float],
+    coordinate_sd: Mapping[str, float],
+) -> Adaptation:
+    """Adapt marker positions and locked coordinates to trials, with the skeleton as the prior.
+
+    Args:
+        skeleton: from the static trial.
+        trials: the trials it will be used for.
+        poses: their `first_poses`; of coordinates that are locked by now no notice is taken.
+        marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
+        coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
+
+    Frames whose visible markers do not determine every coordinate are left out.
+
+    Raises:
+        TrialError: no frame of any trial remains.
+    """
+    present = {label for trial in trials for label in trial.markers.labels}
+    kept = [marker for marker in skeleton.markers if marker.label in present]
+    rest = [marker for marker in skeleton.markers if marker.label not in present]
+    base = skeleton.with_markers(kept)
+    measured = np.concatenate([sampled(trial.markers).arranged(base.labels) for trial in trials])
+    start = np.concatenate([ik.q[:, [ik.coordinates.index(name) for name in base.coordinates]] for ik in poses])
+    seen = np.isfinite(start).all(axis=1)
+    if not seen.any():
+        raise TrialError(
+            ", ".join(trial.name for trial in trials),
+            f"in none of the {len(seen)} frames looked at are enough markers visible for all coordinates; fill the "
+            f"gaps of the markers or use another trial",
+        )
+    measured, moving = measured[seen], start[seen]
+
+    still = list(coordinate_sd)
+    freed = base.free(still)
+    columns = {name: i for i, name in enumerate(freed.coordinates)}
+    still_at = np.array([columns[name] for name in still], dtype=int)
+    moving_at = np.array([columns[name] for name in base.coordinates])
+    prior = np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()])
+    deviation = np.concatenate(
+        [list(coordinate_sd.values()), np.repeat([marker_sd_m[marker.segment] for marker in kept], 3)]
+    )
+    static = prior.copy()
+    for _ in range(_STEPS):
+        q = np.empty((len(moving), len(freed.coordinates)))
+        q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
+        residual, jacobian = _in_segments(freed, measured, q, static[len(still) :].reshape(-1, 3))
+        by_moving, by_still = jacobian[..., moving_at], jacobian[..., still_at]
+        step, moving_step = _step(residual, by_moving, by_still, (prior - static) / deviation**2, deviation)
+        static, moving = static + step, moving + moving_step
+        if np.abs(step).max() < _TOLERANCE_M:
+            break
+    markers = _relocated(kept, static[len(still) :])
+    moved = {m.label: float(np.linalg.norm(m.position - k.position)) for m, k in zip(markers, kept, strict=True)}
+    values = {name: float(value) for name, value in zip(still, static[: len(still)], strict=True)}
+    return Adaptation(skeleton.with_markers([*markers, *rest]).lock(values), moved, values)
+
+
+def hold_uninformed(
+    skeleton: Skeleton, trials: Sequence[Trial], poses: Sequence[InverseKinematics], may_hold: Mapping[str, float]
+) -> tuple[Skeleton, tuple[str, ...]]:
+    """The skeleton with those coordinates held that no marker shows, and their names.
+
+    Args:
+        skeleton: from the static trial.
+        trials: the trials it will be used for.
+        poses: their `first_poses`.
+        may_hold: the coordinates that need not be shown, and the values at which they are held.
+
+    Raises:
+        TrialError: a trial never shows another coordinate, or one that another trial shows.
+    """
+    never = []
+    for ik in poses:
+        shown = np.isfinite(ik.q).any(axis=0)
+        never.append([name for name, known in zip(ik.coordinates, shown, strict=True) if not known])
+    held = [name for name in skeleton.coordinates if all(name in names for names in never) and name in may_hold]
+    for trial, names in zip(trials, never, strict=True):
+        lost = [name for name in names if name not in held]
+        if lost:
+            raise TrialError(trial.name, _not_shown(skeleton, trial.markers, lost))
+    return skeleton.lock({name: may_hold[name] for name in held}), tuple(held)
+
+
+def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str]) -> str:
+    children = [joint.child for joint in skeleton.joints if {axis.coordinate for axis in joint.axes} & set(coordinates)]
+    worn = [m.label for m in skeleton.markers if m.segment in children]
+    gone = [label for label in worn if label not in markers.labels]
+    missing = f"; not in the file: {', '.join(gone)}" if gone else ""
+    return (
+        f"in no frame do enough markers show {', '.join(coordinates)} (markers of {', '.join(children)}: "
+        f"{', '.join(worn) or 'none'}{missing}); use a trial that has them"
+    )
+
+
+def sampled(markers: Markers) -> Markers:
+    """A few frames, FRAME_SPACING_S apart, from all over the trial (at most sixty)."""
+    duration = float(markers.time[-1] - markers.time[0])
+    count = min(_MAX_FRAMES, len(markers.time), 1 + int(duration / FRAME_SPACING_S))
+    every = -(-len(markers.time) // count)
+    return Markers(markers.time[::every], markers.labels, markers.positions[::every])
+
+
+def _relocated(markers: Sequence[Marker], positions: np.ndarray) -> list[Marker]:
+    return [
+        Marker(marker.label, marker.segment, position)
+        for marker, position in zip(markers, positions.reshape(-1, 3), strict=True)
+    ]
+
+
+def _in_segments(
+    skeleton: Skeleton, measured: np.ndarray, q: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Marker errors (n, m, 3) and their derivatives (n, m, 3, c) by the coordinates, in noise deviations.
+
+    Both are in the axes of the markers' segments, so that a marker's place (m, 3) in its segment moves it by itself.
+    What is not seen is NaN in the errors and zero in the derivatives.
+    """
+    pose = skeleton.pose(q)
+    turned = pose.rotation[:, skeleton.marker_segments]
+    positions = (turned @ places[..., None])[..., 0] + pose.translation[:, skeleton.marker_segments]
+    to_segment = turned.transpose(0, 1, 3, 2) / MARKER_NOISE_M
+    errors = (to_segment @ (measured - positions)[..., None])[..., 0]
+    seen = np.isfinite(errors)
+    return errors, to_segment @ marker_jacobian(skeleton, pose, positions) * seen[..., None]
+
+
+def _step(
+    residual: np.ndarray, by_moving: np.ndarray, by_still: np.ndarray, prior_pull: np.ndarray, deviation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """One Gauss-Newton step of the static unknowns (k,), still coordinates then places, and of the moving (n, c).
+
+    Takes what `_in_segments` gives.
+    """
+    n = len(residual)
+    seen = np.isfinite(residual).reshape(n, -1)
+    residual = np.nan_to_num(residual).reshape(n, -1)
+    by_moving, by_still = (part.reshape(n, residual.shape[1], -1) for part in (by_moving, by_still))
+    transposed = by_moving.transpose(0, 2, 1)
+    normal = transposed @ by_moving + 1e-6 * np.eye(by_moving.shape[-1])
+    across = np.concatenate([transposed @ by_still, transposed / MARKER_NOISE_M], axis=-1)
+    gradient = transposed @ residual[..., None]
+    solved = np.linalg.solve(normal, np.concatenate([across, gradient], axis=-1))
+    # S^T S and S^T r summed over frames; a place moves its own marker only
+    k = by_still.shape[-1]
+    square, right = np.diag(1.0 / deviation**2), prior_pull.copy()
+    square[:k, :k] += np.einsum("nri,nrj->ij", by_still, by_still)
+    square[:k, k:] += by_still.sum(axis=0).T / MARKER_NOISE_M
+    square[k:, :k] = square[:k, k:].T
+    square[range(k, len(square)), range(k, len(square))] += seen.sum(axis=0) / MARKER_NOISE_M**2
+    right[:k] += np.einsum("nri,nr->i", by_still, residual)
+    right[k:] += residual.sum(axis=0) / MARKER_NOISE_M
+    # (M^T S)^T (M^T M)^-1 (M^T S) is taken off: the moving coordinates follow
+    followed = across.reshape(-1, len(right)).T @ solved.reshape(-1, len(right) + 1)
+    step = np.linalg.solve(square - followed[:, :-1], right - followed[:, -1])
+    return step, solved[..., -1] - solved[..., :-1] @ step
+
+
+def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
+    """(n, m, 3, c): velocity of every marker, at these positions (n, m, 3) m, for each coordinate at unit rate."""
+    linear, angular = pose.jacobian[:, None, :3], pose.jacobian[:, None, 3:]
+    turning = np.cross(angular, positions[..., None], axis=2)
+    by_axes = (linear + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
+    return skeleton.map.to_coordinates(by_axes, pose.slopes)

@@ -1,0 +1,239 @@
+"""What can be wrong with a subject, a trial or a result, and how to say it.
+
+Errors come before the estimation, warnings after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from kinertia.errors import SubjectError, TrialError
+from kinertia.estimation.two_level import TwoLevelResult
+from kinertia.model.anthropometry import check_subject
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics
+from kinertia.settings import Subject
+from kinertia.trial.data import Recording, Trial
+from kinertia.trial.free_moment import mean_turning
+
+if TYPE_CHECKING:
+    from kinertia.estimation.estimate import TrialFit
+
+T = TypeVar("T")
+
+FORCE_MASS_TOLERANCE = 0.02
+"""Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
+CONTRADICTING_MASS = 0.10
+"""Scale and vertical force, or two trials, may differ by this share before the simultaneous estimate refuses."""
+_OTHER_PERSON_M, _OTHER_PERSON = 0.04, 0.15
+"""Two markers of a segment may differ in distance by this much between trials of one person: length, or share."""
+ESTIMATE_TOLERANCE = 0.03
+"""Scale and estimated total mass may differ by this share before a warning."""
+CONTRADICTING_COM_M = 0.1
+"""A centre of mass this far from the literature contradicts it."""
+
+
+def known(value: T | None) -> T:
+    """The value of a field that the subject file or `complete_subject` has filled in."""
+    if value is None:
+        raise ValueError("complete_subject must come first")
+    return value
+
+
+def complete_subject(
+    subject: Subject, recordings: Sequence[Recording], mass_only: bool = False
+) -> tuple[Subject, list[str]]:
+    """Mass and height from the files where the user gave none; warnings where both are given and disagree.
+
+    Args:
+        subject, recordings: what the user says, and the files.
+        mass_only: height and sex may stay unknown.
+
+    Raises:
+        SubjectError: neither the user nor a file gives mass or height, or the value cannot be true.
+    """
+    warnings = []
+    found: dict[str, float] = {}
+    for quantity, option in (("mass_kg", "--mass"), ("height_m", "--height")):
+        told = [(r.name, getattr(r, quantity)) for r in recordings if getattr(r, quantity) is not None]
+        given = getattr(subject, quantity)
+        if given is None and not told:
+            if mass_only and quantity == "height_m":
+                continue
+            raise SubjectError(
+                quantity, None, f"no file carries it; give it with {option} or as {quantity} under [subject]"
+            )
+        found[quantity] = told[0][1] if given is None else given
+        for name, value in told:
+            if abs(value - found[quantity]) > 0.01 * found[quantity]:
+                warnings.append(f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}")
+    check_subject(found["mass_kg"], found.get("height_m", 1.7), subject.sex or "male")
+    return subject.model_copy(update=found), warnings
+
+
+def check_visible(skeleton: Skeleton, trial: Trial) -> None:
+    """Raise TrialError when a marker is never seen, or a segment other than the arms' has no marker in the trial."""
+    lost = [
+        marker.label
+        for marker in skeleton.markers
+        if marker.label in trial.markers.labels
+        and not np.isfinite(trial.markers.select([marker.label]).positions).any()
+    ]
+    if lost:
+        raise TrialError(
+            trial.name,
+            f"no frame shows the marker{'s' if len(lost) > 1 else ''} {', '.join(lost)}; label them, or remove them "
+            f"from the file if they were not worn",
+        )
+    arms = tuple(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))
+    for segment in set(skeleton.segments) - set(arms):
+        worn = [m.label for m in skeleton.markers if m.segment == segment]
+        if worn and not set(worn) & set(trial.markers.labels):
+            raise TrialError(
+                trial.name,
+                f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are "
+                f"unknown; use a trial that has them",
+            )
+
+
+def check_same_person(skeleton: Skeleton, trials: Sequence[Trial]) -> None:
+    """Raise TrialError when marker distances say that trials are of different people, or of one marked anew.
+
+    Compared are distances between markers of one segment of pelvis, legs and feet: median over the frames of a trial.
+    """
+    segments = dict(zip(skeleton.labels, skeleton.marker_segments, strict=True))
+    lower = {skeleton.segments[0], *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl")}
+    for first, other in combinations(trials, 2):
+        labels = [name for name in skeleton.labels if name in first.markers.labels and name in other.markers.labels]
+        pairs = [
+            (a, b)
+            for a, b in combinations(labels, 2)
+            if segments[a] == segments[b] and skeleton.segments[segments[a]] in lower
+        ]
+        if not pairs:
+            continue
+        long, short = (_median_distances(trial, pairs) for trial in (first, other))
+        off = np.abs(long - short)
+        wrong = np.nan_to_num(np.minimum(off / _OTHER_PERSON_M, off / (_OTHER_PERSON * long)))
+        k = int(np.argmax(wrong))
+        if wrong[k] > 1.0:
+            raise TrialError(
+                other.name,
+                f"the markers {pairs[k][0]} and {pairs[k][1]} are {short[k] * 1e3:.0f} mm apart, in '{first.name}' "
+                f"{long[k] * 1e3:.0f} mm; pool only trials of one person with the markers left in place",
+            )
+
+
+def _median_distances(trial: Trial, pairs: Sequence[tuple[str, str]]) -> np.ndarray:
+    ends = (trial.markers.arranged([pair[i] for pair in pairs]) for i in range(2))
+    distances = np.linalg.norm(np.subtract(*ends), axis=-1)
+    seen = np.isfinite(distances).any(axis=0)
+    return np.where(seen, np.nanmedian(np.where(seen, distances, 0.0), axis=0), np.nan)
+
+
+def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, residual: np.ndarray) -> float:
+    """Body mass by the vertical ground reaction over a window, whatever the CoM's acceleration.
+
+    The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no
+    mean vertical residual is m F / (F + P), with means over the window.
+
+    Args:
+        literature: the BSPs of the residual.
+        foot_loads: (w, 2, 6) ground reactions.
+        residual: (w, 6) root residual of the literature BSPs on the uncorrected motion.
+    """
+    force = float(foot_loads[:, :, 1].sum(axis=1).mean())
+    return literature.total_mass_kg * force / (force + float(residual[:, 1].mean()))
+
+
+def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
+    """Body mass by the vertical ground reaction of a fitted trial."""
+    return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
+
+
+def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
+    """Raise TrialError when trials cannot be of one person, or not of the one on the scale.
+
+    Args:
+        mass_kg: by the scale.
+        by_force_kg: per trial, `mass_by_force_kg`.
+    """
+    heaviest, lightest = max(by_force_kg, key=by_force_kg.__getitem__), min(by_force_kg, key=by_force_kg.__getitem__)
+    if by_force_kg[heaviest] > (1 + CONTRADICTING_MASS) * by_force_kg[lightest]:
+        raise TrialError(
+            heaviest,
+            f"the vertical force carries {by_force_kg[heaviest]:.1f} kg, in '{lightest}' "
+            f"{by_force_kg[lightest]:.1f} kg; pool only trials of one person, with the same plates",
+        )
+    for name, by_force in by_force_kg.items():
+        if abs(by_force - mass_kg) > CONTRADICTING_MASS * mass_kg:
+            raise TrialError(
+                name,
+                f"the vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg; correct the mass, or "
+                f"the gain and zero of the plates",
+            )
+
+
+def fit_warnings(
+    mass_kg: float,
+    literature: BodySegmentParameters,
+    estimate: BodySegmentParameters,
+    trials: Sequence[TrialFit],
+    source: str = "the literature",
+) -> list[str]:
+    """What the user should know before using the numbers, whatever the estimator.
+
+    `source` says where the parameters before the estimate come from.
+    """
+    found = []
+    for trial in trials:
+        by_force = mass_from_force_kg(literature, trial)
+        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
+            found.append(
+                f"{trial.name}: the mean vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg "
+                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
+            )
+    total = estimate.total_mass_kg
+    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
+        found.append(
+            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
+            f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
+        )
+    moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
+    worst = int(np.argmax(moved))
+    if moved[worst] > CONTRADICTING_COM_M:
+        found.append(
+            f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
+            f"moved by {moved[worst] * 1e3:.0f} mm"
+        )
+    return found
+
+
+def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
+    """Trials whose ground reactions turn the person ever further to one side, and why that may be."""
+    means = {k.trial.name: mean_turning(k.trial.loads, k.time, skeleton.root.centre(k.motion.q)) for k in trials}
+    return [f"{name}: {mean.sentence()}" for name, mean in means.items() if mean is not None and mean.contradicts]
+
+
+def two_level_warnings(result: TwoLevelResult) -> list[str]:
+    """What the user should know of a two-level estimate: not converged, or physically impossible."""
+    found = []
+    if not result.converged:
+        found.append(
+            f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is "
+            f"reported"
+        )
+    consistent = result.bsp.physically_consistent()
+    if not consistent.all():
+        names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
+        found.append(
+            f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
+            f"({', '.join(names)}): it explains the forces, but skin-motion noise decides single parameters; "
+            f"do not use them as this person's"
+        )
+    return found

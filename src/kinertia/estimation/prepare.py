@@ -1,0 +1,187 @@
+"""From recordings to what an estimator needs: calibrated skeleton, literature BSPs, smoothed kinematics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from kinertia.errors import MarkerSetError, TrialError
+from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
+from kinertia.estimation.input_checks import check_same_person, check_visible, complete_subject, known
+from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.io.osim.reader import OsimModel
+from kinertia.model.anthropometry import literature_bsp
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
+from kinertia.model.marker_set import MarkerSet, check_marker_set, choose_marker_set
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics, facing, solve_kinematics
+from kinertia.motion.swapped_markers import check_labels
+from kinertia.settings import Settings, Subject
+from kinertia.trial.data import Recording, Trial
+from kinertia.trial.plate_assignment import build_trial
+
+LOWER_BODY_SD_M = 0.01
+UPPER_BODY_SD_M = 0.04
+"""How far markers may sit from where the model has them."""
+_ARM_ROTATION_SD_RAD = 1.0
+
+Progress = Callable[[str, float], None]
+"""Called with the stage's name and the share of it that is done (0 to 1)."""
+
+
+@dataclass(frozen=True)
+class TrialInput:
+    """A recording and, where the user gives one, the window (s) to use instead of the detected one."""
+
+    recording: Recording
+    window_s: tuple[float, float] | None = None
+    read_seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """All that an estimator needs of a person: what recordings become before any estimate.
+
+    Attributes:
+        subject: with mass and height filled in.
+        skeleton: calibrated model.
+        literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
+        prior: how far the person's may be from them.
+        freedom: what else the simultaneous estimate may move.
+        file: the OpenSim model that the skeleton is from, if it is.
+        kinematics: smoothed coordinates and ground reactions, one entry per trial.
+        seconds: computing time by stage, one entry per trial.
+        warnings, notes: one sentence each.
+    """
+
+    subject: Subject
+    skeleton: Skeleton
+    literature: BodySegmentParameters
+    prior: BspPrior
+    freedom: Freedom
+    file: OsimModel | None
+    kinematics: tuple[Kinematics, ...]
+    seconds: tuple[Mapping[str, float], ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def calibrate(
+    static: Recording,
+    trials: Sequence[Trial],
+    marker_set: MarkerSet,
+    subject: Subject,
+    hip_centre: str,
+) -> tuple[Gait27, Skeleton, list[str]]:
+    """The 27-DOF model of the static trial, adapted to the trials.
+
+    Returns the model as the static trial gives it, the adapted skeleton, and notes. Markers of pelvis, legs and feet
+    are held to the static trial by a deviation of 10 mm, those of torso and arms and the shoulder centres by 40 mm.
+    """
+    model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
+    for trial in trials:
+        check_visible(model.skeleton, trial)
+    check_same_person(model.skeleton, trials)
+    poses = first_poses(model.skeleton, trials)
+    skeleton, held = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
+    for trial in trials:
+        check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
+    upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
+    marker_sd = {s: UPPER_BODY_SD_M if s in upper else LOWER_BODY_SD_M for s in model.skeleton.segments}
+    coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
+        ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
+    )
+    adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
+    far = {label: moved for label, moved in adapted.moved_m.items() if moved > 0.03}
+    notes = []
+    if held:
+        notes.append(f"no marker shows {', '.join(held)}: held at 0 (the arm hangs along the torso)")
+    if far:
+        listed = ", ".join(f"{label} {moved * 1e3:.0f} mm" for label, moved in sorted(far.items(), key=lambda i: -i[1]))
+        notes.append(f"markers that sit elsewhere in the trials than in the static trial (adapted): {listed}")
+    return model, adapted.skeleton, notes
+
+
+def prepare(
+    subject: Subject,
+    static: Recording,
+    inputs: Sequence[TrialInput],
+    settings: Settings,
+    marker_set: MarkerSet | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> Prepared:
+    """Calibrated skeleton, literature BSPs and smoothed kinematics of all trials; the arguments are `estimate_bsp`'s.
+
+    Raises:
+        KinertiaError: the subject, a marker set or a trial cannot be used.
+    """
+    recordings = [item.recording for item in inputs]
+    subject, warnings = complete_subject(subject, [static, *recordings])
+    if marker_set is None:
+        marker_set = choose_marker_set(static.markers.labels)
+    else:
+        check_marker_set(marker_set, static.markers.labels)
+
+    progress("calibration", 0.0)
+    started = time.perf_counter()
+    turned = [_turned(item, marker_set) for item in inputs]
+    model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
+    literature = literature_bsp(
+        known(subject.mass_kg), known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
+    )
+    calibration_s = (time.perf_counter() - started) / len(inputs)
+
+    kinematics, seconds = [], []
+    for k, (trial, angle) in enumerate(turned):
+        progress("inverse kinematics", k / len(turned))
+        started = time.perf_counter()
+        kinematics.append(solve_kinematics(skeleton, trial, angle, settings.cutoff_hz))
+        ik_s = time.perf_counter() - started
+        seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
+
+    notes = [f"marker set: {marker_set.name}", *static.notes, *notes]
+    for trial, _ in turned:
+        absent = [label for label in skeleton.labels if label not in trial.markers.labels]
+        if absent:
+            notes.append(f"{trial.name}: markers of the static trial that it does not have: {', '.join(absent)}")
+    notes += [note for k in kinematics for note in k.notes]
+    return Prepared(
+        subject=subject,
+        skeleton=skeleton,
+        literature=literature,
+        prior=literature_prior(literature),
+        freedom=GAIT27_FREEDOM.with_axes() if settings.joint_axes else GAIT27_FREEDOM,
+        file=None,
+        kinematics=tuple(kinematics),
+        seconds=tuple(seconds),
+        warnings=tuple(warnings),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
+    """The trial with its loads sorted by foot, facing +X, and the angle (deg) it was turned by."""
+    recording = item.recording
+    for side in "rl":
+        label = marker_set.landmarks[f"asis_{side}"][0]
+        if label not in recording.markers.labels:
+            raise TrialError(recording.name, f"the marker {label} is missing; it tells which way the person faces")
+    present = set(recording.markers.labels)
+    feet = {side: [label for label in labels if label in present] for side, labels in marker_set.foot_labels().items()}
+    for side, labels in feet.items():
+        if not labels:
+            raise TrialError(
+                recording.name, f"no marker of the {'right' if side == 'r' else 'left'} foot is in the file"
+            )
+    trial = build_trial(recording, feet, item.window_s)
+    try:
+        rotation, angle = facing(trial.markers, marker_set)
+    except MarkerSetError as error:
+        raise TrialError(trial.name, str(error)) from error
+    if angle == 0.0:
+        return trial, 0.0
+    note = f"{trial.name}: turned by {angle:g} degrees about the vertical so that the person faces +X"
+    return replace(trial.rotated(rotation), notes=(*trial.notes, note)), angle

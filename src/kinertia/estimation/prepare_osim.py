@@ -1,0 +1,254 @@
+"""From recordings and a user's own OpenSim model to what the simultaneous estimate needs.
+
+The model's scaling, markers and joints stay as they are unless calibration is asked for, and so does the laboratory's
+frame: the trial is not turned. The prior is around the model's own body segment parameters, at the mass on the scale.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.checks.verdict import impossible_segments
+from kinertia.errors import OsimError, TrialError
+from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
+from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
+from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
+from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, Freedom
+from kinertia.io.osim.reader import OsimModel
+from kinertia.model.anatomy import segment_of
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Axis, Skeleton
+from kinertia.motion.kinematics import solve_kinematics
+from kinertia.settings import Settings, Subject
+from kinertia.trial.data import Trial
+from kinertia.trial.plate_assignment import build_trial
+
+LIGHT_KG = 0.5
+"""Bodies that weigh less together than this move with their joints, but are not estimated."""
+_MASS_TOLERANCE = 0.002
+
+
+def prepare_osim(
+    subject: Subject,
+    model: OsimModel,
+    inputs: Sequence[TrialInput],
+    settings: Settings,
+    calibrate: bool,
+    progress: Progress = lambda stage, share: None,
+) -> Prepared:
+    """The model fitted to all trials; the arguments are `estimate_bsp_of_model`'s.
+
+    Raises:
+        KinertiaError: the subject, the model or a trial cannot be used.
+    """
+    subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
+    if not model.skeleton.markers:
+        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    feet = _feet(model)
+    progress("calibration", 0.0)
+    started = time.perf_counter()
+    trials = [_trial(model, item, feet) for item in inputs]
+    may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
+    skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
+    poses = first_poses(skeleton, trials)
+    skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
+    if calibrate:
+        skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
+    calibration_s = (time.perf_counter() - started) / len(inputs)
+    own, factor = at_mass(model.bsp, known(subject.mass_kg))
+    prior, held = parted(skeleton, own)
+    centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
+    freedom = Freedom(centres, MARKER_SD_M if calibrate else None, held, "the model's own")
+
+    kinematics, seconds = [], []
+    for k, trial in enumerate(trials):
+        progress("inverse kinematics", k / len(trials))
+        started = time.perf_counter()
+        kinematics.append(solve_kinematics(skeleton, trial, 0.0, settings.cutoff_hz))
+        ik_s = time.perf_counter() - started
+        seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
+    notes = [
+        f"OpenSim model: {model.path.name}",
+        *_mass_note(model, own, factor),
+        *_idle_note(model, idle),
+        *_held_note(skeleton, held),
+        *_marker_notes(model, trials),
+        *(note for k in kinematics for note in k.notes),
+    ]
+    return Prepared(
+        subject=subject,
+        skeleton=skeleton,
+        literature=freedom.whole(prior.mean),
+        prior=prior,
+        freedom=freedom,
+        file=model,
+        kinematics=tuple(kinematics),
+        seconds=tuple(seconds),
+        warnings=(*warnings, *_impossible_warning(model)),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _impossible_warning(model: OsimModel) -> list[str]:
+    impossible = impossible_segments(model.bsp)
+    if not impossible:
+        return []
+    return [
+        f"{model.path.name}: the model's own mass properties are physically impossible for {', '.join(impossible)}; "
+        f"the estimate starts from them, so correct them first (kinertia check {model.path.name} says what is wrong)"
+    ]
+
+
+def _feet(model: OsimModel) -> dict[str, list[str]]:
+    """The bodies of each foot by their names, the heaviest first: it carries the ground reactions.
+
+    Raises:
+        OsimError: there is none.
+    """
+    mass = dict(zip(model.bsp.segments, model.bsp.mass_kg.tolist(), strict=True))
+    feet = {}
+    for side, name in zip("rl", ("right", "left"), strict=True):
+        bodies = [body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"]
+        if not bodies:
+            raise OsimError(
+                model.path, f"no body of the {name} foot; expected one named calcn_{side}, foot_{side} or the like"
+            )
+        feet[side] = sorted(bodies, key=lambda body: -mass[body])
+    return feet
+
+
+def _trial(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> Trial:
+    """The trial with its loads sorted by foot."""
+    recording = item.recording
+    labels = {}
+    for (side, bodies), name in zip(feet.items(), ("right", "left"), strict=True):
+        worn = [marker.label for marker in model.skeleton.markers if marker.segment in bodies]
+        labels[side] = [label for label in worn if label in recording.markers.labels]
+        if not labels[side]:
+            raise TrialError(
+                recording.name,
+                f"no marker of the {name} foot is in the file (the model has {', '.join(worn) or 'none'} there); it "
+                f"takes one to tell which plate the foot stands on",
+            )
+    return build_trial(recording, labels, item.window_s)
+
+
+def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
+    """The skeleton with three more locked translations in front of every joint that turns about three axes.
+
+    They are `<joint>/offset_x` to `_z`, along the parent's axes. Joints that the file gives no frame of their own, or
+    one that hangs on another frame, do not get them: the file could not be changed accordingly.
+    """
+    joints = list(skeleton.joints)
+    locked: dict[str, float] = {}
+    for i, (joint, told) in enumerate(zip(joints, model.joints, strict=True)):
+        turns = [a for a in joint.axes if a.kind == "rotation" and a.coordinate not in skeleton.locked]
+        if i == 0 or told.offset is None or len({a.coordinate for a in turns}) < 3:
+            continue
+        columns = np.asarray(joint.rotation).T @ np.eye(3)
+        names = [f"{told.name}/offset_{axis}" for axis in "xyz"]
+        offsets = [
+            Axis(name, "translation", tuple(map(float, column)))  # type: ignore[arg-type]
+            for name, column in zip(names, columns.T, strict=True)
+        ]
+        joints[i] = replace(joint, axes=(*offsets, *joint.axes))
+        locked |= dict.fromkeys(names, 0.0)
+    return replace(skeleton, joints=tuple(joints), locked={**skeleton.locked, **locked})
+
+
+def centre_offsets(skeleton: Skeleton) -> dict[str, np.ndarray]:
+    """By joint, (3,) m by which the skeleton's joint centre offsets move it in its parent, along the parent's axes."""
+    names = {name.removesuffix("/offset_x") for name in skeleton.locked if name.endswith("/offset_x")}
+    return {name: np.array([skeleton.locked[f"{name}/offset_{axis}"] for axis in "xyz"]) for name in names}
+
+
+def _marker_sd(skeleton: Skeleton) -> dict[str, float]:
+    """Per segment, how far its markers may be from where the model has them."""
+    upper = ("torso", "upper_arm", "forearm")
+    return {s: UPPER_BODY_SD_M if kind_of(s) in upper else LOWER_BODY_SD_M for s in skeleton.segments}
+
+
+def kind_of(body: str) -> str:
+    """The segment of the prior's table that a body is part of by its name, without its side; else its own name."""
+    return (segment_of(body) or body).removesuffix("_r").removesuffix("_l")
+
+
+def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentParameters, float]:
+    """The same parameters with masses and inertias scaled to this total, and the factor."""
+    factor = mass_kg / bsp.total_mass_kg
+    scaled = BodySegmentParameters(bsp.segments, bsp.mass_kg * factor, bsp.com_m, bsp.inertia_kgm2 * factor)
+    return scaled, factor
+
+
+def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
+    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others.
+
+    Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
+    """
+    mass = dict(zip(own.segments, own.mass_kg, strict=True))
+    groups: dict[int, list[str]] = {}
+    carriers, _ = skeleton.placement_of_parameters(own.segments)
+    for name, carrier in zip(own.segments, carriers.tolist(), strict=True):
+        groups.setdefault(carrier, []).append(name)
+    heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
+    chosen = {max(names, key=mass.__getitem__) for names in heavy}
+    estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
+    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
+    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
+    return prior, rest if rest.segments else None
+
+
+def _part(bsp: BodySegmentParameters, names: Sequence[str]) -> BodySegmentParameters:
+    rows = [bsp.segments.index(name) for name in names]
+    return BodySegmentParameters(tuple(names), bsp.mass_kg[rows], bsp.com_m[rows], bsp.inertia_kgm2[rows])
+
+
+def _mass_note(model: OsimModel, own: BodySegmentParameters, factor: float) -> list[str]:
+    if abs(factor - 1.0) < _MASS_TOLERANCE:
+        return []
+    return [
+        f"the model weighs {model.bsp.total_mass_kg:.1f} kg, the person {own.total_mass_kg:.1f} kg: all its masses and "
+        f"inertias are multiplied by {factor:.3f} before the estimate"
+    ]
+
+
+def _idle_note(model: OsimModel, idle: Sequence[str]) -> list[str]:
+    if not idle:
+        return []
+    values = {c.name: c.default for c in model.coordinates}
+    angles = {c.name for c in model.coordinates if c.angle}
+    listed = ", ".join(
+        f"{name} ({np.degrees(values[name]):.0f} deg)" if name in angles else f"{name} ({values[name]:.3f} m)"
+        for name in idle
+    )
+    return [f"no marker shows these coordinates, which are locked at their defaults: {listed}"]
+
+
+def _held_note(skeleton: Skeleton, held: BodySegmentParameters | None) -> list[str]:
+    if held is None:
+        return []
+    parents = {joint.child: joint.parent for joint in skeleton.joints}
+    listed = ", ".join(f"{name} ({parents[name]})" for name in held.segments)
+    return [
+        f"bodies that weigh less than {LIGHT_KG:g} kg or move as one with another are estimated as one with it: they "
+        f"keep the model's own parameters, and what the data say of them goes to the neighbour (in brackets the "
+        f"parent): {listed}"
+    ]
+
+
+def _marker_notes(model: OsimModel, trials: Sequence[Trial]) -> list[str]:
+    notes = []
+    known_labels = set(model.skeleton.labels)
+    for trial in trials:
+        extra = [label for label in trial.markers.labels if label not in known_labels]
+        absent = [label for label in model.skeleton.labels if label not in trial.markers.labels]
+        if extra:
+            notes.append(f"{trial.name}: markers that the model does not have, left out: {', '.join(extra)}")
+        if absent:
+            notes.append(f"{trial.name}: markers of the model that it does not have: {', '.join(absent)}")
+    return notes

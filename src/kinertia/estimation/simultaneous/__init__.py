@@ -1,0 +1,1 @@
+"""Motion, body segment parameters and calibration in one maximum-a-posteriori estimate."""

@@ -1,0 +1,63 @@
+"""Error bars before any estimate: what trials tell at a given motion and given body segment parameters.
+
+The information of the simultaneous estimate (`simultaneous`) does not depend on the data but through the point at which
+it is taken. Taken at the literature's parameters it says beforehand what a recording will show; taken at the truth it
+is the Cramér-Rao bound of the estimator's own noise model, prior included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.marker_offsets import as_displaced
+from kinertia.estimation.simultaneous.normal_equations import reduced
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.solver import root_of_covariance
+from kinertia.model.bsp import block_diagonal
+from kinertia.model.log_cholesky import table_jacobian
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What each of several trials of a person tells of parameters and calibration, and what the prior tells.
+
+    Attributes:
+        problem: at whose start it is taken: the observations' coordinates, the prior's mean. Of observations as they
+            are alone (`observation.Observations`): repeats are counted here.
+        repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
+    """
+
+    problem: MapProblem
+    repeats: np.ndarray
+
+    @cached_property
+    def of_trials(self) -> tuple[np.ndarray, ...]:
+        """Per trial (S, S) information on the static unknowns, motion eliminated."""
+        problem = self.problem
+        normals = (problem.normal(k, start, problem.start_static) for k, start in enumerate(problem.start))
+        return tuple(reduced(normal, 0.0).information for normal in normals)
+
+    @cached_property
+    def of_prior(self) -> np.ndarray:
+        """(S, S) information of all priors."""
+        return self.problem.prior_terms(self.problem.start_static)[0]
+
+    def root(self, trials: Iterable[int]) -> np.ndarray:
+        """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
+        chosen = list(trials)
+        counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
+        layout, information = self.problem.layout, self.of_prior
+        for k, count in zip(chosen, counts, strict=True):
+            sd = self.problem.displacement_sd_m[k]
+            information = information + as_displaced(self.of_trials[k] / count, layout.locals, sd)
+        theta = layout.theta
+        chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
+        return chain @ root_of_covariance(information)[theta]
+
+    def sd(self, trials: Iterable[int]) -> np.ndarray:
+        """(s, 10) deviations of the body segment parameters that these trials together would leave."""
+        return np.linalg.norm(self.root(trials), axis=1).reshape(-1, 10)

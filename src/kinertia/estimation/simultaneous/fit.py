@@ -1,0 +1,239 @@
+"""The simultaneous estimate on measured trials of one person: priors, observations, outcome in the user's terms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.estimation.identifiability import BaseParameters, base_parameters
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.estimation.simultaneous.observation import CUTOFF_HZ, MarkerNoise, Observations, observe
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.problem import CalibrationPrior
+from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.kinematics import Kinematics
+
+PLATE_SD = {"x": 0.010, "z": 0.010, "gain": 0.02, "free moment": 0.0015}
+"""Names and units as in PLATE_UNKNOWNS. Gain: scale and plates of a laboratory may differ by this much before it is
+worth a warning (DESIGN section 7). Free moment: half a percent of the vertical force at 0.3 m (no source)."""
+CLOCK_SD_S = 0.005
+_STAYING_SD_M = 1e-6
+"""Of markers that stay where they are."""
+_NOTABLE = 2.0
+_DISPLACED_M = 0.03
+CONTRADICTION_SD = 3.0
+"""A parameter this many prior deviations from the literature contradicts the model."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What the simultaneous estimate says beyond the estimate itself.
+
+    Attributes:
+        prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
+        covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
+        calibration: per quantity its value, prior and posterior deviation, and unit.
+        marker_noise: per trial.
+        iterations: Gauss-Newton steps.
+        base: which combinations of parameters these motions show, and which none ever shows.
+    """
+
+    prior_sd: np.ndarray
+    sd: np.ndarray
+    covariance: np.ndarray
+    calibration: Mapping[str, Mapping[str, float | str]]
+    marker_noise: tuple[MarkerNoise, ...]
+    iterations: int
+    base: BaseParameters
+
+    @property
+    def information(self) -> np.ndarray:
+        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything; NaN for segments held."""
+        known = self.prior_sd > 0
+        return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class SimultaneousFit:
+    """Outcome of `fit_simultaneous`.
+
+    Attributes:
+        result: of the estimator.
+        bsp: all segments, those that are held included.
+        skeleton: with the estimated marker positions and static coordinates.
+        skeletons: the same per trial, with the markers where they are in it.
+        posterior: deviations and calibration.
+        motions: per trial, at the frames of its measured window.
+        foot_loads: per trial (w, 2, 6) at the corrected place and time.
+        warnings: one sentence each.
+    """
+
+    result: SimultaneousResult
+    bsp: BodySegmentParameters
+    skeleton: Skeleton
+    skeletons: tuple[Skeleton, ...]
+    posterior: Posterior
+    motions: tuple[Motion, ...]
+    foot_loads: tuple[np.ndarray, ...]
+    warnings: tuple[str, ...]
+
+
+def fit_simultaneous(
+    skeleton: Skeleton,
+    prior: BspPrior,
+    trials: Sequence[Kinematics],
+    cutoff_hz: float | str,
+    freedom: Freedom = GAIT27_FREEDOM,
+) -> SimultaneousFit:
+    """Estimate motion, BSPs and calibration of all trials together.
+
+    Args:
+        skeleton: calibrated.
+        prior: of the body segment parameters, and the total mass of its segments by the scale.
+        trials: kinematics of the trials.
+        cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
+        freedom: what may move beside these segments.
+    """
+    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    used = used_skeleton(skeleton, trials, freedom)
+    seen = observed(used, prior, trials, cutoff, freedom)
+    together = seen.together
+    calibration = calibration_prior(used, freedom)
+    result = estimate_simultaneous(used, prior, calibration, together, 1.0 / (2.0 * cutoff))
+    found = result.skeleton.carrying(None)
+    if freedom.marker_sd_m is None:
+        found = found.with_markers(used.markers)
+    motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
+    loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
+    covariance, before = (freedom.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
+    posterior = Posterior(
+        np.sqrt(np.diag(before)).reshape(-1, 10),
+        np.sqrt(np.diag(covariance)).reshape(-1, 10),
+        covariance,
+        _calibration(used, freedom, result),
+        seen.noise,
+        result.iterations,
+        base_parameters(
+            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in together]
+        ),
+    )
+    return SimultaneousFit(
+        result,
+        freedom.whole(result.bsp),
+        found,
+        tuple(found.with_places(found.marker_locals + moved) for moved in result.displacements_m),
+        posterior,
+        motions,
+        loads,
+        tuple(_warnings(prior, freedom, result, posterior, trials)),
+    )
+
+
+def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], freedom: Freedom) -> Skeleton:
+    """The skeleton with the markers that any of the trials shows, and the segments that are held."""
+    shown = {label for k in trials for label in k.ik.labels}
+    used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
+    return used.carrying(freedom.held)
+
+
+def observed(
+    skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], cutoff_hz: float, freedom: Freedom
+) -> Observations:
+    """What the estimate sees of trials of a `used_skeleton`."""
+    staying = freedom.marker_sd_m is None
+    return observe(skeleton, trials, prior.mass_kg + freedom.held_kg, cutoff_hz, staying)
+
+
+def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
+    """How far a calibrated skeleton with these markers, plates and clock may be off."""
+    places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
+    return CalibrationPrior(freedom.coordinates, places, PLATE_SD, CLOCK_SD_S)
+
+
+def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
+    found: dict[str, dict[str, float | str]] = {}
+    for name, (value, sd) in result.coordinates.items():
+        change = value - skeleton.locked[name]
+        told = {"value": change, "prior_sd": freedom.coordinates[name], "sd": sd}
+        found[name] = {**told, "unit": "rad" if name in freedom.axes else "m"}
+    for plate, (values, sds) in result.plates.items():
+        name = f"plate {plate.removeprefix('plate ')}"
+        for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
+            told = {"value": float(value), "prior_sd": PLATE_SD[unknown], "sd": float(deviation)}
+            found[f"{name}: {unknown}"] = {**told, "unit": unit}
+    clock, clock_sd = result.clock_s
+    found["clock: forces late by"] = {"value": clock, "prior_sd": CLOCK_SD_S, "sd": clock_sd, "unit": "s"}
+    return found
+
+
+SHOWN_UNIT = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "1": (1e2, "%"),
+    "rad": (180.0 / np.pi, "degrees"),
+    "N m/N": (1e3, "N m/kN"),
+}
+"""Factor and unit in which people read a calibrated quantity."""
+
+
+def _warnings(
+    prior: BspPrior,
+    freedom: Freedom,
+    result: SimultaneousResult,
+    posterior: Posterior,
+    trials: Sequence[Kinematics],
+) -> list[str]:
+    found = []
+    if not result.converged:
+        found.append(
+            f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
+        )
+    for name, told in posterior.calibration.items():
+        value, sd = float(told["value"]), float(told["prior_sd"])
+        if ":" in name and abs(value) > _NOTABLE * sd:
+            scale, unit = SHOWN_UNIT[str(told["unit"])]
+            found.append(
+                f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit}); check the instruments"
+            )
+    for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
+        if noise.wandering:
+            listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
+            found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
+    found += _attached_anew(result, trials)
+    away = (result.bsp.table() - prior.mean.table()) / prior.sd
+    far = [
+        f"{PARAMETERS[k]} of {result.bsp.segments[i]} {away[i, k]:+.1f}"
+        for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD)
+    ]
+    if far:
+        found.append(
+            f"the data contradict the model: {', '.join(far)} prior deviations from {freedom.source}; a wrong joint, "
+            f"plate or marker is likelier than an odd person"
+        )
+    return found
+
+
+def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:
+    """Markers that sit farther from where they are in the other trials than skin moves."""
+    labels = result.skeleton.labels
+    shown = np.array([np.isin(labels, k.ik.labels) for k in trials])
+    places = np.where(shown[..., None], result.displacements_m, np.nan)
+    found = []
+    for k, kinematics in enumerate(trials):
+        away = np.linalg.norm(places[k] - np.delete(places, k, axis=0), axis=-1)
+        closest = np.where(np.isnan(away), np.inf, away).min(axis=0, initial=np.inf)
+        far = [(label, value) for label, value in zip(labels, closest, strict=True) if _DISPLACED_M < value < np.inf]
+        if far:
+            listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in far)
+            found.append(
+                f"{kinematics.trial.name}: markers sit elsewhere in their segments than in the other trials: {listed}; "
+                f"skin moves up to some {_DISPLACED_M * 1e3:.0f} mm; correct their labels, or fit trials before and "
+                "after they were attached anew separately"
+            )
+    return found

@@ -1,0 +1,192 @@
+"""Standard deviations of joint moments, from motion, body segment parameters and calibration together.
+
+Delta method: the joint moments' analytic derivatives by spline coefficients and static unknowns, times their posterior
+covariance. Errors that come back (`repetition`) make the motion no vaguer, only what many frames say of what does not
+move: what is left of the motion if that were known is that of the errors alone. Of the coefficients' covariance only
+the blocks near the diagonal are needed, since six splines are active in any frame; they come from the block-banded
+factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what smoothing took off the loads under the feet,
+as a moving mean square: sharp forces at foot strike are lost to the moments of the leg.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.ndimage import uniform_filter1d
+
+from kinertia.estimation.simultaneous.marker_terms import FRAMES_AT_ONCE
+from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Reduced, by_splines
+from kinertia.estimation.simultaneous.problem import MapProblem, by_body
+from kinertia.model.log_cholesky import dynamic_jacobian
+from kinertia.model.skeleton import Pose, Skeleton
+
+_LOST_KNOTS = 2.0
+"""Half of the stretch over which what smoothing took off is averaged, in knot intervals: one period of the cutoff."""
+
+
+@dataclass(frozen=True)
+class MomentDerivatives:
+    """Derivatives of generalised forces at d frames.
+
+    Attributes:
+        q, qd, qdd: (d, c, c) by the coordinates that move and their rates.
+        static: (d, c, s) by the static unknowns that root equations depend on.
+        lost: (d, c) what the loads that smoothing took off would have added.
+    """
+
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    static: np.ndarray
+    lost: np.ndarray
+
+
+def joint_moment_sd(
+    problem: MapProblem,
+    k: int,
+    coefficients: np.ndarray,
+    static: np.ndarray,
+    eliminated: Reduced,
+    root: np.ndarray,
+) -> np.ndarray:
+    """(d, c) posterior deviations of the generalised forces of trial k at its dynamic frames, N m and N.
+
+    Args:
+        problem: of the estimate.
+        k: the trial.
+        coefficients, static: the estimate.
+        eliminated: the trial's normal equations there, undamped.
+        root: (S, S) root of the posterior covariance of the static unknowns.
+    """
+    basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
+    parts = problem.full(basis.evaluate(coefficients), static)
+    motion = _MotionSpread.of(eliminated, coefficients.shape[1], root)
+    variance, lost = np.empty((2, len(frames), coefficients.shape[1]))
+    for start in range(0, len(frames), FRAMES_AT_ONCE):
+        chosen = frames[start : start + FRAMES_AT_ONCE]
+        by = moment_derivatives(problem, k, [part[chosen] for part in parts], static, chosen)
+        still = by.static @ root[problem.layout.in_root]
+        through = by_splines(basis.values[:, chosen], (by.q, by.qd, by.qdd)).reshape(*by.q.shape[:2], -1)
+        lost[start : start + len(chosen)] = by.lost
+        for first in np.unique(basis.first[chosen]):
+            rows = np.flatnonzero(basis.first[chosen] == first)
+            own, carried = motion.active(int(first))
+            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1) / problem.trials[k].repeats
+            spread += np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
+            variance[start + rows] = spread
+    around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
+    variance += uniform_filter1d(np.square(lost), around, axis=0, mode="nearest")
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def moment_derivatives(
+    problem: MapProblem, k: int, motion: Sequence[np.ndarray], static: np.ndarray, frames: np.ndarray
+) -> MomentDerivatives:
+    """Derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
+
+    Args:
+        problem: of the estimate.
+        k: the trial.
+        motion: all coordinates, static ones included, and their rates (d, c), as `MapProblem.full` has them.
+        static: the estimate.
+        frames: (d,) indices.
+    """
+    trial, layout = problem.trials[k], problem.layout
+    skeleton = problem.placed(static)
+    q, qd, qdd = motion
+    model = skeleton.model_with(problem.bsp(static))
+    data = model.createData()
+    x, v, a = skeleton.map.motion(q, qd, qdd)
+    d, axes = x.shape
+    dq, dv, da = np.empty((d, axes, axes)), np.empty((d, axes, axes)), np.empty((d, axes, axes))
+    joints, place = skeleton.placement_of_parameters(problem.segments)
+    columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
+    tau, regressor = np.empty((d, axes)), np.empty((d, axes, len(columns)))
+    for i in range(d):
+        pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
+        tau[i], dq[i], dv[i], da[i] = data.tau, data.dtau_dq, data.dtau_dv, data.M
+        regressor[i] = pin.computeJointTorqueRegressor(model, data, x[i], v[i], a[i])[:, columns]
+    da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
+    loads, rates = (problem.foot_loads(k, static, order, frames) for order in (0, 1))
+    pose = skeleton.pose(q)
+    by_static, lost = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
+    by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
+    for foot, name in enumerate(skeleton.feet):
+        moves = skeleton.support[skeleton.segments.index(name)]
+        jacobian = (pose.jacobian * moves).transpose(0, 2, 1)
+        only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
+        by_plate = trial.ground.by_plate(only, problem.carriers[k][frames], problem.plate_values(static))
+        by_static[:, :, layout.plates] -= jacobian @ by_plate
+        by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]
+        tau -= (jacobian @ loads[:, foot, :, None])[..., 0]
+        lost -= (jacobian @ trial.ground.lost[frames, foot, :, None])[..., 0]
+        dq -= _load_derivative(pose, moves, loads[:, foot])
+    by_q, by_qd, by_qdd = (
+        _rows_to_coordinates(skeleton, pose, part)
+        for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+    )
+    each = np.arange(q.shape[1])
+    by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
+    by_static = _rows_to_coordinates(skeleton, pose, by_static)
+    by_static[:, :, layout.coordinates] = by_q[:, :, problem.still]
+    rows = problem.moving[:, None]
+    by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (by_q, by_qd, by_qdd))
+    lost = skeleton.map.to_coordinates(lost, pose.slopes)[:, problem.moving]
+    return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving], lost)
+
+
+def _rows_to_coordinates(skeleton: Skeleton, pose: Pose, by: np.ndarray) -> np.ndarray:
+    """(d, c, k) from (d, a, k): rows of axes to those of coordinates."""
+    return skeleton.map.to_coordinates(by.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
+
+
+def _load_derivative(pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """(d, a, a) derivative of J^T load by the axes' places, for a load (d, 6) at the ground origin.
+
+    An axis turns the axes of all that come after it: column j of J changes by the motion product of i and j.
+    """
+    columns = pose.jacobian.transpose(0, 2, 1) * moves[:, None]
+    linear, angular = columns[..., :3], columns[..., 3:]
+    force, moment = load[:, None, :3], load[:, None, 3:]
+    # (J_i x J_j) . load = J_j . (load carried along by i)
+    carried = np.concatenate([np.cross(force, angular), np.cross(moment, angular) + np.cross(force, linear)], axis=-1)
+    changed = columns @ carried.transpose(0, 2, 1)
+    order = np.arange(len(moves))
+    return np.where(order[:, None] > order, changed, 0.0)
+
+
+@dataclass(frozen=True)
+class _MotionSpread:
+    """How uncertain neighbouring spline coefficients are, and how they go with the static unknowns.
+
+    Attributes:
+        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k) of their covariance if the static
+            unknowns were known.
+        carried: (splines, c, S) how far one deviation of each independent part of the static unknowns carries them.
+    """
+
+    diagonal: np.ndarray
+    below: np.ndarray
+    carried: np.ndarray
+
+    @classmethod
+    def of(cls, eliminated: Reduced, c: int, root: np.ndarray) -> _MotionSpread:
+        band, size = eliminated.band, len(root)
+        carried = band.backward(eliminated.border).reshape(-1, size) @ root
+        return cls(*band.inverse_blocks(), carried.reshape(-1, c, size))
+
+    def active(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """(6 c, 6 c) covariance and (6 c, S) of the six splines from `first` on."""
+        block, offset = divmod(first, SPLINES_PER_BLOCK)
+        pair = np.block(
+            [
+                [self.diagonal[block], self.below[block].T],
+                [self.below[block], self.diagonal[block + 1]],
+            ]
+        )
+        c = self.carried.shape[1]
+        here = slice(offset * c, (offset + 6) * c)
+        return pair[here, here], self.carried[first : first + 6].reshape(6 * c, -1)

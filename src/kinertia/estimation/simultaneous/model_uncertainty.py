@@ -1,0 +1,69 @@
+"""What the simultaneous estimate may move of a model beside the segments of its prior, and what it leaves alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+
+JOINT_CENTRE_SD_M = 0.010
+JOINT_AXIS_SD_RAD = float(np.radians(5.0))
+MARKER_SD_M = 0.005
+"""The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """Joint centres and markers that may move, and segments that are not estimated.
+
+    Attributes:
+        centres: static coordinate of the skeleton (locked) -> prior deviation, m.
+        marker_sd_m: prior deviation of marker positions in their segments, each axis; None: they stay where they are.
+        held: parameters of the segments that the prior does not have; None where it has all.
+        source: where the prior's mean comes from, for messages.
+        axes: static coordinate that tilts a joint's axis -> prior deviation, rad.
+    """
+
+    centres: Mapping[str, float]
+    marker_sd_m: float | None
+    held: BodySegmentParameters | None
+    source: str
+    axes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def coordinates(self) -> dict[str, float]:
+        """All static coordinates that may move -> prior deviation, m or rad."""
+        return {**self.centres, **self.axes}
+
+    def with_axes(self) -> Freedom:
+        """The same with the axes of knees, ankles and elbows of the 27-DOF model free."""
+        return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
+
+    @property
+    def held_kg(self) -> float:
+        """Mass of the segments that are not estimated."""
+        return 0.0 if self.held is None else self.held.total_mass_kg
+
+    def whole(self, estimate: BodySegmentParameters) -> BodySegmentParameters:
+        """The estimate, and after it the segments that are held."""
+        if self.held is None:
+            return estimate
+        table = np.concatenate([estimate.table(), self.held.table()])
+        return BodySegmentParameters.from_table((*estimate.segments, *self.held.segments), table)
+
+    def whole_covariance(self, covariance: np.ndarray) -> np.ndarray:
+        """(10 s, 10 s) in the order of `whole`, zero for segments that are held."""
+        return np.pad(covariance, (0, 0 if self.held is None else 10 * len(self.held.segments)))
+
+
+GAIT27_FREEDOM = Freedom(
+    dict.fromkeys((*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS), JOINT_CENTRE_SD_M),
+    MARKER_SD_M,
+    None,
+    "the literature",
+)
+"""The 27-DOF model: hip, lumbar and shoulder centres, and all markers."""

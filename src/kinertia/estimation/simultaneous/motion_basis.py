@@ -1,0 +1,65 @@
+"""Uniform quintic B-splines for the coordinates of a trial, with the normal equations of anything that depends on
+them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+
+from kinertia.motion.smoothing import columns_alike
+
+_DEGREE = 5
+_ACTIVE = _DEGREE + 1
+_RIDGE = 1e-8
+"""Keeps splines that no frame touches at zero."""
+_ROUNDING = 1e-9
+"""Of a knot interval."""
+
+
+class MotionBasis:
+    """Uniform quintic B-splines over a trial's time, with knots no closer than frames.
+
+    Six splines are active at any time, and seven at two neighbouring frames.
+
+    Attributes:
+        size: number of splines.
+        first: (n,) the first active spline of each frame.
+        values: (3, n, 6) values of the active splines and their first two time derivatives.
+    """
+
+    def __init__(self, time: np.ndarray, spacing_s: float) -> None:
+        count = min(max(1, int(np.ceil((time[-1] - time[0]) / spacing_s))), len(time) - 1)
+        step = (time[-1] - time[0]) / count
+        knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
+        self.size = count + _DEGREE
+        self.first = np.minimum(((time - time[0]) / step + _ROUNDING).astype(int), count - 1)
+        # on a uniform grid all splines are one, shifted
+        shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
+        local = (time - time[0]) / step - self.first
+        at = local[:, None] + np.arange(_DEGREE, -1, -1)
+        self.values = np.stack([shape.derivative(d)(at) / step**d if d else shape(at) for d in range(3)])
+        self.active = self.first[:, None] + np.arange(_ACTIVE)
+        self.knots = knots
+
+    def evaluate(self, coefficients: np.ndarray) -> list[np.ndarray]:
+        """Coordinates and their first two derivatives, each (n, c), of coefficients (size, c)."""
+        active = coefficients[self.active]
+        return [np.einsum("na,nac->nc", values, active) for values in self.values]
+
+    def fit(self, q: np.ndarray) -> np.ndarray:
+        """(size, c) least-squares coefficients of q (n, c); NaN rows of a column are left out."""
+        seen = np.isfinite(q)
+        filled = np.where(seen, q, 0.0)
+        coefficients = np.empty((self.size, q.shape[1]))
+        for mask, columns in columns_alike(seen):
+            value = self.values[0] * mask[:, None]
+            band = np.zeros((_ACTIVE, self.size))
+            right = np.zeros((self.size, len(columns)))
+            for a in range(_ACTIVE):
+                np.add.at(right, self.active[:, a], value[:, a, None] * filled[:, columns])
+                for b in range(a, _ACTIVE):
+                    np.add.at(band[b - a], self.active[:, a], value[:, a] * value[:, b])
+            band[0] += _RIDGE
+            coefficients[:, columns] = solveh_banded(band, right, lower=True)
+        return coefficients

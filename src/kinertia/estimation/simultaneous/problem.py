@@ -1,0 +1,343 @@
+"""Terms of the simultaneous estimate: residuals, derivatives and normal equations of markers, root and priors.
+
+All derivatives are analytic, and come from Pinocchio's Jacobian, RNEA derivatives and joint torque regressor. Frames
+are summed knot interval by knot interval: the normal matrix is banded in the motion and bordered by what does not move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.marker_terms import marker_terms
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.normal_equations import NormalEquations, assemble
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
+from kinertia.model.bsp import BodySegmentParameters, block_diagonal
+from kinertia.model.log_cholesky import (
+    dynamic_jacobian,
+    from_log_cholesky,
+    nearest_consistent,
+    table_jacobian,
+    to_log_cholesky,
+)
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.inverse_kinematics import ancestor_of
+
+COEFFICIENT_SD = 1.0
+"""Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One trial as the estimator sees it.
+
+    Attributes:
+        time: (n,) s, uniform.
+        markers: (n, m, 3) m in the order of the skeleton's markers; NaN where not seen.
+        marker_sd: (m,) effective deviation of each marker coordinate in one frame, m.
+        marker_autocorrelation: of these errors between neighbouring frames (`marker_terms`).
+        q: (n, c) start.
+        dynamic: (n,) frames whose ground contacts are all measured.
+        ground: the loads on the feet, and the plates that measured them.
+        force_sd, moment_sd: effective deviations of the root residual, N and N m.
+        displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
+        repeats: by how much errors that come back have raised all variances (`repeated`).
+    """
+
+    time: np.ndarray
+    markers: np.ndarray
+    marker_sd: np.ndarray
+    marker_autocorrelation: float
+    q: np.ndarray
+    dynamic: np.ndarray
+    ground: FootPlates
+    force_sd: float
+    moment_sd: float
+    displacement_sd_m: np.ndarray | float = 0.0
+    repeats: float = 1.0
+
+    def repeated(self, times: float) -> Observation:
+        """The same where its errors come back so many times in all that is estimated from."""
+        more = np.sqrt(times)
+        return replace(
+            self,
+            marker_sd=more * self.marker_sd,
+            force_sd=more * self.force_sd,
+            moment_sd=more * self.moment_sd,
+            repeats=times * self.repeats,
+        )
+
+
+@dataclass(frozen=True)
+class CalibrationPrior:
+    """Prior deviations of the calibration; the skeleton as it stands is the mean.
+
+    Attributes:
+        coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
+        marker_sd_m: (m,) of each marker's position in its segment, each axis.
+        plate_sd: of each of PLATE_UNKNOWNS.
+        clock_sd_s: of the time between forces and markers.
+    """
+
+    coordinates: Mapping[str, float]
+    marker_sd_m: np.ndarray
+    plate_sd: Mapping[str, float]
+    clock_sd_s: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each kind of static unknown stands in the vector."""
+
+    theta: slice
+    plates: slice
+    clock: int
+    coordinates: slice
+    locals: slice
+
+    @classmethod
+    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int) -> Layout:
+        """The layout for these numbers of unknowns."""
+        counts = [n_bsp, len(PLATE_UNKNOWNS) * n_plates, 1, n_coordinates, 3 * n_markers]
+        ends = np.cumsum(counts).tolist()
+        theta, plates, clock, coordinates, places = (
+            slice(end - count, end) for end, count in zip(ends, counts, strict=True)
+        )
+        return cls(theta, plates, clock.start, coordinates, places)
+
+    @property
+    def in_root(self) -> slice:
+        """What the root equations depend on: all but the marker positions."""
+        return slice(0, self.coordinates.stop)
+
+    @property
+    def in_markers(self) -> slice:
+        """What the markers depend on: static coordinates and marker positions."""
+        return slice(self.coordinates.start, self.locals.stop)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.locals.stop
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all unknowns.
+
+    Attributes:
+        coefficients: per trial those of its motion.
+        static: (S,) what does not move.
+        displaced: per trial (3 m,) displacements of its markers (`displacement`), in prior deviations.
+    """
+
+    coefficients: tuple[np.ndarray, ...]
+    static: np.ndarray
+    displaced: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
+    squares of everything. Each trial's are those of the static unknowns as they are in it.
+    """
+
+    point: Point
+    normals: tuple[NormalEquations, ...]
+    information: np.ndarray
+    right: np.ndarray
+    cost: float
+
+
+class MapProblem:
+    """Residuals and normal equations at a point."""
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        prior: BspPrior,
+        calibration: CalibrationPrior,
+        trials: Sequence[Observation],
+        spacing_s: float,
+    ) -> None:
+        self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
+        self.free = skeleton.free(calibration.coordinates)
+        names = list(self.free.coordinates)
+        self.moving = np.array([names.index(name) for name in skeleton.coordinates])
+        self.still = np.array([names.index(name) for name in calibration.coordinates], dtype=int)
+        self.segments = prior.mean.segments
+        self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
+        self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
+        self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
+        self.carriers = [trial.ground.columns(self.plates) for trial in trials]
+        self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
+        self.above = ancestor_of(self.free)
+        count = len(skeleton.markers)
+        self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
+        self.information = np.linalg.inv(prior.covariance)
+        self.start_static = np.zeros(self.layout.size)
+        self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
+        self.start_static[self.layout.coordinates] = [skeleton.locked[name] for name in calibration.coordinates]
+        self.start_static[self.layout.locals] = skeleton.marker_locals.ravel()
+        deviation = np.full(self.layout.size, np.inf)
+        deviation[self.layout.coordinates] = list(calibration.coordinates.values())
+        deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
+        deviation[self.layout.plates] = [calibration.plate_sd[name] for name in PLATE_UNKNOWNS] * len(self.plates)
+        deviation[self.layout.clock] = calibration.clock_sd_s
+        self.weight = 1.0 / np.square(deviation)
+
+    @property
+    def beginning(self) -> Point:
+        """Where the estimate starts: the observations' coordinates, the prior's mean, no displacements."""
+        return Point(tuple(self.start), self.start_static, tuple(np.zeros_like(sd) for sd in self.displacement_sd_m))
+
+    def bsp(self, static: np.ndarray) -> BodySegmentParameters:
+        """Body segment parameters of the static unknowns."""
+        return from_log_cholesky(self.segments, static[self.layout.theta])
+
+    def placed(self, static: np.ndarray) -> Skeleton:
+        """The freed skeleton with markers where the static unknowns put them."""
+        return self.free.with_places(static[self.layout.locals].reshape(-1, 3))
+
+    def shortened(self, step: np.ndarray) -> np.ndarray:
+        """The step with no logarithm (mass, second moments) changing by more than one."""
+        logs = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
+        step = step.copy()
+        step[logs] = np.clip(step[logs], -1.0, 1.0)
+        return step
+
+    def full(self, parts: Sequence[np.ndarray], static: np.ndarray) -> list[np.ndarray]:
+        """Coordinates and derivatives of the freed skeleton: the static ones do not move."""
+        result = []
+        for order, part in enumerate(parts):
+            every = np.zeros((len(part), len(self.free.coordinates)))
+            every[:, self.moving] = part
+            if order == 0:
+                every[:, self.still] = static[self.layout.coordinates]
+            result.append(every)
+        return result
+
+    def prior_terms(self, static: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Information (S, S), right-hand side (S,) and cost of all priors."""
+        bsp = self.bsp(static)
+        jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
+        gap = (bsp.table() - self.prior.mean.table()).ravel()
+        mass_row = jacobian[0::10].sum(axis=0) / self.prior.mass_sd_kg
+        mass_gap = (bsp.total_mass_kg - self.prior.mass_kg) / self.prior.mass_sd_kg
+        information = np.diag(self.weight)
+        right = -self.weight * (static - self.start_static)
+        cost = float(np.sum(self.weight * np.square(static - self.start_static)))
+        theta = self.layout.theta
+        information[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
+        right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
+        return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
+
+    def at(self, point: Point) -> Linearised:
+        """Cost and normal equations at a point."""
+        normals = tuple(self.normal(k, part, self.in_trial(k, point)) for k, part in enumerate(point.coefficients))
+        information, right, cost = self.prior_terms(point.static)
+        cost += sum(0.5 * float(own @ own) for own in point.displaced)
+        return Linearised(point, normals, information, right, cost + sum(normal.cost for normal in normals))
+
+    def in_trial(self, k: int, point: Point) -> np.ndarray:
+        """(S,) static unknowns as they are in trial k: its markers displaced."""
+        static = point.static.copy()
+        static[self.layout.locals] += self.displacement_sd_m[k] * point.displaced[k]
+        return static
+
+    def root_sd(self, trial: Observation) -> np.ndarray:
+        """(6,) deviations of the root residual: N, N m."""
+        return np.repeat([trial.force_sd, trial.moment_sd], 3)
+
+    def plate_values(self, static: np.ndarray) -> np.ndarray:
+        """(p, 4) what is wrong with every plate, in the order of PLATE_UNKNOWNS."""
+        return static[self.layout.plates].reshape(-1, len(PLATE_UNKNOWNS))
+
+    def foot_loads(
+        self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
+    ) -> np.ndarray:
+        """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
+        trial = self.trials[k]
+        at = trial.time[frames] + static[self.layout.clock]
+        return trial.ground.corrected(at, self.carriers[k][frames], self.plate_values(static), derivative)
+
+    def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
+        """Normal equations of trial k."""
+        trial, basis, layout = self.trials[k], self.bases[k], self.layout
+        parts = self.full(basis.evaluate(coefficients), static)
+        skeleton = self.placed(static)
+        noise = (trial.marker_sd, trial.marker_autocorrelation)
+        marker = marker_terms(skeleton, self.above, trial.markers, parts[0], noise, self.moving, self.still)
+        root = self._root_terms(k, skeleton, parts, static)
+        normal = assemble(basis, marker, root, layout.in_markers, layout.in_root)
+        moved = coefficients - self.start[k]
+        normal.band[:, 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2
+        normal.right -= moved / COEFFICIENT_SD**2
+        normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
+        return normal
+
+    def _root_terms(
+        self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, s), residual."""
+        trial, layout = self.trials[k], self.layout
+        frames = np.flatnonzero(trial.dynamic)
+        q, qd, qdd = (part[frames] for part in parts)
+        bsp = self.bsp(static)
+        model = skeleton.model_with(bsp)
+        data = model.createData()
+        # the regressor needs no static coordinates: a model without them is smaller
+        names = list(self.calibration.coordinates)
+        smaller = skeleton.lock(dict(zip(names, static[layout.coordinates].tolist(), strict=True)))
+        bare, bare_data = smaller.model, smaller.model.createData()
+        joints, place = smaller.placement_of_parameters(self.segments)
+        columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
+        x, v, a = skeleton.map.motion(q, qd, qdd)
+        few = np.stack(smaller.map.motion(*(part[:, self.moving] for part in (q, qd, qdd))))
+        d, axes = x.shape
+        dq, dv, da = np.empty((d, 6, axes)), np.empty((d, 6, axes)), np.empty((d, 6, axes))
+        tau, regressor = np.empty((d, 6)), np.empty((d, 6, len(columns)))
+        for i in range(d):
+            pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
+            tau[i] = data.tau[:6]
+            dq[i], dv[i], da[i] = data.dtau_dq[:6], data.dtau_dv[:6], data.M[:6]
+            regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
+        square = da[:, :, :6]
+        da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
+        dq, dv, da = skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+        root = skeleton.root
+        loads = self.foot_loads(k, static, 0, frames)
+        wrench = loads.sum(axis=1)
+        dq[:, :, :6] -= root.ground_load_derivative(q, wrench)
+        by_static = np.zeros((d, 6, layout.in_root.stop))
+        by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
+        by_static[:, :, layout.coordinates] = dq[:, :, self.still]
+        by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
+        for column in range(by_plate.shape[2]):
+            by_static[:, :, layout.plates.start + column] = -root.ground_load_to_generalised(q, by_plate[..., column])
+        rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
+        by_static[:, :, layout.clock] = -root.ground_load_to_generalised(q, rates)
+        sd = self.root_sd(trial)[None, :, None]
+        left = (tau - root.ground_load_to_generalised(q, wrench)) / sd[..., 0]
+        return (
+            frames,
+            dq[..., self.moving] / sd,
+            dv[..., self.moving] / sd,
+            da[..., self.moving] / sd,
+            by_static / sd,
+            left,
+        )
+
+
+def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
+    """(d, r, 10 s) derivative by the body's unknowns, from a regressor (d, r, 10 s) and `chain` (s, 10, 10), the
+    derivative of each segment's parameters in it by the segment's own ten.
+    """
+    d, r, wide = regressor.shape
+    by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain
+    return by_segment.transpose(1, 0, 2).reshape(d, r, wide)

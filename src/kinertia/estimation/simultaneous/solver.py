@@ -1,0 +1,201 @@
+"""Motion, body segment parameters and calibration in one maximum-a-posteriori estimate (DESIGN section 6).
+
+Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
+log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
+segments, how far they are from these in each of several trials (`displacement`), what is wrong with each plate
+(`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
+deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg damping, all
+derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`);
+its Schur complement is the information on them, and its inverse their covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
+from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
+from kinertia.estimation.simultaneous.normal_equations import Reduced, reduced
+from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
+from kinertia.model.bsp import BodySegmentParameters, block_diagonal
+from kinertia.model.log_cholesky import table_jacobian
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion
+
+
+@dataclass(frozen=True)
+class SimultaneousResult:
+    """Outcome of `estimate_simultaneous`.
+
+    Attributes:
+        bsp: the estimate, physically consistent.
+        bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
+        skeleton: with the estimated marker positions and static coordinates.
+        coordinates: static coordinate -> (value, posterior deviation), rad or m.
+        plates: per plate what is wrong with it (4,), in the order of PLATE_UNKNOWNS, and the posterior deviations (4,).
+        clock_s: the time offset and its posterior deviation, s.
+        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
+        motions: per trial q, qd, qdd at its frames.
+        displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
+        moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
+        converged: the last step was short: CONVERGED_SD, CONVERGED.
+        iterations: Gauss-Newton steps taken.
+        cost: half the sum of squares, at the start and at the end.
+    """
+
+    bsp: BodySegmentParameters
+    bsp_covariance: np.ndarray
+    skeleton: Skeleton
+    coordinates: dict[str, tuple[float, float]]
+    plates: dict[str, tuple[np.ndarray, np.ndarray]]
+    clock_s: tuple[float, float]
+    foot_loads: tuple[np.ndarray, ...]
+    motions: tuple[Motion, ...]
+    displacements_m: tuple[np.ndarray, ...]
+    moment_sd: tuple[np.ndarray, ...]
+    converged: bool
+    iterations: int
+    cost: tuple[float, float]
+
+
+CONVERGED_SD = 0.1
+"""Stop after a step that moves body and calibration by less, in posterior deviations of all of them together, ..."""
+CONVERGED = 1.0
+"""... and promises to lower half the sum of squares by less: what is left to the motion is below its own deviations."""
+_FIRST_DAMPING = 1e-5
+"""Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
+information: 1e-3 would hold the first steps back."""
+_STUCK = 1e6
+"""Damping at which no step lowers the cost any more."""
+_MAX_ITERATIONS = 40
+_SINGULAR = 1e-13
+"""Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
+
+
+def estimate_simultaneous(
+    skeleton: Skeleton, prior: BspPrior, calibration: CalibrationPrior, trials: Sequence[Observation], spacing_s: float
+) -> SimultaneousResult:
+    """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
+    problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
+    here = problem.at(problem.beginning)
+    begin, damping, iterations, converged = here.cost, _FIRST_DAMPING, 0, False
+    scale = np.zeros(problem.layout.size)
+    while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
+        iterations += 1
+        scale = np.maximum(scale, np.diag(here.information) + sum(np.diag(normal.static) for normal in here.normals))
+        there, promised, moved_sd = _step(problem, here, damping, scale)
+        kept = (here.cost - there.cost) / promised
+        converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
+        if kept > 0.0:
+            here = there
+        damping = max(damping * _change_of_damping(kept), 1e-9)
+    covariance, moment_sd = _deviations(problem, here)
+    return _result(problem, here.point, covariance, moment_sd, converged, iterations, (begin, here.cost))
+
+
+def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """Posterior covariance (S, S) of the static unknowns, and deviations of the joint moments of every trial."""
+    parts, displaced = _eliminated(problem, here, 0.0)
+    told = [each.information for each in displaced]
+    root = root_of_covariance(here.information + sum(told))
+    moment_sd = []
+    for k, (motion, part) in enumerate(zip(here.point.coefficients, parts, strict=True)):
+        in_trial, sd = root, problem.displacement_sd_m[k]
+        if sd.any():
+            elsewhere = here.information + sum(told[:k] + told[k + 1 :])
+            in_trial = root_of_covariance(part.information + as_displaced(elsewhere, problem.layout.locals, sd))
+        static = problem.in_trial(k, here.point)
+        moment_sd.append(joint_moment_sd(problem, k, motion, static, part, in_trial))
+    return root @ root.T, tuple(moment_sd)
+
+
+def _eliminated(problem: MapProblem, here: Linearised, damping: float) -> tuple[list[Reduced], list[Displaced]]:
+    """Normal equations of all trials without motion, and without motion and displacements."""
+    parts = [reduced(normal, damping) for normal in here.normals]
+    rows = zip(parts, problem.displacement_sd_m, here.point.displaced, strict=True)
+    places = problem.layout.locals
+    return parts, [Displaced.of(part.information, part.right, places, sd, own) for part, sd, own in rows]
+
+
+def _change_of_damping(kept: float) -> float:
+    """Factor on the damping after a step that lowered the cost by this share of what it promised."""
+    if kept > 0.75:
+        return 0.1
+    return 1.0 if kept > 0.25 else 10.0
+
+
+def root_of_covariance(information: np.ndarray) -> np.ndarray:
+    """R with covariance R R^T; finite also where a segment has come near the edge of what is physically possible.
+
+    There the logarithm of a second moment tells nothing any more, and the information on it may round to below zero.
+    """
+    scale = 1.0 / np.sqrt(np.diag(information))
+    values, vectors = np.linalg.eigh(scale[:, None] * information * scale)
+    return scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+
+
+def _step(problem: MapProblem, here: Linearised, damping: float, scale: np.ndarray) -> tuple[Linearised, float, float]:
+    """Where a step leads, by how much it promises to lower the cost, and how far body and calibration move, in
+    deviations of all of them together.
+    """
+    parts, displaced = _eliminated(problem, here, damping)
+    information = here.information + sum(each.information for each in displaced)
+    right = here.right + sum(each.right for each in displaced)
+    information[np.diag_indices_from(information)] += damping * scale
+    step = np.linalg.solve(information, right)
+    moved_sd = float(np.sqrt(step @ information @ step))
+    coefficients, moved = [], []
+    promised = 0.5 * float(here.right @ step)
+    for k, (part, normal) in enumerate(zip(parts, here.normals, strict=True)):
+        size, c = normal.right.shape
+        old, own = here.point.displaced[k], displaced[k].step(step)
+        in_trial = step.copy()
+        in_trial[problem.layout.locals] += problem.displacement_sd_m[k] * own
+        move = part.band.backward(part.motion - part.border @ in_trial[:, None]).reshape(-1, c)[:size]
+        coefficients.append(here.point.coefficients[k] + move)
+        moved.append(old + own)
+        promised += 0.5 * float(normal.static_right @ in_trial + (normal.right * move).sum() - old @ own)
+    point = Point(tuple(coefficients), here.point.static + problem.shortened(step), tuple(moved))
+    return problem.at(point), promised, moved_sd
+
+
+def _result(
+    problem: MapProblem,
+    point: Point,
+    covariance: np.ndarray,
+    moment_sd: tuple[np.ndarray, ...],
+    converged: bool,
+    iterations: int,
+    cost: tuple[float, float],
+) -> SimultaneousResult:
+    layout, values = problem.layout, point.static
+    bsp = problem.bsp(values)
+    chain = block_diagonal(table_jacobian(values[layout.theta]))
+    sd = np.sqrt(np.diag(covariance))
+    names = list(problem.calibration.coordinates)
+    found = {
+        name: (float(value), float(dev))
+        for name, value, dev in zip(names, values[layout.coordinates], sd[layout.coordinates], strict=True)
+    }
+    markers = problem.placed(values).markers
+    skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in found.items()})
+    plates = zip(problem.plate_values(values), problem.plate_values(sd), strict=True)
+    return SimultaneousResult(
+        bsp,
+        chain @ covariance[layout.theta, layout.theta] @ chain.T,
+        skeleton,
+        found,
+        dict(zip(problem.plates, plates, strict=True)),
+        (float(values[layout.clock]), float(sd[layout.clock])),
+        tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
+        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
+        tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
+        moment_sd,
+        converged,
+        iterations,
+        cost,
+    )

@@ -1,0 +1,239 @@
+"""Ground reaction forces from MOT/STO files, with or without an OpenSim ExternalLoads file."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kinertia.errors import FileError
+from kinertia.io.number_table import expect_file
+from kinertia.io.sto import read_sto
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+
+_FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Which columns hold one plate's load: each identifier is followed by x, y, z."""
+
+    name: str
+    force: str
+    point: str
+    torque: str | None
+    foot: str | None
+
+
+def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = None) -> PlateLoads:
+    """Read force plates from a MOT or STO file: force and point of application in ground axes, N, m, N m.
+
+    With an ExternalLoads file its identifiers say which column is what and its bodies which foot it claims (a
+    claim only); its own `datafile` is used only when `mot_path` is None. Without one, columns are recognised
+    by name: `ground_force_vx`, `1_ground_force_vx`, `ground_force_r_vx`, `ground_force_1_vx` and the like,
+    with the point `..._px` and the torque `..._mx`, `ground_torque_...x` or `ground_moment_...mx`.
+
+    Samples with less than `LOAD_THRESHOLD_N` of vertical force are set to zero: their point of application is
+    garbage. Where no torque is given, the free moment is zero. `read_forces_with_notes` tells what was
+    assumed.
+
+    Raises:
+        FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
+            in ground, time does not grow, a loaded sample is NaN, or the forces point down.
+    """
+    return read_forces_with_notes(mot_path, loads_path)[0]
+
+
+def read_forces_with_notes(
+    mot_path: str | Path | None, loads_path: str | Path | None = None
+) -> tuple[PlateLoads, tuple[str, ...]]:
+    """`read_forces` and the assumptions made while reading, one sentence each."""
+    notes: tuple[str, ...] = ()
+    if loads_path is None:
+        if mot_path is None:
+            raise ValueError("read_forces needs a force file or an ExternalLoads file")
+        path = Path(mot_path)
+        table = read_sto(path)
+        groups = _groups_by_name(path, table)
+    else:
+        loads_path = Path(loads_path)
+        root = _external_loads(loads_path)
+        path = Path(mot_path) if mot_path is not None else _datafile(root, loads_path)
+        table = read_sto(path)
+        groups, notes = _groups_by_identifier(root, loads_path)
+        _expect_columns(groups, table, path, loads_path)
+    _expect_steady_time(path, table.index.to_numpy(float))
+    wrenches = [_wrench(path, table, group) for group in groups]
+    loads = PlateLoads(
+        table.index.to_numpy(float),
+        tuple(group.name for group in groups),
+        np.stack([force for force, _ in wrenches], axis=1),
+        np.stack([moment for _, moment in wrenches], axis=1),
+        tuple(group.foot for group in groups),
+    )
+    return loads, (*notes, *_remarks(path, loads, groups))
+
+
+def _expect_steady_time(path: Path, time: FloatArray) -> None:
+    steps = np.diff(time)
+    if not steps.size:
+        return
+    usual = float(np.median(steps))
+    odd = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * abs(usual)))
+    if odd.size:
+        before, after = time[odd[0]], time[odd[0] + 1]
+        raise FileError(
+            path,
+            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal "
+            "steps, export the forces without gaps",
+        )
+
+
+def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArray, FloatArray]:
+    """Force (k, 3) and moment about the ground origin (k, 3), zero below the threshold."""
+    force = _triple(table, group.force)
+    _expect_numbers(path, table, group.force, np.ones(len(force), dtype=bool))
+    if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
+        raise FileError(
+            path,
+            f"the largest vertical force in {group.force}y is {force[:, 1].min():.0f} N, downward; expected "
+            "Y up and the force on the person, turn the sign or the axes before export",
+        )
+    loaded = force[:, 1] >= LOAD_THRESHOLD_N
+    _expect_numbers(path, table, group.point, loaded)
+    moment = np.cross(_triple(table, group.point), force)
+    if group.torque is not None:
+        _expect_numbers(path, table, group.torque, loaded)
+        moment = moment + _triple(table, group.torque)
+    return np.where(loaded[:, None], force, 0.0), np.where(loaded[:, None], moment, 0.0)
+
+
+def _triple(table: pd.DataFrame, identifier: str) -> FloatArray:
+    return table[[identifier + axis for axis in "xyz"]].to_numpy(float)
+
+
+def _expect_numbers(path: Path, table: pd.DataFrame, identifier: str, where: np.ndarray) -> None:
+    broken = np.argwhere(np.isnan(_triple(table, identifier)) & where[:, None])
+    if broken.size:
+        row, axis = broken[0]
+        raise FileError(
+            path,
+            f"column {identifier}{'xyz'[axis]} has no number at {table.index[row]:g} s; expected one for "
+            "every loaded sample, fill the gap or cut the trial before export",
+        )
+
+
+def _remarks(path: Path, loads: PlateLoads, groups: Sequence[_Columns]) -> list[str]:
+    idle = [name for name, force in zip(loads.names, loads.force.swapaxes(0, 1), strict=True) if not force.any()]
+    still = [group.name for group in groups if group.torque is None]
+    notes = []
+    if idle:
+        notes.append(f"{path.name}: {', '.join(idle)} never carries {LOAD_THRESHOLD_N:g} N")
+    if still:
+        notes.append(f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero")
+    return notes
+
+
+def _groups_by_name(path: Path, table: pd.DataFrame) -> list[_Columns]:
+    columns = [str(column) for column in table.columns]
+    forces = [c[:-1] for c in columns if c.endswith("vx") and {c[:-1] + "y", c[:-1] + "z"} <= set(columns)]
+    groups = []
+    for force in forces:
+        stem = force[:-1]
+        if not _has(table, stem + "p"):
+            raise FileError(
+                path,
+                f"{force}x has no point of application; expected {stem}px, {stem}py and {stem}pz, or an "
+                "ExternalLoads file",
+            )
+        candidates = [stem + "m", stem + "t"]
+        candidates += [stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")]
+        torque = next((c for c in candidates if c != stem and _has(table, c)), None)
+        words = re.split(r"[_\W]+", stem.lower())
+        feet = {_FOOT_WORDS[word] for word in words if word in _FOOT_WORDS}
+        groups.append(_Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None))
+    if not groups:
+        raise FileError(
+            path,
+            "no ground reaction forces: expected columns like ground_force_vx, ground_force_vy, "
+            f"ground_force_vz, but it has {_listed(columns)}; rename them or give an ExternalLoads file",
+        )
+    return groups
+
+
+def _has(table: pd.DataFrame, identifier: str) -> bool:
+    return all(identifier + axis in table.columns for axis in "xyz")
+
+
+def _listed(columns: Sequence[str]) -> str:
+    return ", ".join(columns[:40]) + (" ..." if len(columns) > 40 else "")
+
+
+def _external_loads(path: Path) -> ElementTree.Element:
+    expect_file(path)
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise FileError(
+            path, f"not XML ({error}); expected an ExternalLoads file, export it again", error.position[0]
+        ) from None
+    if root.find(".//ExternalForce") is None:
+        raise FileError(path, "no ExternalForce in it; expected an OpenSim ExternalLoads file")
+    return root
+
+
+def _datafile(root: ElementTree.Element, loads_path: Path) -> Path:
+    name = (root.findtext(".//datafile") or "").strip()
+    if not name or name.lower() == "unassigned":
+        raise FileError(loads_path, "names no datafile; give the MOT or STO file of the forces beside it")
+    path = loads_path.parent / name.replace("\\", "/")
+    if not path.is_file():
+        raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
+    return path
+
+
+def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_Columns], tuple[str, ...]]:
+    groups, notes = [], []
+    for number, element in enumerate(root.iter("ExternalForce"), start=1):
+        name = element.get("name") or f"load {number}"
+        if _text(element, "isDisabled") == "true" or _text(element, "appliesForce") == "false":
+            notes.append(f"{path.name}: {name} is disabled there and was left out")
+            continue
+        for tag in ("force_expressed_in_body", "point_expressed_in_body"):
+            body = _text(element, tag) or "ground"
+            if body.rsplit("/", 1)[-1] != "ground":
+                raise FileError(path, f"{name} has {tag} = {body}; expected ground, transform the load before export")
+        force, point = _text(element, "force_identifier"), _text(element, "point_identifier")
+        for tag, identifier in (("force_identifier", force), ("point_identifier", point)):
+            if not identifier:
+                raise FileError(path, f"{name} has no {tag}; expected the beginning of its three column names")
+        side = re.search(r"_([rl])$", _text(element, "applied_to_body"))
+        groups.append(
+            _Columns(name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None)
+        )
+    if not groups:
+        raise FileError(path, "all its external forces are disabled; expected at least one that applies")
+    return groups, tuple(notes)
+
+
+def _text(element: ElementTree.Element, tag: str) -> str:
+    text = (element.findtext(tag) or "").strip()
+    return "" if text.lower() == "unassigned" else text
+
+
+def _expect_columns(groups: Sequence[_Columns], table: pd.DataFrame, path: Path, loads_path: Path) -> None:
+    for group in groups:
+        for identifier in filter(None, (group.force, group.point, group.torque)):
+            missing = [identifier + axis for axis in "xyz" if identifier + axis not in table.columns]
+            if missing:
+                raise FileError(
+                    path,
+                    f"no column {', '.join(missing)}, which {loads_path.name} names for {group.name} by the "
+                    f"identifier '{identifier}'; correct the identifier, the columns are "
+                    f"{_listed(list(table.columns))}",
+                )

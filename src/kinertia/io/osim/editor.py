@@ -1,0 +1,114 @@
+"""An OpenSim model file with other mass properties (and marker and joint places, where these were calibrated).
+
+Only the numbers that change are replaced in the file's own text; everything else stays byte for byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kinertia.io.osim.reader import INERTIA_TAGS, OsimModel, body_elements, marker_elements
+from kinertia.io.osim.xml import Element, parse, replaced
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Marker
+
+CHANGE_COLUMNS = ("component", "property", "old", "new")
+
+
+@dataclass(frozen=True)
+class _Edit:
+    """New content of a property of one element."""
+
+    element: Element
+    tag: str
+    values: np.ndarray
+
+
+def write_osim(
+    path: str | Path,
+    model: OsimModel,
+    bsp: BodySegmentParameters,
+    markers: Mapping[str, np.ndarray] | None = None,
+    joint_shifts: Mapping[str, np.ndarray] | None = None,
+) -> pd.DataFrame:
+    """Write the model's file with these parameters, and tell what changed.
+
+    Args:
+        path: of the new file.
+        model: as read.
+        bsp: of some or all of its bodies.
+        markers: by label, (3,) m in the marker's body.
+        joint_shifts: by joint with an `offset`, (3,) m by which it moves in its parent, in the parent's axes.
+
+    Returns:
+        one row per changed property: component, property, old and new text; no rows if nothing changed.
+    """
+    document = parse(model.content).child("Model")
+    assert document is not None  # it was read before
+    edits = [*_body_edits(document, bsp), *_marker_edits(model, document, markers or {})]
+    edits += _joint_edits(model, joint_shifts or {})
+    spans, rows = [], []
+    for edit in edits:
+        old = edit.element.child(edit.tag)
+        told = "" if old is None else " ".join(old.text.split())
+        if told and np.array_equal(np.array(told.split(), dtype=float), edit.values):
+            continue
+        new = " ".join(repr(float(value)) for value in edit.values)
+        spans.append(_replacement(edit.element, edit.tag, old, new))
+        rows.append((edit.element.name, edit.tag, told, new))
+    Path(path).write_bytes(replaced(model.content, spans))
+    return pd.DataFrame(rows, columns=list(CHANGE_COLUMNS))
+
+
+def _replacement(element: Element, tag: str, old: Element | None, new: str) -> tuple[tuple[int, int], bytes]:
+    """Byte span and what goes there."""
+    if old is not None and old.inner is not None:
+        return old.inner, new.encode()
+    whole = f"<{tag}>{new}</{tag}>".encode()
+    if old is not None:
+        return old.outer, whole
+    assert element.inner is not None  # it has other properties
+    return (element.inner[1], element.inner[1]), whole
+
+
+def _body_edits(document: Element, bsp: BodySegmentParameters) -> Iterator[_Edit]:
+    rows = dict(zip(bsp.segments, bsp.table(), strict=True))
+    for body in body_elements(document):
+        row = rows.get(body.name)
+        if row is None or row[0] == 0.0:  # massless bodies stay as they are
+            continue
+        yield _Edit(body, "mass", row[:1])
+        yield _Edit(body, "mass_center", row[1:4])
+        if any(body.child(tag) is not None for tag in INERTIA_TAGS):
+            for tag, value in zip(INERTIA_TAGS, row[4:], strict=True):
+                yield _Edit(body, tag, np.array([value]))
+        else:
+            yield _Edit(body, "inertia", row[4:])
+
+
+def _marker_edits(model: OsimModel, document: Element, positions: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
+    """Each marker moves in the axes of its own frame, which may be another than its body's."""
+    known: dict[str, Marker] = {marker.label: marker for marker in model.skeleton.markers}
+    for element in marker_elements(document):
+        if element.name in positions:
+            shift = positions[element.name] - known[element.name].position
+            if shift.any():
+                frame = model.marker_frames[element.name]
+                location = element.child("location")
+                old = np.array(location.text.split(), dtype=float) if location is not None else np.zeros(3)
+                yield _Edit(element, "location", old + frame.T @ shift)
+
+
+def _joint_edits(model: OsimModel, shifts: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
+    for joint in model.joints:
+        shift = shifts.get(joint.name)
+        if shift is not None and joint.offset is not None and shift.any():
+            tag = "location_in_parent" if joint.offset is joint.element else "translation"
+            old = joint.offset.child(tag)
+            place = np.array(old.text.split(), dtype=float) if old is not None else np.zeros(3)
+            yield _Edit(joint.offset, tag, place + shift)

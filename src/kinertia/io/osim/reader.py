@@ -1,0 +1,335 @@
+"""OpenSim model files (.osim, formats 3 and 4): bodies, joints, coordinates and markers as a `Skeleton`.
+
+Muscles, wrapping, geometry and controllers are not read; `kinertia.io.osim.editor` hands them through untouched. What
+cannot be represented is an error that names it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from xml.parsers.expat import ExpatError
+
+import numpy as np
+
+from kinertia.errors import OsimError
+from kinertia.io.number_table import expect_file
+from kinertia.io.osim.joints import (
+    Frames,
+    OsimCoordinate,
+    OsimJoint,
+    coupled,
+    read_joint,
+    read_joint_in_body,
+)
+from kinertia.io.osim.properties import Values
+from kinertia.io.osim.xml import Element, parse
+from kinertia.model.axis_functions import AxisFunction
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
+
+NEWEST_VERSION = 40600
+"""Of the formats known here; OpenSim 4.6 writes it."""
+_START = 0.2
+"""How far from its default to the middle of its range a coordinate starts.
+
+An elbow that starts straight may bend either way: turned by half a turn, the arm fits its markers nearly as well.
+"""
+_FORMAT_3, _FORMAT_4 = range(30000, 30501), range(40000, NEWEST_VERSION + 1)
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A coordinate that follows another by a CoordinateCouplerConstraint."""
+
+    dependent: str
+    independent: str
+    function: AxisFunction
+
+
+@dataclass(frozen=True, eq=False)
+class OsimModel:
+    """A model file as Kinertia sees it.
+
+    Attributes:
+        path, content: the file and its bytes.
+        skeleton: locked coordinates at their defaults; coupled coordinates follow their leaders.
+        bsp: of all bodies, in the file's order; a body may be massless.
+        joints: in the skeleton's order.
+        couplings: dependent coordinates, which the skeleton does not have.
+        marker_frames: per label, (3, 3) orientation of the frame that its location is given in, in its body.
+    """
+
+    path: Path
+    content: bytes = field(repr=False)
+    skeleton: Skeleton
+    bsp: BodySegmentParameters
+    joints: tuple[OsimJoint, ...]
+    couplings: tuple[Coupling, ...]
+    marker_frames: Mapping[str, np.ndarray]
+
+    @cached_property
+    def coordinates(self) -> tuple[OsimCoordinate, ...]:
+        """All coordinates of the file, joint by joint."""
+        return tuple(coordinate for joint in self.joints for coordinate in joint.coordinates)
+
+    def all_coordinates(self, skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
+        """(n, k) values of all `coordinates`, locked and coupled ones included.
+
+        Args:
+            skeleton: the model's, possibly with more coordinates locked.
+            q: (n, c) its coordinates.
+        """
+        known = {name: q[:, i] for i, name in enumerate(skeleton.coordinates)}
+        known |= {name: np.full(len(q), value) for name, value in skeleton.locked.items()}
+        for coupling in self.couplings:
+            known[coupling.dependent] = coupling.function(known[coupling.independent])
+        return np.stack([known[coordinate.name] for coordinate in self.coordinates], axis=1)
+
+
+def read_osim(path: str | Path) -> OsimModel:
+    """Read a model.
+
+    Raises:
+        FileError: no such file.
+        OsimError: not an OpenSim model of a known format, or one that Kinertia cannot represent.
+    """
+    path = Path(path)
+    expect_file(path)
+    content = path.read_bytes()
+    model, version = _model(path, content)
+    defaults = model.child("defaults")
+    values = Values(path, {e.tag: e for e in defaults.children} if defaults is not None else {})
+    bodies = body_elements(model)
+    bsp = _bsp(values, bodies)
+    if version in _FORMAT_3:
+        holders = [
+            (joint, body) for body in bodies for holder in [body.child("Joint")] if holder for joint in holder.children
+        ]
+        frames = None
+        joints = [read_joint_in_body(values, joint, body.name) for joint, body in holders]
+    else:
+        frames = Frames(values, model, bsp.segments)
+        joints = [read_joint(values, element, frames) for element in _objects(model, "JointSet")]
+    joints = _ordered(values, joints, bodies)
+    couplings = _couplings(values, model, joints)
+    placed = [_marker(values, element, frames, bsp.segments) for element in marker_elements(model)]
+    markers = [marker for marker, _ in placed if marker.segment != "ground"]
+    skeleton = _skeleton(values, model, joints, couplings, markers)
+    if not bsp.mass_kg[bsp.segments.index(skeleton.segments[0])] > 0:
+        root = next(body for body in bodies if body.name == skeleton.segments[0])
+        values.fail(root, f"the root body '{root.name}' has no mass; expected a positive one (kg), as of a pelvis")
+    turned = {marker.label: rotation for marker, rotation in placed}
+    return OsimModel(path, content, skeleton, bsp, tuple(joints), couplings, turned)
+
+
+def _model(path: Path, content: bytes) -> tuple[Element, int]:
+    try:
+        document = parse(content)
+    except ExpatError as error:
+        raise OsimError(path, f"not XML ({error}); expected an OpenSim model, export it again", error.lineno) from None
+    model = document.child("Model")
+    if document.tag != "OpenSimDocument" or model is None:
+        raise OsimError(path, f"no Model in it (outermost element <{document.tag}>); expected an OpenSim model")
+    told = document.attributes.get("Version", "")
+    version = int(told) if told.isdigit() else 0
+    if version > NEWEST_VERSION:
+        raise OsimError(
+            path,
+            f"format {told} is newer than {NEWEST_VERSION}, the newest known here; save it with OpenSim 4.6 or "
+            f"earlier, or update Kinertia",
+            document.line,
+        )
+    if version not in _FORMAT_3 and version not in _FORMAT_4:
+        raise OsimError(path, f"format '{told}' is not known; open it in OpenSim 4 and save it again", document.line)
+    return model, version
+
+
+def _objects(model: Element, tag: str) -> list[Element]:
+    """The members of one of the model's sets."""
+    found = model.child(tag)
+    objects = None if found is None else found.child("objects")
+    return [] if objects is None else objects.children
+
+
+def body_elements(model: Element) -> list[Element]:
+    """The bodies, without ground."""
+    return [body for body in _objects(model, "BodySet") if body.tag == "Body" and body.name != "ground"]
+
+
+def marker_elements(model: Element) -> list[Element]:
+    """The markers."""
+    return [marker for marker in _objects(model, "MarkerSet") if marker.tag == "Marker"]
+
+
+INERTIA_TAGS = tuple(f"inertia_{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
+"""Format 3 has one element for each of what format 4 has in one, `inertia`."""
+
+
+def _bsp(values: Values, bodies: Sequence[Element]) -> BodySegmentParameters:
+    rows = []
+    for body in bodies:
+        mass = values.numbers(body, "mass", 1)
+        if mass[0] < 0:
+            values.fail(body, f"body '{body.name}' has mass {mass[0]:g} kg; expected zero or a positive one")
+        centre = values.numbers(body, "mass_center", 3, [0.0] * 3)
+        if values.property(body, "inertia") is not None:
+            inertia = values.numbers(body, "inertia", 6)
+        else:
+            inertia = np.concatenate([values.numbers(body, tag, 1) for tag in INERTIA_TAGS])
+        # OpenSim's tensors are per kg: without mass there is none
+        rows.append(np.concatenate([mass, centre, inertia * (mass > 0)]))
+    return BodySegmentParameters.from_table(tuple(body.name for body in bodies), np.array(rows))
+
+
+def _ordered(values: Values, joints: Sequence[OsimJoint], bodies: Sequence[Element]) -> list[OsimJoint]:
+    """Parents before children, the root first."""
+    names = {body.name for body in bodies}
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            if end not in names and (end != "ground" or end == joint.child):
+                values.fail(
+                    joint.element,
+                    f"joint '{joint.name}' connects '{end}', which is not among the bodies; correct its name",
+                )
+    placed, left, ordered = {"ground"}, list(joints), []
+    while left:
+        ready = next((joint for joint in left if joint.parent in placed), None)
+        if ready is None:
+            values.fail(left[0].element, f"joint '{left[0].name}' is in a chain that does not reach ground")
+        if ready.child in placed:
+            values.fail(
+                ready.element,
+                f"joint '{ready.name}' closes a loop at body '{ready.child}'; expected a tree, one joint for each body",
+            )
+        left.remove(ready)
+        placed.add(ready.child)
+        ordered.append(ready)
+    for body in bodies:
+        if body.name not in placed:
+            values.fail(body, f"body '{body.name}' has no joint that connects it; add one or remove the body")
+    return ordered
+
+
+def _couplings(values: Values, model: Element, joints: Sequence[OsimJoint]) -> tuple[Coupling, ...]:
+    """Couplings in an order in which leaders are known before those that follow them."""
+    names = {coordinate.name for joint in joints for coordinate in joint.coordinates}
+    found = []
+    for element in _objects(model, "ConstraintSet"):
+        if values.flag(element, "isDisabled", False) or not values.flag(element, "isEnforced", True):
+            continue
+        if element.tag != "CoordinateCouplerConstraint":
+            values.fail(
+                element,
+                f"constraint '{element.name}' is a {element.tag}, which Kinertia cannot represent; it knows "
+                f"CoordinateCouplerConstraint: set isEnforced to false or remove it",
+            )
+        leaders = values.text(element, "independent_coordinate_names").split()
+        dependent = values.text(element, "dependent_coordinate_name")
+        for name in (*leaders, dependent):
+            if name not in names:
+                values.fail(element, f"constraint '{element.name}' names the coordinate '{name}', which no joint has")
+        holder = element.child("coupled_coordinates_function")
+        if len(leaders) != 1 or holder is None or not holder.children:
+            values.fail(
+                element,
+                f"constraint '{element.name}' has {len(leaders)} independent coordinates; expected one and a function",
+            )
+        function = values.function(holder.children[0], element.name)
+        scale = float(values.numbers(element, "scale_factor", 1, [1.0])[0])
+        found.append((element, Coupling(dependent, leaders[0], function.scaled(scale))))
+    return _leaders_first(values, found)
+
+
+def _leaders_first(values: Values, found: Sequence[tuple[Element, Coupling]]) -> tuple[Coupling, ...]:
+    left, ordered = list(found), []
+    while left:
+        following = {coupling.dependent for _, coupling in left}
+        ready = next((item for item in left if item[1].independent not in following), None)
+        if ready is None:
+            values.fail(left[0][0], f"constraint '{left[0][0].name}' couples coordinates in a circle")
+        left.remove(ready)
+        ordered.append(ready[1])
+    return tuple(ordered)
+
+
+def _marker(
+    values: Values, element: Element, frames: Frames | None, bodies: Sequence[str]
+) -> tuple[Marker, np.ndarray]:
+    """A marker in its body, and the orientation of its own frame there."""
+    location = values.numbers(element, "location", 3, [0.0] * 3)
+    if frames is None:
+        body, rotation, origin = values.text(element, "body"), np.eye(3), np.zeros(3)
+        if body not in (*bodies, "ground"):
+            values.fail(element, f"marker '{element.name}' is on '{body}', which is not among the bodies")
+    else:
+        body, (rotation, origin) = frames.place(element, element.name, values.text(element, "socket_parent_frame"))
+    return Marker(element.name, body, origin + rotation @ location), rotation
+
+
+def _skeleton(
+    values: Values,
+    model: Element,
+    joints: Sequence[OsimJoint],
+    couplings: Sequence[Coupling],
+    markers: Sequence[Marker],
+) -> Skeleton:
+    gravity = values.numbers(model, "gravity", 3, [0.0, -9.80665, 0.0])
+    if gravity[0] or gravity[2] or not gravity[1] < 0:
+        values.fail(model, f"gravity is {gravity.tolist()}; expected it along -y (Y up), turn the model")
+    locked: dict[str, float] = {}
+    following = {coupling.dependent for coupling in couplings}
+    for joint in joints:
+        locked |= joint.constants
+        locked |= {c.name: c.default for c in joint.coordinates if c.locked and c.name not in following}
+    _check_root(values, joints, locked, following)
+    return Skeleton(
+        model.name,
+        tuple(_skeleton_joint(joint, couplings) for joint in joints),
+        tuple(markers),
+        locked,
+        float(-gravity[1]),
+        start={
+            c.name: c.default + _START * (sum(c.range) / 2 - c.default)
+            for j in joints[1:]
+            for c in j.coordinates
+            if c.angle
+        },
+    )
+
+
+def _skeleton_joint(joint: OsimJoint, couplings: Sequence[Coupling]) -> Joint:
+    axes = [_led(axis, couplings) for axis in joint.axes]
+    return Joint(joint.parent, joint.child, *joint.parent_place, tuple(axes), *joint.child_place)
+
+
+def _led(axis: Axis, couplings: Sequence[Coupling]) -> Axis:
+    for coupling in reversed(couplings):
+        if axis.coordinate == coupling.dependent:
+            axis = coupled(axis, coupling.independent, coupling.function)
+    return axis
+
+
+def _check_root(values: Values, joints: Sequence[OsimJoint], locked: Mapping[str, float], following: set[str]) -> None:
+    root, *others = joints
+    for joint in others:
+        if joint.parent == "ground":
+            values.fail(
+                joint.element,
+                f"joint '{joint.name}' puts '{joint.child}' on ground beside '{root.child}'; expected one root body",
+            )
+    names = {axis.coordinate for axis in root.axes}
+    free = len(names) == 6 and not names & {*locked, *following}
+    free &= [axis.kind for axis in root.axes] == ["translation"] * 3 + ["rotation"] * 3
+    free &= all(axis.function is None for axis in root.axes)
+    if free:
+        directions = np.array([axis.direction for axis in root.axes]).reshape(2, 3, 3)
+        free = bool(np.allclose(directions @ directions.transpose(0, 2, 1), np.eye(3), atol=1e-6))
+    if not free:
+        values.fail(
+            root.element,
+            f"without a free root joint: '{root.name}' ({root.element.tag}) between ground and '{root.child}' must "
+            f"have three free translations and three free rotations about axes square to one another, none locked",
+        )

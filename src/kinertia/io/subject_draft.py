@@ -1,0 +1,140 @@
+"""A first subject file from the recordings in a folder: what `kinertia init` writes."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from kinertia.errors import FileError, KinertiaError
+from kinertia.io.recording import read_recording
+from kinertia.settings import Model, Settings, Subject, Table, TrialFiles
+
+STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
+"""What the names of static trials contain."""
+
+
+def init_subject(folder: str | Path) -> str:
+    """Draft a subject file for the recordings in a folder (not its subfolders); writes nothing.
+
+    The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads go
+    with the trial whose name is most like theirs; mass and height come from a C3D file that holds them. What
+    stays unknown is a commented line marked FILL IN. Recordings whose names begin like another static trial's
+    are left out and named in a comment.
+
+    Raises:
+        FileError: no such folder, or no .c3d or .trc file in it.
+    """
+    folder = Path(folder).resolve()
+    if not folder.is_dir():
+        raise FileError(folder, "no such folder; give the one that holds the recordings")
+    files = sorted(folder.iterdir())
+    c3d = [file for file in files if file.suffix.lower() == ".c3d"]
+    trc = [file for file in files if file.suffix.lower() == ".trc"]
+    captures = c3d + [file for file in trc if file.stem not in [twin.stem for twin in c3d]]
+    if not captures:
+        raise FileError(folder, "holds no .c3d or .trc file; give the folder that holds the recordings")
+    static, trials = _static_and_trials(captures)
+    others = [file.name for file in c3d + trc if file not in (static, *trials)]
+    forces = [file for file in files if _holds_forces(file)]
+    loads = [file for file in files if file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)]
+    chosen = matched_by_name([trial for trial in trials if trial not in c3d], forces)
+    text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
+    if others:
+        text += [f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."]
+    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
+    guessed = static is not None and not STATIC_NAME.search(static.stem)
+    note = " (the shortest recording)" if guessed else ""
+    text += ["", "[model]", _entry(Model, "static", static and static.name, "static.trc", note)]
+    text += ["# " + _entry(Model, "markers", "plug-in-gait")]
+    for trial in trials:
+        text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
+        if trial in chosen:
+            text += [_entry(TrialFiles, "forces", chosen[trial].name, note=" (matched by name)")]
+            for file in matched_by_name([chosen[trial]], loads).values():
+                text += [_entry(TrialFiles, "loads", file.name, note=" (matched by name)")]
+        elif trial not in c3d:
+            text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
+    if not trials:
+        text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
+    text += ["", "[settings]", *(_entry(Settings, *item) for item in Settings().model_dump().items()), ""]
+    return "\n".join(text)
+
+
+def _entry(table: type[Table], key: str, value: object, example: object = None, note: str = "") -> str:
+    """`key = value  # what it is`; without a value a commented example to fill in."""
+    about = f"{table.model_fields[key].description}{note}"
+    if value is None:
+        return f"# {key} = {json.dumps(example)}  # FILL IN: {about}"
+    return f"{key} = {json.dumps(value, ensure_ascii=False)}  # {about}"
+
+
+def _subject_lines(c3d: Sequence[Path]) -> list[str]:
+    recordings = [recording for recording in map(_recording, c3d) if recording]
+    lines = [_entry(Subject, "sex", None, "female")]
+    for key, example in (("mass_kg", 70.0), ("height_m", 1.7)):
+        value = next((getattr(recording, key) for recording in recordings if getattr(recording, key)), None)
+        lines.append(_entry(Subject, key, value, example, " (from C3D)" if value else ""))
+    return lines
+
+
+def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:
+    """The static trial and the dynamic trials that share most of the beginning of its name."""
+    statics = [file for file in captures if STATIC_NAME.search(file.stem)]
+    if not statics and len(captures) > 1:
+        statics = [min(captures, key=_duration_s)]
+    dynamic = [file for file in captures if file not in statics]
+    if not statics or not dynamic:
+        return (statics[0] if statics else None), dynamic
+    # of equals `max` takes the first, so that unrelated names all go to the first static trial
+    owners = [max(statics, key=lambda s: _common_start(s.stem, file.stem)) for file in dynamic]
+    return owners[0], [file for file, owner in zip(dynamic, owners, strict=True) if owner == owners[0]]
+
+
+def _common_start(a: str, b: str) -> int:
+    return next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+
+
+def _recording(file: Path) -> Any:
+    """What a capture holds, or None where it cannot be read: reading the trial itself will say why."""
+    try:
+        return read_recording(file)
+    except KinertiaError:
+        return None
+
+
+def _duration_s(file: Path) -> float:
+    recording = _recording(file)
+    return recording.markers.time[-1] - recording.markers.time[0] if recording else float("inf")
+
+
+def _head(file: Path) -> str:
+    with file.open("rb") as stream:
+        return stream.read(20_000).decode("utf-8", errors="replace")
+
+
+def _holds_forces(file: Path) -> bool:
+    """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
+    motion = file.suffix.lower() in (".mot", ".sto") and not STATIC_NAME.search(file.stem)
+    return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
+
+
+def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
+    """Pairs of files by the longest common part of their names, the best pair first; each file once.
+
+    At least four letters must agree, unless there is one file on each side.
+    """
+    scores = {}
+    for wants in wanting:
+        for offers in offered:
+            matcher = difflib.SequenceMatcher(None, wants.stem.lower(), offers.stem.lower(), autojunk=False)
+            scores[wants, offers] = (matcher.find_longest_match().size, matcher.ratio())
+    least = 0 if len(wanting) == len(offered) == 1 else 4
+    pairs: dict[Path, Path] = {}
+    for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):
+        if score[0] >= least and wants not in pairs and offers not in pairs.values():
+            pairs[wants] = offers
+    return pairs

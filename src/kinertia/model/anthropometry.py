@@ -1,0 +1,275 @@
+"""Body segment parameters from the literature, for a person's mass, height, sex and measured segment lengths.
+
+Two tables, both scaled by total mass and segment lengths:
+
+- `dumas` (default): Dumas, Chèze & Verriest (2007) with the corrected foot and the thorax/abdomen split;
+  centres of mass in three dimensions and full inertia tensors. Use it where BSPs are estimated: with centres
+  of mass on the segment axes, segment masses cannot be identified from gait (DESIGN section 5).
+- `deleva`: de Leva (1996), Table 4; centres of mass on the segments' long axes, no products of inertia.
+
+The numbers are in `data/dumas2007.csv` and `data/deleva1996.csv`, with their units and endpoints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import pandas as pd
+
+from kinertia.errors import SubjectError
+from kinertia.model.bsp import MIRROR_SIGNS, BodySegmentParameters, FloatArray, combine
+
+SEGMENTS = (
+    *("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "thigh_l", "shank_l", "foot_l"),
+    *("upper_arm_r", "forearm_r", "upper_arm_l", "forearm_l"),
+)
+"""The twelve segments with mass of the 27-DOF model; torso includes the head, forearm the hand."""
+
+_DUMAS_STATURE_M = {"male": 1.77, "female": 1.61}
+_DUMAS_TORSO_COM = {"male": (-0.036, -0.420, -0.002), "female": (-0.016, -0.436, -0.006)}
+"""CoM of the 2007 table's one-piece torso, in torso lengths from the cervical joint."""
+_DELEVA_STATURE_M = {"male": 1.741, "female": 1.735}
+
+
+@dataclass(frozen=True)
+class BodyGeometry:
+    """What the tables need to know of a person's skeleton, measured in a static trial.
+
+    Attributes:
+        lumbar_joint_m: (x, y, z) of the lumbar joint centre (L5/S1) in the pelvis frame (origin mid-ASIS), m.
+        mid_hip_m: (x, y, z) of the midpoint of the hip joint centres in the pelvis frame, m.
+        lengths_m: m, by name, where JC is a joint centre: `torso` lumbar JC to cervical JC; and with the
+            suffixes `_r` and `_l`: `thigh` hip JC to knee JC; `shank` knee JC to ankle JC; `foot` ankle JC to
+            the midpoint of metatarsal heads 1 and 5; `foot_total` heel to toe tip (only de Leva needs it);
+            `upper_arm` shoulder JC to elbow JC; `forearm` elbow JC to wrist JC.
+    """
+
+    lumbar_joint_m: tuple[float, float, float]
+    mid_hip_m: tuple[float, float, float]
+    lengths_m: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A table row in ISB axes: mass / body mass; CoM / L; tensor / (m L^2); reference L (m) or NaN."""
+
+    mass: float
+    com: FloatArray
+    gyration: FloatArray
+    length_m: float
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A row placed in the frame of a model segment, as if a right one: CoM = origin + com * length."""
+
+    segment: str
+    row: _Row
+    origin_m: FloatArray
+    length_m: float
+
+
+def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
+    """Refuse a mass (kg), height (m) or sex ("male" or "female") that cannot be true.
+
+    Raises:
+        SubjectError: mass outside 10-300 kg, height outside 0.5-2.5 m, or another sex.
+    """
+    if not 10.0 <= mass_kg <= 300.0:
+        hint = "that looks like grams; " if mass_kg > 1000.0 else ""
+        raise SubjectError("mass_kg", mass_kg, f"{hint}give the body mass in kilograms, between 10 and 300.")
+    if not 0.5 <= height_m <= 2.5:
+        unit = "millimetres" if height_m > 300.0 else "centimetres"
+        hint = f"that looks like {unit}; " if height_m > 3.0 else ""
+        raise SubjectError("height_m", height_m, f"{hint}give the stature in metres, between 0.5 and 2.5.")
+    if sex not in _DUMAS_STATURE_M:
+        raise SubjectError("sex", sex, "the tables know 'male' and 'female'; give the one to use.")
+
+
+def reference_lengths(height_m: float, sex: str) -> dict[str, float]:
+    """Segment lengths (m) of the tables' reference subjects, scaled by stature; names as in `BodyGeometry`.
+
+    For what nobody measured. Torso and foot are Dumas', the rest de Leva's.
+    """
+    dumas, deleva = _dumas_table(sex), _deleva_table(sex)
+    torso = dumas["thorax"].length_m + dumas["abdomen"].length_m
+    per_dumas = {"torso": torso, "foot": dumas["foot"].length_m}
+    per_deleva = {name: deleva[name].length_m for name in ("thigh", "shank", "upper_arm", "forearm")}
+    per_deleva["foot_total"] = deleva["foot"].length_m
+    lengths = {name: height_m * length / _DUMAS_STATURE_M[sex] for name, length in per_dumas.items()}
+    return lengths | {name: height_m * length / _DELEVA_STATURE_M[sex] for name, length in per_deleva.items()}
+
+
+def literature_bsp(
+    mass_kg: float, height_m: float, sex: str, geometry: BodyGeometry, source: str = "dumas"
+) -> BodySegmentParameters:
+    """Body segment parameters of the 27-DOF model's twelve segments (`SEGMENTS`) from the literature.
+
+    Segment frames are those of the model (ISB: x anterior, y up, z right; origin at the proximal joint
+    centre): pelvis at mid-ASIS; torso at the lumbar joint, y to the cervical joint; limbs at the proximal
+    joint, y from the distal to the proximal joint; foot at the ankle joint, x from heel to toe and y up when
+    standing. Left mirrors right; only lengths may differ between sides.
+
+    Both tables: the hand (wrist to fingertip) continues the forearm along its axis, with parallel frames; its
+    length is the stature times Hand 2 (WJC-DAC3) over the stature of de Leva's reference subject. Head and
+    torso are one body.
+
+    Deviations from the sources:
+
+    - The mass fractions (Dumas: male 1.002, female 0.999; de Leva: 1.0000, 0.9999) are divided by their sum,
+      so that the total mass is exactly `mass_kg`.
+    - Dumas: thorax and abdomen lie in line along the torso's y axis, thorax 334/477 (male) or 322/429
+      (female) of its length, and the head stands upright along y above the cervical joint, 0.278/1.77 (male)
+      or 0.243/1.61 (female) of the stature high. In reality the thoracolumbar joint lies behind that line, so
+      that stacked in line their CoM would come 4 % of the torso's length too far forward: both are moved
+      together until it is where the 2007 table's one-piece torso has it. (Its tensor is not used: no source
+      for the female one; the one quoted from memory is not physically consistent.)
+    - de Leva: pelvis is the lower trunk (omphalion to mid hip), torso the middle trunk, upper trunk (from
+      cervicale, taken as the height of the cervical joint) and head. Their lengths are the reference
+      subject's, scaled by the height of the cervical joint over the mid hip when the torso stands upright on
+      the pelvis (head: by stature). The lower trunk's axis is the vertical through the mid hip, the others'
+      is the torso's y axis. That the omphalion is above the lumbar joint, so that the pelvis owns a slice of
+      the belly, is de Leva's cut.
+    - de Leva's foot is measured from the heel, and no table gives the ankle's place between heel and toe tip.
+      The foot is placed so that for the reference feet its CoM is where Dumas has it in the sagittal plane:
+      the ankle is 0.17 (male) or 0.21 (female) of the foot's length before the heel, and the heel-toe axis
+      0.20 (male) or 0.31 (female) of `foot` below the ankle.
+
+    Args:
+        mass_kg: body mass, kg, 10-300.
+        height_m: stature, m, 0.5-2.5.
+        sex: "male" or "female".
+        geometry: measured joint centres and lengths.
+        source: "dumas" or "deleva".
+
+    Raises:
+        SubjectError: an argument cannot be true, or a length that the source needs is missing.
+    """
+    check_subject(mass_kg, height_m, sex)
+    if source not in _SOURCES:
+        raise SubjectError("source", source, f"choose one of {', '.join(_SOURCES)}.")
+    _check_geometry(geometry, height_m, source)
+    parts = list(_SOURCES[source](height_m, sex, geometry))
+    mass_scale = mass_kg / sum(part.row.mass for part in parts)
+    bodies = []
+    for segment in SEGMENTS:
+        own = [part for part in parts if part.segment == segment]
+        mass = np.array([mass_scale * part.row.mass for part in own])
+        com = [part.origin_m + part.row.com * part.length_m for part in own]
+        inertia = [m * part.length_m**2 * part.row.gyration for m, part in zip(mass, own, strict=True)]
+        bodies.append(combine(mass, com, inertia))
+    right = BodySegmentParameters(SEGMENTS, *(np.array(values) for values in zip(*bodies, strict=True)))
+    left = np.array([segment.endswith("_l") for segment in SEGMENTS])
+    return BodySegmentParameters.from_table(SEGMENTS, np.where(left[:, None], MIRROR_SIGNS, 1.0) * right.table())
+
+
+def _check_geometry(geometry: BodyGeometry, height_m: float, source: str) -> None:
+    names = ["thigh", "shank", "foot", "upper_arm", "forearm"] + ["foot_total"] * (source == "deleva")
+    for name in ["torso", *(f"{name}_{side}" for name in names for side in "rl")]:
+        length = geometry.lengths_m.get(name)
+        if length is None:
+            raise SubjectError(name, length, f"this length is missing; the '{source}' table needs it, in metres.")
+        if not 0.0 < length < height_m:
+            raise SubjectError(name, length, "a segment length must lie between 0 and the stature; give it in metres.")
+    rise = geometry.lumbar_joint_m[1] - geometry.mid_hip_m[1]
+    if not 0.0 < rise < height_m:
+        raise SubjectError(
+            "lumbar_joint_m",
+            geometry.lumbar_joint_m,
+            f"this is {rise:g} m above the mid hip; check the pelvis markers.",
+        )
+
+
+def _dumas_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator[_Part]:
+    table, lengths = _dumas_table(sex), geometry.lengths_m
+    torso = lengths["torso"]
+    thorax = torso * table["thorax"].length_m / (table["thorax"].length_m + table["abdomen"].length_m)
+    head = height_m * table["head"].length_m / _DUMAS_STATURE_M[sex]
+    lumbar = np.array(geometry.lumbar_joint_m, dtype=float)
+    pelvis = float(np.linalg.norm(lumbar - geometry.mid_hip_m))
+    yield _Part("pelvis", table["pelvis"], lumbar, pelvis)
+    trunk = [
+        _Part("torso", table["abdomen"], _along_y(torso - thorax), torso - thorax),
+        _Part("torso", table["thorax"], _along_y(torso), thorax),
+    ]
+    com = sum(p.row.mass * (p.origin_m + p.row.com * p.length_m) for p in trunk) / sum(p.row.mass for p in trunk)
+    shift = _along_y(torso) + torso * np.array(_DUMAS_TORSO_COM[sex]) - com
+    yield from (replace(part, origin_m=part.origin_m + shift) for part in trunk)
+    yield _Part("torso", table["head"], _along_y(torso), head)
+    for side in "rl":
+        yield from _limb_parts(table, lengths, side, _hand_length(height_m, sex))
+        yield _Part(f"foot_{side}", table["foot"], np.zeros(3), lengths[f"foot_{side}"])
+
+
+def _deleva_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator[_Part]:
+    table, lengths = _deleva_table(sex), geometry.lengths_m
+    torso = lengths["torso"]
+    mid_hip = np.array(geometry.mid_hip_m, dtype=float)
+    trunk = ("upper_trunk", "middle_trunk", "lower_trunk")
+    scale = (geometry.lumbar_joint_m[1] - mid_hip[1] + torso) / sum(table[name].length_m for name in trunk)
+    upper, middle, lower = (scale * table[name].length_m for name in trunk)
+    head = height_m * table["head"].length_m / _DELEVA_STATURE_M[sex]
+    yield _Part("pelvis", table["lower_trunk"], mid_hip + _along_y(lower), lower)
+    yield _Part("torso", table["middle_trunk"], _along_y(torso - upper), middle)
+    yield _Part("torso", table["upper_trunk"], _along_y(torso), upper)
+    yield _Part("torso", table["head"], _along_y(torso + head), head)
+    foot, dumas = table["foot"], _dumas_table(sex)["foot"]
+    heel_to_ankle = foot.com[0] - dumas.com[0] * dumas.length_m / foot.length_m
+    for side in "rl":
+        yield from _limb_parts(table, lengths, side, _hand_length(height_m, sex))
+        total = lengths[f"foot_total_{side}"]
+        heel = np.array([-heel_to_ankle * total, dumas.com[1] * lengths[f"foot_{side}"], 0.0])
+        yield _Part(f"foot_{side}", foot, heel, total)
+
+
+_SOURCES = {"dumas": _dumas_parts, "deleva": _deleva_parts}
+
+
+def _limb_parts(table: Mapping[str, _Row], lengths: Mapping[str, float], side: str, hand: float) -> Iterator[_Part]:
+    for name in ("thigh", "shank", "upper_arm", "forearm"):
+        yield _Part(f"{name}_{side}", table[name], np.zeros(3), lengths[f"{name}_{side}"])
+    yield _Part(f"forearm_{side}", table["hand"], _along_y(-lengths[f"forearm_{side}"]), hand)
+
+
+def _hand_length(height_m: float, sex: str) -> float:
+    return height_m * _deleva_table(sex)["hand"].length_m / _DELEVA_STATURE_M[sex]
+
+
+def _along_y(y: float) -> FloatArray:
+    return np.array([0.0, y, 0.0])
+
+
+@cache
+def _dumas_table(sex: str) -> dict[str, _Row]:
+    table = {}
+    for name, row in _read("dumas2007.csv", sex).iterrows():
+        radii = row[["rxx", "ryy", "rzz", "rxy", "rxz", "ryz"]].to_numpy(dtype=float) / 100.0
+        xx, yy, zz, xy, xz, yz = np.sign(radii) * radii**2
+        gyration = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        com = row[["com_x", "com_y", "com_z"]].to_numpy(dtype=float) / 100.0
+        table[str(name)] = _Row(row["mass"] / 100.0, com, gyration, row["length"] / 1000.0)
+    return table
+
+
+@cache
+def _deleva_table(sex: str) -> dict[str, _Row]:
+    table = {}
+    for name, row in _read("deleva1996.csv", sex).iterrows():
+        sagittal, transverse, longitudinal = row["r_sagittal"], row["r_transverse"], row["r_longitudinal"]
+        if name == "foot":  # long axis x, heel to toe; the paper's sagittal column about z, transverse about y
+            com, radii = [row["com"], 0.0, 0.0], [longitudinal, transverse, sagittal]
+        else:  # long axis y, downwards
+            com, radii = [0.0, -row["com"], 0.0], [sagittal, longitudinal, transverse]
+        gyration = np.diag(np.square(radii))
+        table[str(name)] = _Row(row["mass"], np.array(com), gyration, row["length"] / 1000.0)
+    return table
+
+
+def _read(name: str, sex: str) -> pd.DataFrame:
+    with files("kinertia.model").joinpath("data", name).open(encoding="utf-8") as file:
+        table = pd.read_csv(file, comment="#")
+    return table[table["sex"] == sex].set_index("segment")

@@ -1,0 +1,110 @@
+"""From coordinates to the axes of the Pinocchio model and back (DESIGN section 4).
+
+An axis x follows one coordinate q by a function: x = f(q), xd = f' qd, xdd = f' qdd + f'' qd^2. Several axes may follow
+the same coordinate (a knee that rolls and slides, a patella coupled to it). By virtual work the generalised force of a
+coordinate is the sum over its axes of f' times the axis' force. Where every axis is its own coordinate nothing is
+computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinertia.model.axis_functions import AxisFunction
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinateMap:
+    """The functions of all moving axes.
+
+    Attributes:
+        owner: (a,) index of each axis' coordinate.
+        functions: of each axis; None where the axis is its coordinate.
+        count: number of coordinates, c.
+    """
+
+    owner: np.ndarray
+    functions: tuple[AxisFunction | None, ...]
+    count: int
+
+    @classmethod
+    def of(
+        cls, coordinates: Sequence[str], followed: Sequence[str], functions: Sequence[AxisFunction | None]
+    ) -> CoordinateMap:
+        """The map of axes that follow these coordinates (one name per axis) by these functions."""
+        index = {name: i for i, name in enumerate(coordinates)}
+        return cls(np.array([index[name] for name in followed], dtype=int), tuple(functions), len(coordinates))
+
+    @cached_property
+    def identity(self) -> bool:
+        """Whether every axis is its own coordinate."""
+        return all(f is None for f in self.functions) and np.array_equal(self.owner, np.arange(self.count))
+
+    @cached_property
+    def _sum(self) -> np.ndarray:
+        """(a, c) adds up the axes of every coordinate."""
+        return (self.owner[:, None] == np.arange(self.count)).astype(float)
+
+    def _evaluated(self, q: np.ndarray, order: int) -> np.ndarray:
+        """(n, a) derivative of this order of every axis by its coordinate."""
+        result = q[:, self.owner] if order == 0 else np.full((len(q), len(self.owner)), float(order == 1))
+        for axis, function in enumerate(self.functions):
+            if function is not None:
+                result[:, axis] = function(q[:, self.owner[axis]], order)
+        return result
+
+    def axes(self, q: np.ndarray) -> np.ndarray:
+        """(n, a) places of the axes at the coordinates q (n, c)."""
+        return q if self.identity else self._evaluated(q, 0)
+
+    def slopes(self, q: np.ndarray) -> np.ndarray | None:
+        """(n, a) derivative of every axis by its coordinate; None where all are one and the axes the coordinates."""
+        return None if self.identity else self._evaluated(q, 1)
+
+    def motion(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places, rates and accelerations of the axes, each (n, a)."""
+        if self.identity:
+            return q, qd, qdd
+        first, second = self._evaluated(q, 1), self._evaluated(q, 2)
+        rate = qd[:, self.owner]
+        return self._evaluated(q, 0), first * rate, first * qdd[:, self.owner] + second * rate**2
+
+    def to_coordinates(self, columns: np.ndarray, slopes: np.ndarray | None) -> np.ndarray:
+        """(n, ..., c) from (n, ..., a): forces, or derivatives by axes, to those by coordinates.
+
+        Args:
+            columns: one column per axis.
+            slopes: (n, a), from `slopes`.
+        """
+        if slopes is None:
+            return columns
+        return (columns * slopes.reshape(len(slopes), *(1,) * (columns.ndim - 2), slopes.shape[1])) @ self._sum
+
+    def turned_forces(self, forces: np.ndarray, q: np.ndarray) -> np.ndarray | float:
+        """(n, c) derivative of the generalised forces by their own coordinates that is due to the map alone.
+
+        Forces (n, a) of the axes are taken as constant; 0 where every axis is its own coordinate.
+        """
+        return 0.0 if self.identity else (forces * self._evaluated(q, 2)) @ self._sum
+
+    def derivatives_to_coordinates(
+        self,
+        by_axes: tuple[np.ndarray, np.ndarray, np.ndarray],
+        q: np.ndarray,
+        qd: np.ndarray,
+        qdd: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Derivatives (n, r, c) by q, qd and qdd from those (n, r, a) by the axes' places, rates and accelerations."""
+        if self.identity:
+            return by_axes
+        at, rate, acceleration = by_axes
+        first, second, third = (self._evaluated(q, order) for order in (1, 2, 3))
+        v, a = qd[:, self.owner], qdd[:, self.owner]
+        by_q = at * first[:, None] + rate * (second * v)[:, None]
+        by_q += acceleration * (second * a + third * v**2)[:, None]
+        by_qd = rate * first[:, None] + acceleration * (2.0 * second * v)[:, None]
+        return by_q @ self._sum, by_qd @ self._sum, (acceleration * first[:, None]) @ self._sum

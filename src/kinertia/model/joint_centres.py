@@ -1,0 +1,272 @@
+"""Joint centres, joint axes and segment frames of a person standing still, from the landmarks of a static trial.
+
+All points are in ground axes (m). Frames follow ISB: x anterior, y up or proximal, z right. Sources: hip Bell et al.
+(1990) or Harrington et al. (2007); knee and ankle midpoints of the epicondyles and malleoli, or Plug-in Gait's chord
+construction where there are no medial markers (Davis et al. 1991); talocrural and subtalar axes Inman (1976); lumbar
+joint Dumas et al. (2007); shoulder Rab et al. (2002).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinertia.errors import MarkerSetError
+from kinertia.model.anthropometry import reference_lengths
+from kinertia.model.marker_set import MarkerSet, nearest_labels
+from kinertia.trial.data import Recording
+
+_MARKER_RADIUS_M = 0.007
+_SHOULDER_DROP = 0.17
+_ELBOW_WIDTH_OF_STATURE = 0.04
+_TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
+_SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
+_SUBTALAR_DROP_OF_FOOT = 0.018
+_METATARSALS_OF_FOOT = 0.73
+_CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
+_LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
+_CERVICAL = {"male": 0.55, "female": 0.53}
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """Where the markers and landmarks of a static trial are.
+
+    Attributes:
+        markers: label -> (3,) m in ground axes, the median over the frames; only those that the trial shows.
+        points: landmark -> (3,) m in ground axes; only those that the trial shows.
+        widths: joint -> width in m; only those that the trial carries.
+        marker_set: where the names come from.
+    """
+
+    markers: Mapping[str, np.ndarray]
+    points: Mapping[str, np.ndarray]
+    widths: Mapping[str, float]
+    marker_set: MarkerSet
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.points[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.points
+
+    def require(self, joint: str, *names: str) -> None:
+        """Raise MarkerSetError when a landmark that this joint needs is missing."""
+        missing = [name for name in names if name not in self.points]
+        if not missing:
+            return
+        wanted = [label for name in missing for label in self.marker_set.landmarks.get(name, ())]
+        near = nearest_labels(wanted, list(self.markers))
+        hints = [f"{label} (nearest: {' or '.join(n)})" if n else label for label, n in near.items()]
+        labels = f" (labels {', '.join(hints)})" if hints else " (not named in the marker set)"
+        raise MarkerSetError(
+            f"the {joint} needs the landmarks {', '.join(missing)}{labels}, which the static trial does not show; "
+            f"correct the marker set '{self.marker_set.name}' or choose another static trial",
+            missing,
+            near,
+        )
+
+
+def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
+    """Median position of every marker and landmark over the frames of a static trial."""
+    markers = static.markers
+    seen = np.all(np.isfinite(markers.positions), axis=-1)
+    median = {
+        label: np.median(markers.positions[seen[:, i], i], axis=0)
+        for i, label in enumerate(markers.labels)
+        if seen[:, i].any()
+    }
+    points = {
+        name: np.mean([median[label] for label in labels], axis=0)
+        for name, labels in marker_set.landmarks.items()
+        if all(label in median for label in labels)
+    }
+    widths = {
+        joint: static.measurements[name]
+        for joint, name in marker_set.widths.items()
+        if static.measurements.get(name, 0.0) > 0.0
+    }
+    return Landmarks(median, points, widths, marker_set)
+
+
+def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Rotation (3, 3) whose y axis is along y and whose z axis is as near to z as that allows."""
+    y = y / np.linalg.norm(y)
+    x = np.cross(y, z)
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def pelvis_frame(marks: Landmarks) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Rotation, origin (mid ASIS), width (ASIS to ASIS) and depth (mid ASIS to mid PSIS) of the pelvis, m."""
+    named = marks.marker_set.landmarks
+    sacrum = "psis_r" not in marks and ("sacrum" in marks or ("sacrum" in named and "psis_r" not in named))
+    back = ("sacrum",) if sacrum else ("psis_r", "psis_l")
+    marks.require("pelvis", "asis_r", "asis_l", *back)
+    behind = np.mean([marks[name] for name in back], axis=0)
+    origin = (marks["asis_r"] + marks["asis_l"]) / 2
+    z = marks["asis_r"] - marks["asis_l"]
+    rotation = frame(np.cross(z, origin - behind), z)
+    return rotation, origin, float(np.linalg.norm(z)), float(np.linalg.norm(origin - behind))
+
+
+def hip_in_pelvis(width: float, depth: float, method: str, side: str) -> np.ndarray:
+    """Hip joint centre in the pelvis frame (mid ASIS), m: Bell et al. (1990) or Harrington et al. (2007)."""
+    sign = 1.0 if side == "r" else -1.0
+    if method == "bell":
+        return width * np.array([-0.19, -0.30, sign * 0.36])
+    return np.array([-0.24 * depth - 0.0099, -0.30 * width - 0.0109, sign * (0.33 * width + 0.0073)])
+
+
+def lumbar_in_pelvis(width: float, sex: str) -> np.ndarray:
+    """Lumbar joint centre (L5/S1) in the pelvis frame, m: Dumas et al. (2007)."""
+    return width * _LUMBAR[sex]
+
+
+def knee(marks: Landmarks, hip: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+    """Knee centre and flexion axis (unit, to the right)."""
+    return _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
+
+
+def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+    """Ankle centre and talocrural axis (unit, to the right).
+
+    The axis runs through the malleoli where both are marked, else it is Inman's in the shank frame (3, 3).
+    """
+    centre, across = _hinge(marks, f"ankle_{side}", knee_centre, f"shank_wand_{side}", side)
+    if f"ankle_medial_{side}" in marks:
+        return centre, across
+    return centre, shank @ mirrored_axis(_TALOCRURAL_RIGHT, side)
+
+
+def subtalar_axis(side: str) -> np.ndarray:
+    """Subtalar axis in the foot frame (unit; inversion is positive): Inman (1976), 42 deg up, 23 deg inward."""
+    up, inward = _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION
+    right = np.array([np.cos(up) * np.cos(inward), np.sin(up), -np.cos(up) * np.sin(inward)])
+    return mirrored_axis(right, side)
+
+
+def subtalar_in_talus(foot_length: float) -> np.ndarray:
+    """A point of the subtalar axis below the ankle centre, m (Delp et al. 1990: 5 mm on a foot of 0.27 m)."""
+    return np.array([0.0, -_SUBTALAR_DROP_OF_FOOT * foot_length, 0.0])
+
+
+def mirrored_axis(right: np.ndarray, side: str) -> np.ndarray:
+    """A rotation axis of the right side, or its mirror image on the left with the same sense of rotation."""
+    return right if side == "r" else right * np.array([-1.0, -1.0, 1.0])
+
+
+def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: str) -> tuple[np.ndarray, np.ndarray]:
+    name, _, _ = joint.rpartition("_")
+    lateral, medial = f"{name}_lateral_{side}", f"{name}_medial_{side}"
+    sign = 1.0 if side == "r" else -1.0
+    if medial in marks and lateral in marks:
+        across = sign * (marks[lateral] - marks[medial])
+        return (marks[lateral] + marks[medial]) / 2, across / np.linalg.norm(across)
+    if joint not in marks.widths or wand not in marks:
+        marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
+        raise MarkerSetError(
+            f"the {joint} needs a medial marker or the joint's width, and the static trial has neither; "
+            f"use a static trial with medial markers, or a C3D file with the widths in PROCESSING",
+            [medial],
+        )
+    marks.require(joint, lateral, wand)
+    half = marks.widths[joint] / 2 + _MARKER_RADIUS_M
+    centre = _chord(proximal, marks[lateral], marks[wand], half)
+    across = sign * (marks[lateral] - centre)
+    return centre, across / np.linalg.norm(across)
+
+
+def _chord(proximal: np.ndarray, lateral: np.ndarray, wand: np.ndarray, half: float) -> np.ndarray:
+    """Plug-in Gait's chord: the centre at distance `half` from the lateral marker, square to the line to the proximal
+    joint, in the plane of proximal joint, marker and wand, on the side away from the wand (Davis et al. 1991).
+    """
+    up = proximal - lateral
+    distance = np.linalg.norm(up)
+    up = up / distance
+    out = wand - lateral
+    out = out - (out @ up) * up
+    out = out / np.linalg.norm(out)
+    cosine = half / distance
+    return lateral + half * (cosine * up - np.sqrt(1 - cosine**2) * out)
+
+
+def foot_frame(marks: Landmarks, side: str) -> tuple[np.ndarray, float]:
+    """Rotation of the foot standing flat (x from heel to toe, y up) and its length from heel to toe tip, m.
+
+    Without a marker on the toe tip the metatarsal heads are taken to be at 73 % of the foot's length.
+    """
+    marks.require(f"foot_{side}", f"heel_{side}", f"metatarsal_{side}")
+    heel, tip = marks[f"heel_{side}"], f"toe_{side}"
+    x = (marks[tip if tip in marks else f"metatarsal_{side}"] - heel) * np.array([1.0, 0.0, 1.0])
+    length = float(np.linalg.norm(x))
+    x = x / length
+    up = np.array([0.0, 1.0, 0.0])
+    return np.column_stack([x, up, np.cross(x, up)]), length if tip in marks else length / _METATARSALS_OF_FOOT
+
+
+def torso_frame(
+    marks: Landmarks, lumbar: np.ndarray, height_m: float, sex: str
+) -> tuple[np.ndarray, float, dict[str, np.ndarray]]:
+    """Rotation of the torso (origin: lumbar joint), its length to the cervical joint (m), and the shoulder centres.
+
+    With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the
+    acromia and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
+    """
+    marks.require("torso and shoulders", "acromion_r", "acromion_l")
+    across = marks["acromion_r"] - marks["acromion_l"]
+    if "c7" in marks and "sternal_notch" in marks:
+        depth = marks["sternal_notch"] - marks["c7"]
+        upward = Rotation.from_rotvec(_CERVICAL_RAISED[sex] * across / np.linalg.norm(across))
+        top = marks["c7"] + _CERVICAL[sex] * upward.apply(depth)
+        length = float(np.linalg.norm(top - lumbar))
+    else:
+        top = (marks["acromion_r"] + marks["acromion_l"]) / 2
+        length = reference_lengths(height_m, sex)["torso"]
+    rotation = frame(top - lumbar, across)
+    drop = _SHOULDER_DROP * np.linalg.norm(across) * rotation[:, 1]
+    return rotation, length, {side: marks[f"acromion_{side}"] - drop for side in "rl"}
+
+
+def arm(
+    marks: Landmarks, shoulder: np.ndarray, torso: np.ndarray, height_m: float, side: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Elbow centre, wrist centre and elbow flexion axis (unit, to the right when the arm hangs).
+
+    The axis runs through the epicondyles where both are marked; else it is square to the plane of upper arm and
+    forearm, or, with a straight elbow, the torso's z axis swung along with the arm. Without a medial marker the centre
+    lies half an elbow width (measured, or 4 % of the stature) inward from the lateral one.
+    """
+    lateral, medial, wrist_name = f"elbow_lateral_{side}", f"elbow_medial_{side}", f"wrist_{side}"
+    marks.require(f"elbow_{side}", lateral, wrist_name)
+    sign = 1.0 if side == "r" else -1.0
+    wrist = marks[wrist_name]
+    if medial in marks:
+        across = sign * (marks[lateral] - marks[medial])
+        return (marks[lateral] + marks[medial]) / 2, wrist, across / np.linalg.norm(across)
+    half = marks.widths.get(f"elbow_{side}", _ELBOW_WIDTH_OF_STATURE * height_m) / 2 + _MARKER_RADIUS_M
+    elbow = marks[lateral]
+    for _ in range(3):
+        axis = _elbow_axis(shoulder, elbow, wrist, torso)
+        elbow = marks[lateral] - sign * half * axis
+    return elbow, wrist, axis
+
+
+def hanging_arm(shoulder: np.ndarray, torso: np.ndarray, height_m: float, sex: str) -> tuple[np.ndarray, np.ndarray]:
+    """Elbow and wrist centres of an arm without markers: it hangs along the torso, as long as de Leva's (1996)."""
+    lengths = reference_lengths(height_m, sex)
+    elbow = shoulder - lengths["upper_arm"] * torso[:, 1]
+    return elbow, elbow - lengths["forearm"] * torso[:, 1]
+
+
+def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, torso: np.ndarray) -> np.ndarray:
+    upper = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
+    lower = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+    normal = np.cross(upper, lower)
+    if np.linalg.norm(normal) > np.sin(np.radians(15.0)):
+        return normal / np.linalg.norm(normal)
+    swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
+    return swing.apply(torso[:, 2])

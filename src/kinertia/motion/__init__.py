@@ -1,0 +1,1 @@
+"""Coordinates from markers, their derivatives, and rigid-body dynamics of given motion."""

@@ -1,0 +1,336 @@
+"""Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
+
+For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
+once, by Gauss-Newton steps with an analytic Jacobian. Frames are independent problems, so they are computed together:
+one Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over a frame every tenth of a second gives
+the warm start of all the others.
+
+The normal matrix of a tree of markers is the mass matrix of the same tree with a unit mass at every marker, and is
+built the same way: per segment one 6 x 6 matrix of its markers, summed over what each coordinate carries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from kinertia.errors import MarkerSetError, TrialError
+from kinertia.model.skeleton import Pose, Skeleton
+from kinertia.trial.data import Markers
+
+_WARM_START_EVERY_S = 0.1
+_FAR = 1.0
+"""Rad or m between frames so far apart: more than a person moves."""
+MOST_STEPS = 60
+_STEP_TOLERANCE = 1e-5
+"""Rad or m; the step below it is still taken and leaves an error several times smaller."""
+_WOUND_RAD, _ANEW_RAD = 2.6, 1.0
+"""Frames that did not converge, or have a joint turned farther than the first (a foot upside down fits its markers
+nearly as well), start anew with no joint farther than the second from neutral."""
+_UNINFORMED_RAD_PER_M = 60.0
+"""A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
+
+
+@dataclass(frozen=True)
+class InverseKinematics:
+    """Result of `solve_ik`.
+
+    Attributes:
+        time: (n,) s.
+        coordinates: names, in the order of the columns of q.
+        q: (n, c) rad and m; NaN where the visible markers do not determine the coordinate.
+        labels: the markers used.
+        errors_m: (n, m) distance between measured and model marker; NaN where not visible.
+        converged: (n,) False where the iteration stopped at its limit.
+    """
+
+    time: np.ndarray
+    coordinates: tuple[str, ...]
+    q: np.ndarray
+    labels: tuple[str, ...]
+    errors_m: np.ndarray
+    converged: np.ndarray
+
+    @property
+    def marker_rms_m(self) -> float:
+        """Root mean square of the marker distances over all visible markers and frames."""
+        return rms(self.errors_m)
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """When to stop: as `solve_ik` takes it."""
+
+    gain_tolerance_m2: float
+    most_steps: int
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square over everything that is not NaN."""
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def solve_ik(
+    skeleton: Skeleton,
+    markers: Markers,
+    name: str = "markers",
+    consecutive: bool = True,
+    gain_tolerance_m2: float = 0.0,
+    most_steps: int = MOST_STEPS,
+) -> InverseKinematics:
+    """All coordinates at every frame, by least squares on all visible markers.
+
+    Args:
+        skeleton: the model; its markers and those of the trial are matched by label.
+        markers: measured markers.
+        name: the trial's, for messages.
+        consecutive: neighbouring frames show nearly the same pose, so that one may start from the other.
+        gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last; what goes on
+            moving then is a coordinate that the markers hardly show.
+        most_steps: after so many, from one start, a frame counts as not converged.
+
+    Raises:
+        MarkerSetError: fewer than three root markers of the skeleton are in the trial.
+        TrialError: no frame has three visible root markers.
+    """
+    used = [m for m in skeleton.markers if m.label in markers.labels]
+    model = skeleton.with_markers(used)
+    measured = markers.positions[:, [markers.labels.index(m.label) for m in used]]
+    q = np.tile([model.start.get(name, 0.0) for name in model.coordinates], (len(measured), 1))
+    q[:, :6], placed = _place_root(model, measured, name)
+    if not placed.any():
+        raise TrialError(
+            name,
+            "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
+        )
+    fine, stop = np.flatnonzero(placed), _Stop(gain_tolerance_m2, most_steps)
+    if consecutive and len(fine) > 1:
+        every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz))
+        coarse = np.unique(np.append(fine[::every], fine[-1]))
+        q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], stop)
+        _carry_on(model, measured[coarse], q_coarse, stop)
+        q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
+        q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
+    converged = np.zeros(len(q), dtype=bool)
+    q[fine], converged[fine], normal = _best_fit(model, measured[fine], q[fine], stop)
+    errors = np.full(measured.shape[:2], np.nan)
+    errors[fine] = _misses(model, measured[fine], q[fine])
+    q[~placed] = np.nan
+    q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
+    q[:, :6] = model.root.turned_back(q[:, :6])
+    if consecutive:
+        _unwrap(q, model)
+    return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
+
+
+def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """(n, m) m, distances between measured and model markers."""
+    return np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
+
+
+def _best_fit(
+    model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`_gauss_newton`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
+    q, converged, normal = _gauss_newton(model, measured, q, stop)
+    joints = np.abs(q[:, 6:][:, model.rotational[6:]])
+    doubtful = np.flatnonzero(~converged | (joints.max(axis=1, initial=0.0) > _WOUND_RAD))
+    if doubtful.size:
+        anew = q[doubtful]
+        anew[:, 6:] = np.clip(anew[:, 6:], -_ANEW_RAD, _ANEW_RAD)
+        anew, settled, shown = _gauss_newton(model, measured[doubtful], anew, stop)
+        old, new = (
+            np.nansum(np.square(_misses(model, measured[doubtful], one)), axis=1) for one in (q[doubtful], anew)
+        )
+        better = new <= old * (1.0 + 1e-6) + 1e-12
+        kept = doubtful[better]
+        q[kept], converged[kept], normal[kept] = anew[better], settled[better], shown[better]
+    return q, converged, normal
+
+
+def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop) -> None:
+    """Start frames that lie far from their neighbour again from there; they keep what fits better.
+
+    An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
+    """
+    count = len(q)
+    for order, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
+        for k in order:
+            change = q[k] - q[k + step]
+            change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
+            if np.abs(change).max() < _FAR:
+                continue
+            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], stop)
+            old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
+            if new < old:
+                q[k] = again[0]
+
+
+def _unwrap(q: np.ndarray, model: Skeleton) -> None:
+    for c in np.flatnonzero(model.periodic):
+        seen = np.isfinite(q[:, c])
+        q[seen, c] = np.unwrap(q[seen, c])
+
+
+def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Root coordinates (n, 6) by fitting the root segment to its markers, and (n,) whether three were visible."""
+    root = np.flatnonzero(model.marker_segments == 0)
+    if len(root) < 3:
+        raise MarkerSetError(
+            f"trial '{name}' has {len(root)} of the markers on the {model.segments[0]}; at least 3 are needed"
+        )
+    here, there = model.marker_locals[root], measured[:, root]
+    seen = np.isfinite(there).all(axis=-1)
+    placed = seen.sum(axis=1) >= 3
+    weight = (seen / np.maximum(seen.sum(axis=1, keepdims=True), 1))[..., None]
+    there = np.nan_to_num(there)
+    mean_here = (weight * here).sum(axis=1)
+    mean_there = (weight * there).sum(axis=1)
+    covariance = np.einsum("nmi,nmj->nij", weight * (there - mean_there[:, None]), here - mean_here[:, None])
+    u, _, vt = np.linalg.svd(covariance)
+    flip = np.ones((len(u), 3))
+    flip[:, 2] = np.sign(np.linalg.det(u @ vt))
+    rotation = (u * flip[:, None, :]) @ vt
+    return model.root.coordinates(rotation, mean_there - (rotation @ mean_here[..., None])[..., 0]), placed
+
+
+def _gauss_newton(
+    model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Minimise the squared marker distances frame by frame; returns q (n, c), (n,) converged, J^T J (n, c, c).
+
+    Steps are damped (Levenberg) per frame: a step that makes the fit worse is taken back and the damping raised.
+    """
+    q = q.copy()
+    n = len(q)
+    damping = np.full(n, 1e-6)
+    best = np.full(n, np.inf)
+    accepted = q.copy()
+    step = np.zeros_like(q)
+    converged = np.zeros(n, dtype=bool)
+    active = np.arange(n)
+    normal = np.zeros((n, q.shape[1], q.shape[1]))
+    gradient = np.zeros_like(q)
+    above = ancestor_of(model)
+    for _ in range(stop.most_steps):
+        h, g, cost = normal_equations(model, above, measured[active], model.pose(q[active]))
+        better = cost <= best[active] * (1 + 1e-12)
+        up = active[better]
+        best[up], accepted[up] = cost[better], q[up]
+        normal[up], gradient[up] = h[better], g[better]
+        damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
+        damping[active[~better]] *= 100.0
+        step[active] = _damped_step(normal[active], gradient[active], damping[active])
+        gain = np.einsum("nc,nc->n", step[active], gradient[active])
+        small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | (gain < stop.gain_tolerance_m2)
+        done = active[small]
+        converged[done] = True
+        accepted[done] += step[done]
+        active = active[~small]
+        if not active.size:
+            break
+        q[active] = accepted[active] + step[active]
+    return accepted, converged, normal
+
+
+def _damped_step(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    c = normal.shape[-1]
+    scale = np.einsum("nii->n", normal) / c
+    damped = normal + (damping * scale)[:, None, None] * np.eye(c)
+    return np.linalg.solve(damped, gradient[..., None])[..., 0]
+
+
+def normal_equations(
+    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
+
+    `above` is the model's `ancestor_of`.
+    """
+    positions = model.marker_positions(pose)
+    residual = measured - positions
+    seen = np.isfinite(residual).all(axis=-1)
+    residual = np.where(seen[..., None], residual, 0.0)
+    normal = gram(model, above, pose, twist_blocks(model, positions, positions, seen.astype(float)))
+    return normal, marker_forces(model, pose, positions, residual), np.square(residual).sum(axis=(1, 2))
+
+
+def marker_forces(model: Skeleton, pose: Pose, positions: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """(n, c) generalised forces J^T f of forces (n, m, 3) on the markers at these positions (n, m, 3)."""
+    wrench = _per_segment(model) @ np.concatenate([forces, np.cross(positions, forces)], axis=-1)
+    columns = pose.jacobian.transpose(0, 2, 1)
+    return model.map.to_coordinates(np.einsum("ncd,ncd->nc", columns, model.support.T @ wrench), pose.slopes)
+
+
+def gram(model: Skeleton, above: np.ndarray, pose: Pose, blocks: np.ndarray, second: Pose | None = None) -> np.ndarray:
+    """(n, c, c) J^T W J' with J of the markers at a pose and J' at a second pose (the same if None).
+
+    Args:
+        model: the skeleton.
+        above: its `ancestor_of`.
+        pose, second: n frames each.
+        blocks: (n, s, 6, 6) of `twist_blocks`, symmetric if there is no second pose.
+    """
+    n, s = blocks.shape[:2]
+    carried = (model.support.T.astype(float) @ blocks.reshape(n, s, 36)).reshape(n, model.support.shape[1], 6, 6)
+    columns = pose.jacobian.transpose(0, 2, 1)
+    others = columns if second is None else second.jacobian.transpose(0, 2, 1)
+    moved = (carried @ others[..., None])[..., 0]
+    product = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
+    if second is None:
+        product += np.triu(product, 1).transpose(0, 2, 1)
+    else:
+        moved = (columns[:, :, None] @ carried)[:, :, 0]
+        product += np.where(above.T & ~above, moved @ others.transpose(0, 2, 1), 0.0)
+    half = model.map.to_coordinates(product, (second or pose).slopes).transpose(0, 2, 1)
+    return model.map.to_coordinates(half, pose.slopes).transpose(0, 2, 1)
+
+
+def twist_blocks(model: Skeleton, first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(n, s, 6, 6): sum over a segment's markers of w B^T B' with B = [1, -[x]]: how a twist moves them.
+
+    Args:
+        model: tells which marker is on which segment.
+        first, second: (n, m, 3) m, places x and x' of the markers.
+        weight: (n, m).
+    """
+    per_segment = _per_segment(model)
+    x, y = (places * weight[..., None] for places in (first, second))
+    sums = per_segment @ np.concatenate([weight[..., None], x, y], axis=-1)
+    outer = per_segment @ (y[..., :, None] * first[..., None, :]).reshape(*x.shape[:2], 9)
+    outer = outer.reshape(*outer.shape[:2], 3, 3)
+    blocks = np.zeros((*outer.shape[:2], 6, 6))
+    blocks[..., :3, :3] = sums[..., :1, None] * np.eye(3)
+    blocks[..., :3, 3:] = -_skew(sums[..., 4:])
+    blocks[..., 3:, :3] = _skew(sums[..., 1:4])
+    blocks[..., 3:, 3:] = np.einsum("nsii->ns", outer)[..., None, None] * np.eye(3) - outer
+    return blocks
+
+
+def _per_segment(model: Skeleton) -> np.ndarray:
+    """(s, m) 1 where the marker is on the segment."""
+    return (np.arange(len(model.segments))[:, None] == model.marker_segments).astype(float)
+
+
+def ancestor_of(model: Skeleton) -> np.ndarray:
+    """(a, a) True where axis i is axis j or moves it (parents come first, so this is upper triangular)."""
+    tree = model.model
+    above = np.zeros((tree.nv, tree.nv), dtype=bool)
+    for joint in range(1, tree.njoints):
+        above[[i - 1 for i in tree.supports[joint] if i > 0], joint - 1] = True
+    return above
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    zero = np.zeros(v.shape[:-1])
+    rows = [[zero, -v[..., 2], v[..., 1]], [v[..., 2], zero, -v[..., 0]], [-v[..., 1], v[..., 0], zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _uninformed(normal: np.ndarray) -> np.ndarray:
+    """(n, c) True where the visible markers do not determine the coordinate, from J^T J (n, c, c)."""
+    c = normal.shape[-1]
+    deviation = np.sqrt(np.einsum("ncc->nc", np.linalg.inv(normal + 1e-9 * np.eye(c))))
+    return deviation > _UNINFORMED_RAD_PER_M

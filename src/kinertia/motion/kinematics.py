@@ -1,0 +1,179 @@
+"""From a trial to smooth coordinates: facing +X, inverse kinematics, GCV splines, and ground reactions to match.
+
+The splines of the coordinates and those of the ground reactions carry the same band: the forces are smoothed at the
+median cutoff that cross-validation chose for the pelvis translations, whose accelerations they balance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from kinertia.errors import MarkerSetError, TrialError
+from kinertia.model.marker_set import MarkerSet
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
+from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
+from kinertia.trial.data import Markers, Trial, runs
+
+LONGEST_BRIDGE_S = 0.1
+"""The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
+FEWEST_FRAMES = 11
+"""A window needs at least as many frames."""
+AROUND_WINDOW_S = 0.25
+"""Samples this near the measured window help to know what happens at its ends."""
+_END_PERIODS = 0.5
+"""The window keeps off the ends of the record by this share of the cutoff's period: accelerations are poor there.
+
+On the gait2354 walk the residual is 57 N in these frames and 35 N in all others.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """A trial with its coordinates.
+
+    Attributes:
+        trial: turned so that the person faces +X.
+        turned_deg: by how much, about the vertical.
+        ik: coordinates frame by frame.
+        spline: smoothed coordinates over the frames that inverse kinematics solved.
+        cutoff_hz: of the ground reactions.
+        window_s: first and last time at which all ground contact is measured and all coordinates are known, with
+            accelerations.
+        notes: assumptions made on the way.
+    """
+
+    trial: Trial
+    turned_deg: float
+    ik: InverseKinematics
+    spline: SmoothedSpline
+    cutoff_hz: float
+    window_s: tuple[float, float]
+    notes: tuple[str, ...]
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """Indices of the marker frames inside the window."""
+        time = self.trial.markers.time
+        return np.flatnonzero((time >= self.window_s[0] - 1e-9) & (time <= self.window_s[1] + 1e-9))
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """(w,) s, the frames inside the window."""
+        return self.trial.markers.time[self.frames]
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Smoothed coordinates and derivatives inside the window."""
+        return Motion(*(self.spline(self.time, order) for order in range(3)))
+
+    @cached_property
+    def foot_loads(self) -> np.ndarray:
+        """(w, 2, 6) ground reactions on right and left foot in the window: force, moment about the ground origin."""
+        return self.smoothed_loads(self.cutoff_hz)(self.time).reshape(-1, 2, 6)
+
+    def smoothed_loads(self, cutoff_hz: float) -> SmoothedSpline:
+        """Ground reactions (12: right force and moment, left force and moment) as functions of time.
+
+        Samples up to AROUND_WINDOW_S outside the window count: what a plate saw there may not be all of the ground
+        contact, but is how the load on that plate went on.
+        """
+        loads, (start, end) = self.trial.loads, self.window_s
+        near = (loads.time >= start - AROUND_WINDOW_S - 1e-9) & (loads.time <= end + AROUND_WINDOW_S + 1e-9)
+        return smooth(loads.time[near], loads.wrench[near].reshape(-1, 12), cutoff_hz)
+
+
+def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
+    """Rotation about the vertical, by a multiple of 90 degrees, that makes the person face +X; and that angle.
+
+    Raises:
+        MarkerSetError: the markers of the ASIS are not in the trial, or never visible together.
+    """
+    sides = [markers.select(marker_set.landmarks[f"asis_{side}"]).positions.mean(axis=1) for side in "rl"]
+    across = sides[0] - sides[1]
+    across = across[np.isfinite(across[:, 0])]
+    if not len(across):
+        labels = [label for side in "rl" for label in marker_set.landmarks[f"asis_{side}"]]
+        raise MarkerSetError(
+            f"no frame shows the markers {' and '.join(labels)} together, so it is unknown which way the person faces; "
+            f"use a trial that does",
+            labels,
+        )
+    right = across.mean(axis=0)
+    quarter = int(np.round(np.arctan2(right[0], right[2]) / (np.pi / 2)))
+    cosine, sine = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarter % 4]
+    return np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]), -90.0 * quarter
+
+
+def solve_kinematics(
+    skeleton: Skeleton, trial: Trial, turned_deg: float, smoothing: float | Literal["gcv"]
+) -> Kinematics:
+    """Inverse kinematics and smoothing of a trial that already faces +X.
+
+    Raises:
+        TrialError: no stretch in which all ground contact is measured and all coordinates are known, or a coordinate
+            is known in too few frames to be smoothed.
+    """
+    ik = solve_ik(skeleton, trial.markers, trial.name)
+    solved = np.flatnonzero(np.isfinite(ik.q).any(axis=1))
+    inside = slice(solved[0], solved[-1] + 1)
+    try:
+        spline = smooth(ik.time[inside], ik.q[inside], smoothing)
+    except SmoothingError as error:
+        raise TrialError(
+            trial.name,
+            f"enough markers to know {ik.coordinates[error.column]} are visible in {error.n_visible} frames only, too "
+            f"few to smooth it; fill the gaps of the markers or use a longer trial",
+        ) from error
+    cutoff_hz = float(np.median(spline.cutoff_hz[:3]))
+    known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
+    known &= np.abs(ik.time - ik.time[inside].mean()) <= np.ptp(ik.time[inside]) / 2 - _END_PERIODS / cutoff_hz + 1e-9
+    usable = known & trial.measured
+    window, notes = _longest(trial, usable, known)
+    stuck = int((~ik.converged[solved]).sum())
+    if stuck:
+        notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
+    return Kinematics(trial, turned_deg, ik, spline, cutoff_hz, window, (*trial.notes, *notes))
+
+
+def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """`known` (n, c) with gaps up to LONGEST_BRIDGE_S between known frames filled."""
+    filled = known.copy()
+    for c in range(known.shape[1]):
+        for first, last in runs(~known[:, c]):
+            inner = first > 0 and last < len(time) - 1
+            if inner and time[last + 1] - time[first - 1] <= LONGEST_BRIDGE_S:
+                filled[first : last + 1, c] = True
+    return filled
+
+
+def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple[float, float], list[str]]:
+    time = trial.markers.time
+    stretches = sorted(runs(usable), key=lambda run: run[0] - run[1])
+    if not stretches:
+        raise TrialError(
+            trial.name,
+            f"no frame has both measured ground contact (frames with it: {int(trial.measured.sum())}) and enough "
+            f"visible markers for all coordinates (frames with them: {int(known.sum())}); fill marker gaps or use "
+            f"another trial",
+        )
+    first, last = stretches[0]
+    if last - first + 1 < FEWEST_FRAMES:
+        raise TrialError(
+            trial.name,
+            f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} "
+            f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least {FEWEST_FRAMES} are needed",
+        )
+    notes = []
+    left_out = sum(end - start + 1 for start, end in stretches[1:])
+    if left_out:
+        notes.append(
+            f"{trial.name}: only the longest measured stretch, {time[first]:.3f} to {time[last]:.3f} s, is used; "
+            f"{left_out} frames of {len(stretches) - 1} shorter ones are left out"
+        )
+    return (float(time[first]), float(time[last])), notes

@@ -1,0 +1,44 @@
+"""`check.html`: the findings of `kinertia check` as one page that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from kinertia import __version__
+from kinertia.checks.model import ModelCheck
+from kinertia.checks.recording import RecordingCheck
+from kinertia.io.output_folder import complete_folder
+
+
+def save_check_page(
+    recordings: Sequence[tuple[str, RecordingCheck]],
+    models: Sequence[tuple[str, ModelCheck]],
+    mistakes: Sequence[str],
+    folder: str | Path,
+) -> Path:
+    """Write `check.html` into a folder; returns the file.
+
+    Args:
+        recordings, models: findings, each with its title.
+        mistakes: one sentence for each file that could not be read.
+        folder: is made if need be.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    environment = Environment(
+        loader=PackageLoader("kinertia.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template("check.html.j2").render(
+        recordings=recordings, models=models, mistakes=mistakes, version=__version__
+    )
+    with complete_folder(folder) as work:
+        (work / "check.html").write_text(page, encoding="utf-8")
+    return Path(folder) / "check.html"

@@ -1,0 +1,182 @@
+"""Writes a `Fit` to a folder: `report.html`, `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
+
+Everything is written to a hidden folder first and moved when complete, so a run never leaves half a result.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from kinertia import __version__
+from kinertia.checks.verdict import verdicts
+from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.estimation.identifiability import BaseParameters
+from kinertia.estimation.input_checks import mass_from_force_kg
+from kinertia.estimation.prepare_osim import centre_offsets
+from kinertia.io.osim.editor import write_osim
+from kinertia.io.osim.exporter import export_osim
+from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import Provenance
+from kinertia.io.sto import write_sto
+from kinertia.report.page import render
+
+_RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
+
+
+def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None) -> Path:
+    """Write all result files of a fit into a folder, which is made if need be; returns the folder.
+
+    With one trial its files stand in the folder itself, with several in a sub-folder per trial. The report names
+    command and files where `provenance` tells them.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    with complete_folder(folder) as work:
+        (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
+        (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
+        fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
+        _write_model(fit, work)
+        for trial in fit.trials:
+            into = work if len(fit.trials) == 1 else work / trial.name
+            into.mkdir(exist_ok=True)
+            _write_trial(fit, trial, into)
+    return Path(folder)
+
+
+def _write_model(fit: Fit, folder: Path) -> None:
+    """The model with the estimate; of the user's own OpenSim model a list of what changed, too."""
+    if fit.file is None:
+        export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
+        return
+    positions = {marker.label: marker.position for marker in fit.skeleton.markers}
+    shifts = centre_offsets(fit.skeleton)
+    changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
+    changes.to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
+
+
+def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
+    names = list(fit.skeleton.coordinates)
+    rotational = fit.skeleton.rotational
+    write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics")
+    loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
+    for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
+        write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage]), False, file)
+    if trial.moment_sd is not None:
+        write_sto(
+            folder / "inverse_dynamics_sd.sto", _table(trial, loads, trial.moment_sd), False, "inverse_dynamics_sd"
+        )
+    columns = [f"{stage}_{name}" for stage in trial.residuals for name in _RESIDUALS]
+    residuals = np.hstack(list(trial.residuals.values()))
+    write_sto(folder / "residuals.sto", _table(trial, columns, residuals), False, "residuals")
+
+
+def _coordinates(fit: Fit, trial: TrialFit) -> pd.DataFrame:
+    """Coordinates over time, in degrees and m; of an OpenSim model all that it has."""
+    if fit.file is None:
+        names, angles, q = fit.skeleton.coordinates, fit.skeleton.rotational, trial.motion.q
+    else:
+        names = tuple(coordinate.name for coordinate in fit.file.coordinates)
+        angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
+        q = fit.file.all_coordinates(fit.skeleton, trial.motion.q)
+    return _table(trial, names, np.where(angles, np.degrees(q), q))
+
+
+def _table(trial: TrialFit, columns: Sequence[str], values: np.ndarray) -> pd.DataFrame:
+    return pd.DataFrame(values, index=pd.Index(trial.time, name="time"), columns=list(columns))
+
+
+def summary(fit: Fit) -> dict[str, Any]:
+    """What `fit.json` says."""
+    return {
+        "kinertia": __version__,
+        "method": fit.settings.method,
+        "subject": fit.subject.model_dump(),
+        "settings": fit.settings.model_dump(),
+        "total_mass_kg": {
+            "measured": fit.subject.mass_kg,
+            "literature": fit.literature.total_mass_kg,
+            "estimate": fit.estimate.total_mass_kg,
+        },
+        "converged": fit.converged,
+        **_posterior_summary(fit),
+        "trials": [_trial_summary(fit, trial) for trial in fit.trials],
+        "verdicts": [verdict._asdict() for verdict in verdicts(fit)],
+        "warnings": list(fit.warnings),
+        "notes": list(fit.notes),
+    }
+
+
+def _posterior_summary(fit: Fit) -> dict[str, Any]:
+    if fit.posterior is None:
+        return {}
+    noise = {trial.name: asdict(noise) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
+    return {
+        "iterations": fit.posterior.iterations,
+        "calibration": {name: dict(told) for name, told in fit.posterior.calibration.items()},
+        "marker_noise": noise,
+        "identifiability": _identifiability(fit.bsp, fit.posterior.base),
+    }
+
+
+def _identifiability(bsp: pd.DataFrame, base: BaseParameters) -> dict[str, Any]:
+    """Parameters by evidence, and the combinations that the motion shows or no motion shows."""
+    names = bsp["segment"] + "." + bsp["parameter"]
+    return {
+        **{word: names[bsp["evidence"] == word].tolist() for word in ("measured", "informed", "assumed")},
+        "base_parameters": {
+            "count": base.count,
+            "shown": base.shown,
+            "condition": base.condition if math.isfinite(base.condition) else None,
+            "best_shown": [asdict(combination) for combination in base.best],
+            "never_shown": list(base.never),
+        },
+    }
+
+
+def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
+    force = {stage: values[:, :3] for stage, values in trial.residuals.items()}
+    moment = {stage: values[:, 3:] for stage, values in trial.residuals.items()}
+    return {
+        "name": trial.name,
+        "n_frames": len(trial.kinematics.trial.markers.time),
+        "n_dynamic_frames": len(trial.time),
+        "window_s": list(trial.kinematics.window_s),
+        "turned_deg": trial.kinematics.turned_deg,
+        "cutoff_hz": trial.kinematics.cutoff_hz,
+        "mass_from_force_kg": mass_from_force_kg(fit.literature, trial),
+        "seconds": {stage: round(value, 4) for stage, value in trial.seconds.items()},
+        "marker_rms_m": {stage: _rms(values[..., None]) for stage, values in trial.marker_errors_m.items()},
+        "marker_displacements_m": _displacements(fit, trial),
+        "residual_force_rms_N": _each(force, _rms),
+        "residual_force_max_N": _each(force, _max),
+        "residual_moment_rms_Nm": _each(moment, _rms),
+        "residual_moment_max_Nm": _each(moment, _max),
+    }
+
+
+def _displacements(fit: Fit, trial: TrialFit) -> dict[str, list[float]]:
+    """How far markers of this trial are from where the model has them, in their segments; only those that are."""
+    moved = trial.skeleton.marker_locals - fit.skeleton.marker_locals
+    return {label: row.tolist() for label, row in zip(fit.skeleton.labels, moved, strict=True) if row.any()}
+
+
+def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float]:
+    return {stage: statistic(values) for stage, values in vectors.items()}
+
+
+def _rms(vectors: np.ndarray) -> float:
+    """Root mean square length of vectors (..., k) over everything that is not NaN."""
+    return math.sqrt(float(np.nanmean(np.square(vectors).sum(axis=-1))))
+
+
+def _max(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=-1).max())

@@ -1,0 +1,152 @@
+"""The report's first part: a fit in words, for somebody who reads nothing else.
+
+Whether numbers can be used is judged in `kinertia.checks.verdict`; here that is put beside how far the motion was
+changed to get there, what the data told about the body, and where the estimate leaves what it started from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.checks.verdict import Level, Verdict, verdicts
+from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
+from kinertia.motion.inverse_kinematics import rms
+from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
+from kinertia.report.coordinate_titles import title_of
+from kinertia.report.time_figures import motion_change
+from kinertia.report.wording import decimals, fixed, read_in, start_of
+
+_LISTED_FAR = 12
+_EVIDENCE = {
+    "measured": "measured",
+    "informed": "informed by the data",
+    "assumed": "hardly informed by the data, not to be read as this person's",
+}
+
+
+@dataclass(frozen=True)
+class Words:
+    """A fit in sentences.
+
+    Attributes:
+        level: the worst of the judgements.
+        headline: what it means for using the numbers.
+        judgements: `kinertia.checks.verdict.verdicts`.
+        motion: how far the motion was changed.
+        knowledge: what the data could and could not tell about the body segment parameters.
+        departures: estimates more than two prior deviations from what they started from.
+    """
+
+    level: Level
+    headline: str
+    judgements: tuple[Verdict, ...]
+    motion: tuple[str, ...]
+    knowledge: tuple[str, ...]
+    departures: tuple[str, ...]
+
+
+def words(fit: Fit) -> Words:
+    """The verdict on a fit."""
+    judgements = tuple(verdicts(fit))
+    levels = [judgement.level for judgement in judgements]
+    level: Level = next(one for one in ("against", "okay", "good") if one in levels)
+    against = levels.count("against")
+    headline = {
+        "good": "The checks are passed: forces, motion and model agree. What that shows of the body stands below.",
+        "okay": "Usable with care: every check is passed, but not all of them well.",
+        "against": f"Do not use these numbers as they are: {against} of {len(levels)} checks speak against them.",
+    }[level]
+    if fit.warnings:
+        headline += f" Read the warning{'s' if len(fit.warnings) > 1 else ''}."
+    motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
+    return Words(level, headline, judgements, motion, _knowledge(fit), _departures(fit))
+
+
+def _motion(fit: Fit, trial: TrialFit) -> list[str]:
+    before, after = (1e3 * rms(trial.marker_errors_m[stage]) for stage in ("ik", "final"))
+    change = motion_change(trial)
+    angles = np.flatnonzero(fit.skeleton.rotational)
+    each = np.degrees([rms(change[:, k]) for k in angles])
+    worst = int(np.nanargmax(each))
+    name = title_of(fit.skeleton, int(angles[worst]))
+    moved = 1e3 * np.linalg.norm(change[:, :3], axis=1)
+    overall = float(np.degrees(rms(change[:, angles])))
+    return [
+        f"{trial.name}: the model's markers are {before:.1f} mm (RMS) from the measured ones after inverse kinematics "
+        f"and {after:.1f} mm after the estimate",
+        f"{trial.name}: joint angles were changed by {overall:.1f} degrees (RMS), most of all {name} by "
+        f"{each[worst]:.1f}; the pelvis was moved by {rms(moved):.0f} mm (RMS), {np.nanmax(moved):.0f} mm at most",
+    ]
+
+
+def _knowledge(fit: Fit) -> tuple[str, ...]:
+    if fit.posterior is None:
+        return (
+            "the two-level method has no error bars: it cannot tell which parameters the data show and which they do "
+            "not. Small residuals alone prove nothing about single parameters; the simultaneous method tells",
+        )
+    posterior = fit.posterior
+    told = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
+    counts = {word: told.count(word) for word in _EVIDENCE}
+    found = [
+        f"of {len(told)} parameters the data measured {counts['measured']} (information above {100 * MEASURED:g} %) "
+        f"and informed {counts['informed']}; {counts['assumed']} are hardly informed by the data (below "
+        f'{100 * INFORMED:g} %; "assumed" in the table): most of what they say is from {start_of(fit).of}'
+    ]
+    masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
+    for word, meaning in _EVIDENCE.items():
+        if names := [name for name, one in masses.items() if one == word]:
+            found.append(f"masses {meaning}: {_segments(names)}")
+    if kept := held_sentence(fit):
+        found.append(kept)
+    if never := posterior.base.never:
+        found.append(
+            f"{hidden_combinations(fit)} combinations no motion ever shows, such as {never[0]}: all stand "
+            "with the table"
+        )
+    return tuple(found)
+
+
+def held_sentence(fit: Fit) -> str:
+    """Names the segments that were not estimated; empty where all were."""
+    estimated = set(estimated_rows(fit))
+    names = [name for i, name in enumerate(fit.estimate.segments) if i not in estimated]
+    return f"kept as the model has them, not estimated: {_segments(names)}" if names else ""
+
+
+def hidden_combinations(fit: Fit) -> int:
+    """How many independent combinations of the estimated parameters no motion shows: parameters minus rank."""
+    if fit.posterior is None:
+        return 0
+    base = fit.posterior.base
+    return len(base.best[0].weights) - base.count
+
+
+def _segments(names: list[str]) -> str:
+    """ "thigh (both), foot, left"."""
+    pairs = {name[:-2] for name in names if name.endswith("_r") and f"{name[:-2]}_l" in names}
+    short = [name[:-2].replace("_", " ") if name[:-2] in pairs else segment_name(name) for name in names]
+    return "; ".join(dict.fromkeys(short))
+
+
+def _departures(fit: Fit) -> tuple[str, ...]:
+    away = departures(fit)
+    if away is None or fit.posterior is None:
+        return ()
+    scale = fit.posterior.prior_sd
+    before, after, start = fit.literature.table(), fit.estimate.table(), start_of(fit)
+    far = [(int(i), int(k)) for i, k in np.argwhere(np.abs(away) > DEPARTURE_SD)]
+    far.sort(key=lambda place: -abs(away[place]))
+    told = []
+    for i, k in far[:_LISTED_FAR]:
+        (unit, factor), digits = read_in(k), decimals(k, scale[i, k])
+        told.append(
+            f"{NAMES[k]} of {segment_name(fit.estimate.segments[i])}: {fixed(factor * after[i, k], digits)} {unit}; "
+            f"{start.word} {fixed(factor * before[i, k], digits)}; {away[i, k]:+.1f} deviations apart"
+        )
+    if len(far) > _LISTED_FAR:
+        told.append(f"and {len(far) - _LISTED_FAR} more: sort the table by deviations to see them")
+    return tuple(told)

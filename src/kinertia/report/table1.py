@@ -1,0 +1,120 @@
+"""Table 1 on paper and screen: `table1.json`, `table1.csv`, a picture, `report.html`, and rows for the terminal."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from kinertia import __version__
+from kinertia.io.output_folder import complete_folder
+from kinertia.report.page import rendered
+from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
+
+QUANTITIES = {
+    "inertia": ("inertia (kg m2)", "inertia_rms_kgm2", "inertia_max_kgm2"),
+    "mass": ("mass (kg)", "mass_rms_kg", "mass_max_kg"),
+    "com": ("CoM (m)", "com_rms_m", "com_max_m"),
+    "force": ("pelvis force (N)", "force_rms_N", "force_max_N"),
+    "torque": ("pelvis torque (N m)", "torque_rms_Nm", "torque_max_Nm"),
+}
+_CLASSES = {"mass (kg)": ("mass",), "CoM (m)": ("com_x", "com_y", "com_z"), "inertia (kg m2)": ("ixx", "iyy", "izz")}
+# Okabe and Ito's colours, which colour-blind people can tell apart
+_COLOURS = {
+    "start": "#000000",
+    "no_correction_no_noise": "#56B4E9",
+    "no_correction_noise": "#E69F00",
+    "correction_no_noise": "#009E73",
+    "correction_noise": "#D55E00",
+}
+_MARKS = {"start": "_", **dict(zip(CONDITIONS, "svo^", strict=True))}
+
+
+def table1_frame(table: Table1) -> pd.DataFrame:
+    """One row per quantity and statistic; per condition our mean and spread over the draws, and the published value."""
+    rows = []
+    for heading, *names in QUANTITIES.values():
+        for statistic, name in zip(("RMS", "max"), names, strict=True):
+            row: dict[str, object] = {"quantity": heading, "statistic": statistic}
+            for condition in CONDITIONS:
+                row[f"{condition}_mean"] = asdict(table.mean(condition))[name]
+                row[f"{condition}_sd"] = asdict(table.spread(condition))[name]
+                row[f"{condition}_published"] = asdict(PUBLISHED[condition])[name]
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def table1_rows(table: Table1) -> list[list[str]]:
+    """The table in the study's form: quantity, then "RMS / max" per condition: mean, spread and published value."""
+    rows = []
+    for heading, *names in QUANTITIES.values():
+        for label, source, digits in (
+            (heading, table.mean, 2),
+            ("  spread", table.spread, 2),
+            ("  published", PUBLISHED.__getitem__, 3),
+        ):
+            values = [asdict(source(condition)) for condition in CONDITIONS]
+            rows.append([label, *(" / ".join(_short(value[name], digits) for name in names) for value in values)])
+    return rows
+
+
+def _short(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("e-0", "e-")
+
+
+def table1_figure(table: Table1) -> Figure:
+    """Error per segment and class of parameter: at the start and after estimation, RMS over draws, logarithmic."""
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    axes = figure.subplots(1, len(_CLASSES))
+    segments = list(dict.fromkeys(name.partition(".")[0] for name in table.parameters))
+    errors = {"start": np.array([draw.start_errors for draw in table.draws])}
+    errors |= {c: np.array([draw.parameter_errors[c] for draw in table.draws]) for c in CONDITIONS}
+    for axis, (heading, members) in zip(axes, _CLASSES.items(), strict=True):
+        for key, values in errors.items():
+            heights = []
+            for segment in segments:
+                chosen = [table.parameters.index(f"{segment}.{member}") for member in members]
+                heights.append(float(np.sqrt(np.mean(np.square(values[:, chosen])))))
+            label = "start" if key == "start" else CONDITIONS[key]
+            axis.plot(
+                segments, heights, linestyle="", marker=_MARKS[key], color=_COLOURS[key], label=label, markersize=7
+            )
+        axis.set_yscale("log")
+        axis.set_title(f"{heading}, RMS error")
+        axis.tick_params(axis="x", rotation=45)
+        axis.grid(True, axis="y", alpha=0.3)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
+    return figure
+
+
+def save_table1(table: Table1, folder: str | Path) -> Path:
+    """Write `table1.json`, `table1.csv`, `table1.png` and `report.html` into a folder; returns the folder."""
+    figure = table1_figure(table)
+    svg = io.StringIO()
+    figure.savefig(svg, format="svg", metadata={"Date": None})
+    picture = svg.getvalue()
+    page = rendered(
+        "table1.html.j2",
+        title="Table 1 repeated",
+        draws=len(table.draws),
+        seed=table.seed,
+        trial=table.trial,
+        headings=list(CONDITIONS.values()),
+        rows=table1_rows(table),
+        picture=Markup(picture[picture.index("<svg") :]),
+    )
+    with complete_folder(folder) as work:
+        (work / "table1.json").write_text(
+            json.dumps({"kinertia": __version__, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
+        )
+        table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")
+        (work / "report.html").write_text(page, encoding="utf-8")
+        figure.savefig(work / "table1.png", dpi=150)
+    return Path(folder)

@@ -1,0 +1,1 @@
+"""Questions asked of many synthetic people or of held-out trials: how good is the estimate?"""

@@ -1,0 +1,316 @@
+"""Do the error bars hold? Many people drawn from the literature prior walk, are measured and estimated.
+
+`run_accuracy` draws persons and noise, estimates from what a laboratory would have (`disturbed.measured`), and compares
+errors with error bars: how often the truth lies within 95 % intervals (cover), RMS error over posterior deviation
+(ratio), and errors against those of the literature. A draw depends on seed, scenario and its number only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.fisher_information import Information
+from kinertia.estimation.simultaneous.fit import calibration_prior
+from kinertia.estimation.simultaneous.observation import CUTOFF_HZ, observe
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.motions import MOTIONS
+from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
+
+WALK_S = 2.5
+SPACING_S = 1.0 / (2.0 * CUTOFF_HZ)
+CLASSES = {
+    "mass": slice(0, 1),
+    "CoM": slice(1, 4),
+    "moments of inertia": slice(4, 7),
+    "products of inertia": slice(7, 10),
+}
+"""Columns of `BodySegmentParameters.table`."""
+EVIDENCE = ("measured", "informed", "assumed")
+"""Parameters of all kinds by what stands behind their estimate (`identifiability.evidence`)."""
+JOINTS = {
+    "hips": ("hip",),
+    "knees": ("knee",),
+    "ankles": ("ankle", "subtalar"),
+    "back": ("lumbar",),
+    "arms": ("arm", "elbow"),
+}
+"""How the coordinates of each kind of joint begin."""
+WITHIN = 1.959964
+"""Half width of a 95 % interval in deviations."""
+_HELD_SD_M = 1e-4
+_TRIES = 500
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One kind of laboratory: its faults, whether the estimator calibrates, how long a walk was recorded, and which
+    other motions (`synthetic_motions.MOTIONS`) besides.
+    """
+
+    title: str
+    faults: Faults
+    calibrated: bool = True
+    walk_s: float = WALK_S
+    others: tuple[str, ...] = ()
+
+
+PROOF = {
+    "study": Scenario("the study's noise", Faults("study")),
+    "artefact": Scenario("skin motion linear in joint angles", Faults("artefact")),
+    "study_calibration": Scenario("the study's noise, calibration errors", Faults("study", calibration=True)),
+    "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
+    "walks": Scenario("skin motion, twelve strides at two paces", Faults("artefact"), others=("walk", "fast walk")),
+    "session": Scenario(
+        "skin motion, calibration errors; squats, arm swings and trunk sway besides the walk",
+        Faults("artefact", calibration=True),
+        others=("squat", "arm swing", "trunk sway"),
+    ),
+}
+"""What error bars are made for."""
+BREAKS = {
+    "axes": Scenario("axes of knees, ankles and elbows 5 degrees off", Faults("artefact", axes_rad=np.radians(5.0))),
+    "hips": Scenario("hip centres 15 mm off, calibration switched off", Faults("artefact", hips_m=0.015), False),
+    "wobbling": Scenario("40 % of the thighs' mass wobbles", Faults("artefact", wobbling=0.4)),
+    "gain": Scenario("right plate's gain 2 % off, calibration switched off", Faults("artefact", gain=0.02), False),
+}
+"""What error bars are not made for: how far they fall."""
+SCENARIOS = PROOF | BREAKS
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """One person, measured once.
+
+    Attributes:
+        errors, literature_errors: (s, 10) estimate and literature minus truth, in the table's order and units.
+        prior_sd, sd: (s, 10) prior and posterior deviations.
+        bound: (s, 10) the latter at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's
+            own noise model, prior included.
+        attainable: per class, chance that an estimate at the bound has a smaller RMS error than the literature.
+        angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
+        angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
+        moments: per kind of joint, of the joint moments at all frames: mean square error and mean posterior variance,
+            (N m)^2, and share within the 95 % intervals.
+        converged: of the estimate.
+    """
+
+    errors: np.ndarray
+    literature_errors: np.ndarray
+    prior_sd: np.ndarray
+    sd: np.ndarray
+    bound: np.ndarray
+    attainable: Mapping[str, float]
+    angles_rad: tuple[float, float]
+    angle_changes_rad: tuple[float, float]
+    moments: Mapping[str, tuple[float, float, float]]
+    converged: bool
+
+
+@dataclass(frozen=True)
+class ClassAccuracy:
+    """One class of parameters over all draws of a scenario; those by evidence are in prior deviations.
+
+    Attributes:
+        cover: share of parameters within their 95 % interval.
+        cover_sd: its standard error over draws.
+        ratio: RMS of error over posterior deviation.
+        rms, rms_literature: RMS errors of the estimate and the literature, SI.
+        bound: RMS of the Cramér-Rao bound of the estimator's own noise model at the truth, prior included, SI.
+        better: share of draws in which the RMS error is below the literature's.
+        attainable: what this share would be for an estimate at the bound; NaN for classes by evidence.
+    """
+
+    cover: float
+    cover_sd: float
+    ratio: float
+    rms: float
+    rms_literature: float
+    bound: float
+    better: float
+    attainable: float = np.nan
+
+
+@dataclass(frozen=True)
+class MomentAccuracy:
+    """Joint moments of one kind of joint: RMS error and RMS posterior deviation (N m), and cover of 95 % intervals."""
+
+    rms_nm: float
+    sd_nm: float
+    cover: float
+
+
+@dataclass(frozen=True)
+class ScenarioAccuracy:
+    """All classes of one scenario, RMS errors of joint angles (rad) by inverse kinematics and by the estimate, with
+    and without each angle's mean error, joint moments, and the share of draws that converged.
+    """
+
+    title: str
+    draws: int
+    classes: Mapping[str, ClassAccuracy]
+    angles_rad: tuple[float, float]
+    angle_changes_rad: tuple[float, float]
+    moments: Mapping[str, MomentAccuracy]
+    converged: float
+
+
+def run_accuracy(
+    scenarios: Mapping[str, Scenario],
+    draws: int = 100,
+    seed: int = 1,
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> dict[str, ScenarioAccuracy]:
+    """Accuracy in these scenarios, `draws` people each."""
+    found = run_draws(scenarios, draws, seed, workers, progress)
+    return {key: summarised(scenario.title, found[key]) for key, scenario in scenarios.items()}
+
+
+def run_draws(
+    scenarios: Mapping[str, Scenario],
+    draws: int,
+    seed: int,
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> dict[str, list[Draw]]:
+    """All draws of every scenario, in parallel."""
+    cases = [(scenario, number) for scenario in scenarios.values() for number in range(draws)]
+    found = in_parallel(partial(run_draw, seed), cases, workers, progress)
+    return {key: found[i * draws : (i + 1) * draws] for i, key in enumerate(scenarios)}
+
+
+def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
+    """One draw; people of one number are the same in every scenario."""
+    scenario, number = case
+    of_person, of_noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2))
+    subject = walking_subject()
+    prior = literature_prior(subject.literature)
+    person = replace(subject, bsp=prior.draw(of_person))
+    trials = [walk(person, scenario.walk_s, trapezoid=False), *(MOTIONS[name](person) for name in scenario.others)]
+    skeleton, recorded = measured(trials, scenario.faults, of_noise)
+    seen = observe(skeleton, recorded, prior.mass_kg, CUTOFF_HZ)
+    calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
+    result = estimate_simultaneous(skeleton, prior, calibration, seen.together, SPACING_S)
+    trial, kinematics = trials[0], recorded[0]
+    true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
+    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, SPACING_S)
+    bound = Information(there, seen.repeats).root(range(len(true)))
+    angles = np.flatnonzero(trial.skeleton.rotational)[3:]
+    inside = np.flatnonzero(seen.alone[0].dynamic)
+    at = np.searchsorted(trial.time, kinematics.time - 1e-9)
+    truth = trial.motion.cut(at)
+    off = [(q - truth.q)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]
+    found = inverse_dynamics(result.skeleton, result.bsp, result.motions[0].cut(inside), result.foot_loads[0][inside])
+    wrong = found - inverse_dynamics(trial.skeleton, person.bsp, truth, trial.foot_loads[at])
+    return Draw(
+        result.bsp.table() - person.bsp.table(),
+        prior.mean.table() - person.bsp.table(),
+        prior.sd,
+        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
+        np.linalg.norm(bound, axis=1).reshape(-1, 10),
+        attainable(prior, bound, of_noise),
+        (_rms(off[0]), _rms(off[1])),
+        (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
+        _by_joint(trial.skeleton.coordinates, wrong, result.moment_sd[0]),
+        result.converged,
+    )
+
+
+def at_truth(seen: Observation, trial: SyntheticTrial) -> Observation:
+    """The observation with the trial's true coordinates in place of those of inverse kinematics."""
+    return replace(seen, q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)])
+
+
+def _by_joint(coordinates: Sequence[str], errors: np.ndarray, sd: np.ndarray) -> dict[str, tuple[float, float, float]]:
+    """Mean squares and cover of the moments' errors and deviations (w, c), per kind of joint."""
+    found = {}
+    for joint, begins in JOINTS.items():
+        own = [name.startswith(begins) for name in coordinates]
+        error, deviation = errors[:, own], sd[:, own]
+        within = np.abs(error) < WITHIN * deviation
+        found[joint] = (float(np.square(error).mean()), float(np.square(deviation).mean()), float(within.mean()))
+    return found
+
+
+def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
+    """Per class, the chance that an unbiased estimate of covariance R R^T (10 s, k) errs less than the prior's mean.
+
+    Its errors and its distance from the prior's mean are independent; covariances of the two add up to the prior's.
+    """
+    moved, vectors = np.linalg.eigh(prior.given_scale()[1] - root @ root.T)
+    error = root @ rng.standard_normal((root.shape[1], _TRIES))
+    change = vectors @ (np.sqrt(np.maximum(moved, 0.0))[:, None] * rng.standard_normal((len(moved), _TRIES)))
+    found = {}
+    for name, columns in CLASSES.items():
+        own, before = (part.reshape(-1, 10, _TRIES)[:, columns] for part in (error, error + change))
+        squares = (np.square(part).sum(axis=(0, 1)) for part in (own, before))
+        found[name] = float(np.mean(np.less(*squares)))
+    return found
+
+
+def held(skeleton: Skeleton) -> CalibrationPrior:
+    """Calibration switched off: skeleton and instruments count as exact."""
+    places = np.full(len(skeleton.markers), _HELD_SD_M)
+    return CalibrationPrior({}, places, dict.fromkeys(PLATE_UNKNOWNS, _HELD_SD_M), _HELD_SD_M)
+
+
+def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
+    """Cover, ratio and errors by class and by evidence."""
+    errors, before, sd, bound, prior = (
+        np.array([getattr(d, name) for d in draws])
+        for name in ("errors", "literature_errors", "sd", "bound", "prior_sd")
+    )
+    classes = {}
+    for name, columns in CLASSES.items():
+        plain = _class(*(part[..., columns] for part in (errors, before, sd, bound)))
+        classes[name] = replace(plain, attainable=float(np.mean([d.attainable[name] for d in draws])))
+    words = np.vectorize(evidence)(1.0 - np.square(sd / prior))
+    for word in EVIDENCE:
+        chosen = np.where(words == word, 1.0, np.nan) / prior
+        if np.isfinite(chosen).any():
+            classes[word] = _class(*(part * chosen for part in (errors, before, sd, bound)))
+    angles = [_rms(np.array([getattr(d, kind)[i] for d in draws])) for kind in _ANGLES for i in range(2)]
+    moments = {}
+    for joint in JOINTS:
+        square, variance, cover = np.mean([d.moments[joint] for d in draws], axis=0)
+        moments[joint] = MomentAccuracy(float(np.sqrt(square)), float(np.sqrt(variance)), float(cover))
+    converged = float(np.mean([d.converged for d in draws]))
+    pairs = (angles[0], angles[1]), (angles[2], angles[3])
+    return ScenarioAccuracy(title, len(draws), classes, *pairs, moments, converged)
+
+
+def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.ndarray) -> ClassAccuracy:
+    """Of arrays (draws, s, k); NaN is left out, and a draw of which nothing is left."""
+    left = np.isfinite(errors).any(axis=(1, 2))
+    errors, before, sd, bound = (part[left] for part in (errors, before, sd, bound))
+    away = errors / sd
+    within = np.nanmean(np.where(np.isfinite(away), np.abs(away) < WITHIN, np.nan), axis=(1, 2))
+    each, each_before = (np.nanmean(np.square(part), axis=(1, 2)) for part in (errors, before))
+    return ClassAccuracy(
+        float(within.mean()),
+        float(within.std() / np.sqrt(len(within))),
+        _rms(away),
+        _rms(errors),
+        _rms(before),
+        _rms(bound),
+        float(np.mean(each < each_before)),
+    )
+
+
+_ANGLES = ("angles_rad", "angle_changes_rad")
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(np.square(values))))

@@ -1,0 +1,104 @@
+"""Cross-validation: are body segment parameters from some trials better on another one than the literature's?
+
+Small residuals prove nothing on the trials that they were made small on. Here one trial after the other is held out;
+the parameters come from the rest, are frozen, and on the held-out trial only motion and calibration are estimated. The
+objective that remains (half the sum of squares of markers, root residuals and calibration over their deviations) is
+compared with that of the literature's parameters, frozen in the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from kinertia.errors import KinertiaError
+from kinertia.estimation.prepare import Prepared, Progress
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.dynamics import residual
+from kinertia.motion.kinematics import Kinematics
+
+_FROZEN = 1e-3
+"""Deviation that is left to frozen parameters, share of the prior's."""
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How well a trial is explained by frozen parameters.
+
+    Attributes:
+        objective: half the sum of squares that is left.
+        force_rms_n, moment_rms_nm: RMS length of the root residual.
+        marker_rms_m: RMS distance of the markers.
+    """
+
+    objective: float
+    force_rms_n: float
+    moment_rms_nm: float
+    marker_rms_m: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """One trial, explained by the literature's parameters and by those from the other trials."""
+
+    trial: str
+    others: tuple[str, ...]
+    literature: Explained
+    estimate: Explained
+
+
+def cross_validate(
+    ready: Prepared, cutoff_hz: float | str, progress: Progress = lambda stage, share: None
+) -> tuple[HeldOut, ...]:
+    """Hold out every trial in turn.
+
+    The skeleton is calibrated on all trials at once, for both sets of parameters alike.
+
+    Args:
+        ready: the person, with two trials or more.
+        cutoff_hz: as `fit_simultaneous` has it.
+        progress: called as the work goes on.
+
+    Raises:
+        KinertiaError: there are fewer than two trials.
+    """
+    trials = ready.kinematics
+    if len(trials) < 2:
+        raise KinertiaError(
+            f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
+            "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
+        )
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = []
+        for k, held in enumerate(trials):
+            progress("held out", k / len(trials))
+            others = [other for other in trials if other is not held]
+            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff_hz, ready.freedom).result.bsp
+            explained = (_explained(ready, bsp, held, cutoff_hz) for bsp in (ready.prior.mean, estimate))
+            found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
+    return tuple(found)
+
+
+def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
+    """A prior that leaves these parameters where they are."""
+    return replace(prior, mean=bsp, covariance=_FROZEN**2 * prior.covariance, mass_kg=bsp.total_mass_kg)
+
+
+def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, cutoff_hz: float | str) -> Explained:
+    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], cutoff_hz, ready.freedom)
+    (motion,), (loads,) = fitted.motions, fitted.foot_loads
+    model = fitted.skeleton
+    left = residual(model, fitted.bsp, motion, loads.sum(axis=1))
+    modelled = model.marker_positions(model.pose(motion.q))
+    away = held.trial.markers.arranged(model.labels)[held.frames] - modelled
+    force, moment = np.square(left).reshape(-1, 2, 3).sum(axis=2).T
+    return Explained(
+        fitted.result.cost[1],
+        float(np.sqrt(force.mean())),
+        float(np.sqrt(moment.mean())),
+        float(np.sqrt(np.nanmean(np.square(away).sum(axis=-1)))),
+    )

@@ -1,0 +1,121 @@
+"""What to record: the error bar that every body segment parameter would have after candidate motions.
+
+Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
+published size in the walk, up to twice that in the others. Nothing is estimated: deviations follow from the information
+of each trial at the literature's parameters (`predicted.Information`), and those of several trials add up, but for
+errors that come back (`repetition`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.fisher_information import Information
+from kinertia.estimation.simultaneous.fit import calibration_prior, observed, used_skeleton
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.model.bsp import PARAMETERS, UNITS
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics
+from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.motions import MOTIONS
+from kinertia.synthetic.walk import walking_subject
+
+_LARGEST_SET = 3
+_SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Predicted deviations.
+
+    Attributes:
+        segments: names.
+        prior_sd: (s, 10), in the order of `BodySegmentParameters.table`.
+        sd: set of candidates -> (s, 10) deviations after recording them; every candidate alone, and of each size up to
+            three the set that tells most.
+    """
+
+    segments: tuple[str, ...]
+    prior_sd: np.ndarray
+    sd: Mapping[tuple[str, ...], np.ndarray]
+
+    def information(self, candidates: tuple[str, ...]) -> np.ndarray:
+        """(s, 10): 1 - predicted variance / prior variance."""
+        return 1.0 - np.square(self.sd[candidates] / self.prior_sd)
+
+    def counts(self, candidates: tuple[str, ...]) -> dict[str, int]:
+        """How many parameters these candidates would leave measured, informed, assumed."""
+        words = [evidence(value) for value in self.information(candidates).ravel()]
+        return {word: words.count(word) for word in ("measured", "informed", "assumed")}
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row per parameter: segment, parameter, unit, prior_sd, and a column of deviations per set ("a + b")."""
+        s = len(self.segments)
+        columns = {" + ".join(names): sd.ravel() for names, sd in self.sd.items()}
+        return pd.DataFrame(
+            {
+                "segment": np.repeat(np.array(self.segments, dtype=object), len(PARAMETERS)),
+                "parameter": PARAMETERS * s,
+                "unit": UNITS * s,
+                "prior_sd": self.prior_sd.ravel(),
+                **columns,
+            }
+        )
+
+
+def plan_measured(
+    skeleton: Skeleton,
+    prior: BspPrior,
+    trials: Sequence[Kinematics],
+    cutoff_hz: float | str,
+    freedom: Freedom = GAIT27_FREEDOM,
+) -> Plan:
+    """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
+    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    used = used_skeleton(skeleton, trials, freedom)
+
+    def told(chosen: Sequence[int]) -> Information:
+        seen = observed(used, prior, [trials[k] for k in chosen], cutoff, freedom)
+        calibration = calibration_prior(used, freedom)
+        return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
+
+    everything = tuple(range(len(trials)))
+    with threadpool_limits(1):
+        whole = told(everything)
+        sets: list[tuple[int, ...]] = [(k,) for k in everything]
+        sets += [
+            max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
+            for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
+        ]
+        # chosen by the errors of all trials; each set's own errors are what a fit of it would have
+        of_sets = {chosen: whole if chosen == everything else told(chosen) for chosen in sets}
+        found = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
+    names = [k.trial.name for k in trials]
+    return Plan(prior.mean.segments, prior.sd, {tuple(names[k] for k in chosen): sd for chosen, sd in found.items()})
+
+
+def plan_synthetic() -> Plan:
+    """Predicted deviations from the package's motions, each 5 s."""
+    subject = walking_subject()
+    prior = literature_prior(subject.literature)
+    person = replace(subject, bsp=prior.mean)
+    motions = [made(person) for made in MOTIONS.values()]
+    skeleton, trials = measured(motions, Faults("artefact"), np.random.default_rng(_SEED))
+    named = [replace(k, trial=replace(k.trial, name=name)) for name, k in zip(MOTIONS, trials, strict=True)]
+    return plan_measured(skeleton, prior, named, "gcv")
+
+
+def _gain(told: Information, prior: BspPrior, chosen: tuple[int, ...]) -> float:
+    """Information on all parameters, summed."""
+    return float((1.0 - np.square(told.sd(chosen) / prior.sd)).sum())

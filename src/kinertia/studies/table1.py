@@ -1,0 +1,259 @@
+"""The study's Table 1, repeated: which BSPs come back from gait, with and without noise and pelvis correction.
+
+Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the
+study's marker noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The
+two-level estimator never sees the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from kinertia.estimation.from_files import read_inputs
+from kinertia.estimation.prepare import Progress, prepare
+from kinertia.estimation.two_level import Window, estimate_two_level
+from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.smoothing import smooth
+from kinertia.settings import SubjectFile
+from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic.noise import study_noise
+from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
+
+CONDITIONS = {
+    "no_correction_no_noise": "no correction, no noise",
+    "no_correction_noise": "no correction, noise",
+    "correction_no_noise": "correction, no noise",
+    "correction_noise": "correction, noise",
+}
+"""Key and heading of the four conditions, in the order of the published table."""
+START_SHARE = 0.5
+MARGIN_S = 0.1
+"""Frames this near the ends of the trial are smoothed but not used: splines are poor at their ends."""
+_STRIDE_S = 1.24
+
+
+@dataclass(frozen=True)
+class Errors:
+    """One column of Table 1: errors of the estimated parameters, and the root residual that is left.
+
+    RMS and largest magnitude over all parameters of a class (21 moments, 7 masses, 21 CoM coordinates), and over all
+    frames and components of the pelvis force and torque.
+    """
+
+    inertia_rms_kgm2: float
+    inertia_max_kgm2: float
+    mass_rms_kg: float
+    mass_max_kg: float
+    com_rms_m: float
+    com_max_m: float
+    force_rms_N: float
+    force_max_N: float
+    torque_rms_Nm: float
+    torque_max_Nm: float
+
+
+PUBLISHED = {
+    "no_correction_no_noise": Errors(
+        2.67e-5, 5.65e-5, 2.75e-8, 5.30e-8, 9.44e-10, 4.00e-9, 9.01e-10, 2.72e-9, 6.98e-10, 1.68e-9
+    ),
+    "no_correction_noise": Errors(0.933, 4.09, 2.11, 5.77, 0.197, 0.461, 18.3, 50.1, 13.0, 35.2),
+    "correction_no_noise": Errors(
+        2.73e-5, 5.90e-5, 3.95e-8, 7.66e-8, 1.31e-9, 5.51e-9, 5.73e-9, 2.20e-8, 2.42e-9, 1.05e-8
+    ),
+    "correction_noise": Errors(0.382, 1.84, 1.71, 3.07, 0.180, 0.559, 0.229, 0.961, 0.600, 1.53),
+}
+"""Table 1 as published (DESIGN section 1)."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One draw of start and noise.
+
+    Attributes:
+        number: of the draw; with the seed it determines everything.
+        errors: per condition.
+        parameter_errors: per condition, estimate minus truth (49; kg, m, kg m2).
+        start_errors: start minus truth (49).
+        converged: per condition.
+    """
+
+    number: int
+    errors: Mapping[str, Errors]
+    parameter_errors: Mapping[str, np.ndarray]
+    start_errors: np.ndarray
+    converged: Mapping[str, bool]
+
+
+@dataclass(frozen=True)
+class Table1:
+    """All draws of a study.
+
+    Attributes:
+        parameters: names of the 49 parameters.
+        truth: their true values.
+        draws: in the order of their numbers.
+        seed: of the study.
+        trial: where the motion comes from.
+    """
+
+    parameters: tuple[str, ...]
+    truth: np.ndarray
+    draws: tuple[Draw, ...]
+    seed: int
+    trial: str
+
+    def mean(self, condition: str) -> Errors:
+        """Mean of the errors over the draws."""
+        return Errors(*np.mean(self._values(condition), axis=0).tolist())
+
+    def spread(self, condition: str) -> Errors:
+        """Standard deviation of the errors over the draws (zero for one draw)."""
+        return Errors(*np.std(self._values(condition), axis=0, ddof=min(1, len(self.draws) - 1)).tolist())
+
+    def _values(self, condition: str) -> np.ndarray:
+        return np.array([list(asdict(draw.errors[condition]).values()) for draw in self.draws])
+
+
+def symmetric_truth(bsp: BodySegmentParameters) -> BodySegmentParameters:
+    """The same with left mirroring right exactly, so that 49 parameters can describe it."""
+    vector = ParameterVector(bsp, symmetric=True)
+    return vector.bsp(vector.values(bsp))
+
+
+def study_trial() -> SyntheticTrial:
+    """One stride of the package's walk, with margins, of a subject with exactly symmetric BSPs."""
+    subject = walking_subject()
+    return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S + 2 * MARGIN_S)
+
+
+def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> tuple[SyntheticTrial, str]:
+    """The study's trial from a measured one, and what to call it.
+
+    The first trial of the subject file goes through reading, calibration, inverse kinematics and smoothing; of its
+    measured window, the middle `_STRIDE_S` (or all, if it is shorter) is made consistent with the literature BSPs; the
+    margins are inside it, because the pelvis goes astray with the square of the time.
+
+    Raises:
+        KinertiaError: the trial cannot be used, or no pelvis motion near the measured one balances its ground
+            reactions.
+    """
+    static, inputs, marker_set = read_inputs(wanted, progress)
+    with threadpool_limits(1):
+        ready = prepare(wanted.subject, static, inputs[:1], wanted.settings, marker_set, progress)
+        measured = ready.kinematics[0]
+        worn = [m for m in ready.skeleton.markers if m.label in measured.ik.labels]
+        inside = np.abs(measured.time - measured.time.mean()) <= _STRIDE_S / 2 + 1e-9
+        frames = slice(int(np.argmax(inside)), int(len(inside) - np.argmax(inside[::-1])))
+        trial = consistent_trial(
+            ready.skeleton.with_markers(worn),
+            symmetric_truth(without_products(ready.literature)),
+            measured.time[frames],
+            measured.motion.cut(frames),
+            measured.foot_loads[frames],
+        )
+    first, last = trial.time[[0, -1]]
+    return trial, f"{measured.trial.name}, {first:.2f} to {last:.2f} s"
+
+
+def run_table1(
+    trial: SyntheticTrial,
+    repeats: int = 10,
+    seed: int = 1,
+    name: str = "synthetic walk",
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Table1:
+    """All four conditions for a number of independent draws, in parallel processes.
+
+    A draw depends on the seed and its own number only: not on how many there are, nor on the number of processes.
+
+    Args:
+        trial: exactly consistent; its BSPs are the truth.
+        repeats: number of draws.
+        seed: of the study.
+        name: of the trial, for the tables.
+        workers: processes; as many as there are cores if None.
+        progress: called with the share that is done.
+    """
+    vector = ParameterVector(trial.bsp, symmetric=True)
+    draws = in_parallel(partial(run_draw, trial, seed), range(repeats), workers, progress)
+    return Table1(vector.names, vector.values(trial.bsp), tuple(draws), seed, name)
+
+
+def run_draw(trial: SyntheticTrial, seed: int, number: int) -> Draw:
+    """One draw: the four conditions from the same start, the noisy ones with the same noise."""
+    rng = np.random.default_rng([seed, number])
+    vector = ParameterVector(trial.bsp, symmetric=True)
+    truth = vector.values(trial.bsp)
+    theta = truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))
+    start = vector.bsp(theta)
+    inner = _inner(trial.time)
+    windows = {
+        "no_noise": Window(trial.time[inner], trial.motion.cut(inner), trial.window.wrench[inner]),
+        "noise": _noisy_window(trial, inner, rng),
+    }
+    errors, found, converged = {}, {}, {}
+    for condition in CONDITIONS:
+        correct = condition.startswith("correction")
+        window = windows["no_noise" if condition.endswith("no_noise") else "noise"]
+        result = estimate_two_level(trial.skeleton, start, [window], correct=correct)
+        found[condition] = vector.values(result.bsp) - truth
+        errors[condition] = _errors(found[condition], result.residuals[0])
+        converged[condition] = result.converged
+    return Draw(number, errors, found, theta - truth, converged)
+
+
+def _inner(time: np.ndarray) -> slice:
+    margin = round(MARGIN_S / (time[1] - time[0]))
+    return slice(margin, len(time) - margin)
+
+
+def _noisy_window(trial: SyntheticTrial, inner: slice, rng: np.random.Generator) -> Window:
+    ik = solve_ik(trial.skeleton, study_noise(trial.markers, rng))
+    spline = smooth(ik.time, ik.q, "gcv")
+    time = trial.time[inner]
+    motion = Motion(*(spline(time, order) for order in range(3)))
+    return Window(time, motion, trial.window.wrench[inner])
+
+
+def _errors(parameters: np.ndarray, residual: np.ndarray) -> Errors:
+    by_segment = parameters.reshape(-1, 7)
+    groups = (by_segment[:, 4:], by_segment[:, :1], by_segment[:, 1:4], residual[:, :3], residual[:, 3:])
+    values = [value for group in groups for value in (np.sqrt(np.mean(np.square(group))), np.abs(group).max())]
+    return Errors(*map(float, values))
+
+
+def table1_json(table: Table1) -> dict[str, object]:
+    """The study as `table1.json` holds it: per condition the mean over draws, and every draw."""
+    return {
+        "trial": table.trial,
+        "seed": table.seed,
+        "repeats": len(table.draws),
+        "conditions": {condition: asdict(table.mean(condition)) for condition in CONDITIONS},
+        "spread": {condition: asdict(table.spread(condition)) for condition in CONDITIONS},
+        "published": {condition: asdict(PUBLISHED[condition]) for condition in CONDITIONS},
+        "parameters": list(table.parameters),
+        "truth": table.truth.tolist(),
+        "draws": [
+            {
+                "number": draw.number,
+                "start_errors": draw.start_errors.tolist(),
+                "conditions": {
+                    condition: {
+                        **asdict(draw.errors[condition]),
+                        "converged": draw.converged[condition],
+                        "parameter_errors": draw.parameter_errors[condition].tolist(),
+                    }
+                    for condition in CONDITIONS
+                },
+            }
+            for draw in table.draws
+        ],
+    }

@@ -1,0 +1,186 @@
+"""Synthetic walks measured by laboratories with given faults: what the accuracy study estimates from.
+
+The truth is a `SyntheticTrial`; the laboratory has noisy markers, loads by its own plates, and its own idea of the
+skeleton. Only the latter three come out, as `Kinematics`; the estimator gets no more than from files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from kinertia.estimation.simultaneous.fit import CLOCK_SD_S, PLATE_SD
+from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M
+from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.kinematics import Kinematics, solve_kinematics
+from kinertia.motion.smoothing import smooth
+from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
+from kinertia.synthetic.walk import SyntheticTrial
+from kinertia.trial.data import FootLoads, Markers, Trial
+
+CAMERA_SD_M = 0.0005
+WOBBLE_HZ, WOBBLE_DAMPING = 10.0, 0.3
+"""Soft tissue of the thigh on its springs: natural frequency and damping ratio (Gruber et al. 1998, J Biomech 31)."""
+_LOADS_HZ = 40.0
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What is wrong in a laboratory beside the noise of the markers.
+
+    Attributes:
+        noise: "study" (`noise.study_noise`) or "artefact" (`noise.SkinMotion` and 0.5 mm of camera noise).
+        amplitude: factor on that noise, but for the cameras'.
+        calibration: joint centres, markers, plates and clock are off by errors drawn from the estimator's own prior.
+        axes_rad: the axes of knees, ankles and elbows are tilted by this much, each in its own direction.
+        hips_m: both hip centres are this far forward.
+        wobbling: share of the thighs' mass that wobbles on springs.
+        gain: relative error of the right foot's plate.
+    """
+
+    noise: Literal["study", "artefact"]
+    amplitude: float = 1.0
+    calibration: bool = False
+    axes_rad: float = 0.0
+    hips_m: float = 0.0
+    wobbling: float = 0.0
+    gain: float = 0.0
+
+
+def measured(
+    trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator
+) -> tuple[Skeleton, list[Kinematics]]:
+    """The skeleton that the laboratory believes in, and the kinematics by that skeleton of all trials of one person.
+
+    Skin that goes with the joints, skeleton and instruments are the same in all trials; the study's noise is not.
+    Sizes of skin motion are those of the first.
+    """
+    markers, skeleton = _disturbed(trials, faults, rng), trials[0].skeleton
+    instruments = None
+    if faults.calibration:
+        skeleton = _misplaced(skeleton, rng)
+        instruments = _Instruments.draw(rng)
+    if faults.hips_m:
+        skeleton = skeleton.lock({name: faults.hips_m for name in HIP_OFFSETS if "_x_" in name})
+    if faults.axes_rad:
+        skeleton = tilted(skeleton, faults.axes_rad, rng)
+    found = []
+    for trial, seen in zip(trials, markers, strict=True):
+        loads = trial.foot_loads.copy()
+        if faults.wobbling:
+            loads += _wobbled(trial, faults.wobbling)
+        if instruments is not None:
+            loads = instruments.read(trial.time, loads)
+        loads[:, 0] *= 1.0 + faults.gain
+        found.append(_kinematics(skeleton, trial.time, seen, loads))
+    return skeleton, found
+
+
+def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator) -> list[Markers]:
+    """The markers of each trial with noise."""
+    first, *others = (trial.motion.q for trial in trials)
+    skin = SkinMotion.draw(trials[0].skeleton, first, rng, others) if faults.noise == "artefact" else None
+    found = []
+    for trial in trials:
+        exact = trial.markers
+        moved = study_noise(exact, rng) if skin is None else skin.moved(exact, trial.skeleton, trial.motion.q)
+        scaled = replace(exact, positions=exact.positions + faults.amplitude * (moved.positions - exact.positions))
+        found.append(scaled if skin is None else camera_noise(scaled, CAMERA_SD_M, rng))
+    return found
+
+
+def _kinematics(skeleton: Skeleton, time: np.ndarray, markers: Markers, loads: np.ndarray) -> Kinematics:
+    feet = FootLoads(time, loads[..., :3], loads[..., 3:])
+    return solve_kinematics(skeleton, Trial("walk", markers, feet, np.ones(len(time), dtype=bool)), 0.0, "gcv")
+
+
+def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
+    """The skeleton with joint centres and markers off by errors drawn from the prior of `fit_simultaneous`."""
+    centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
+    skeleton = skeleton.lock({name: skeleton.locked[name] + rng.normal(0.0, JOINT_CENTRE_SD_M) for name in centres})
+    places = skeleton.marker_locals + rng.normal(0.0, MARKER_SD_M, skeleton.marker_locals.shape)
+    return skeleton.with_places(places)
+
+
+@dataclass(frozen=True, eq=False)
+class _Instruments:
+    """Plates and clock of a laboratory: how late forces are, and per foot's plate its offset (2, 3) m, gain (2, 1), and
+    crosstalk (2,) to the free moment.
+    """
+
+    late_s: float
+    offset_m: np.ndarray
+    gain: np.ndarray
+    free_moment: np.ndarray
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> _Instruments:
+        """From the prior of `fit_simultaneous`."""
+        late_s = rng.normal(0.0, CLOCK_SD_S)
+        offset = rng.normal(0.0, 1.0, (2, 3)) * [PLATE_SD["x"], 0.0, PLATE_SD["z"]]
+        gain = 1.0 + rng.normal(0.0, PLATE_SD["gain"], (2, 1))
+        return cls(late_s, offset, gain, rng.normal(0.0, PLATE_SD["free moment"], 2))
+
+    def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """What they make of true loads (n, 2, 6)."""
+        wrong = smooth(time, loads.reshape(len(time), 12), _LOADS_HZ)(time + self.late_s).reshape(loads.shape)
+        wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
+        wrong *= self.gain
+        wrong[..., 4] += self.free_moment * wrong[..., 1]
+        return wrong
+
+
+def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Skeleton:
+    """The skeleton with every joint of one rotation tilted by this angle, each in a random direction."""
+    joints = []
+    for joint in skeleton.joints:
+        moving = [axis for axis in joint.axes if axis.coordinate not in skeleton.locked]
+        if len(moving) == 1 and moving[0].kind == "rotation":
+            direction = np.array(moving[0].direction)
+            across = np.cross(direction, rng.standard_normal(3))
+            x, y, z = map(float, Rotation.from_rotvec(angle_rad * across / np.linalg.norm(across)).apply(direction))
+            turned = replace(moving[0], direction=(x, y, z))
+            joint = replace(joint, axes=tuple(turned if axis is moving[0] else axis for axis in joint.axes))
+        joints.append(joint)
+    return replace(skeleton, joints=tuple(joints))
+
+
+def _wobbled(trial: SyntheticTrial, share: float) -> np.ndarray:
+    """Change of the foot loads (n, 2, 6) when this share of each thigh's mass hangs on springs at the thigh's CoM.
+
+    The springs' own deflection under gravity belongs to the CoM; only what inertia adds counts. The change is divided
+    between the feet as the vertical forces are.
+    """
+    step = trial.time[1] - trial.time[0]
+    pose = trial.skeleton.pose(trial.motion.q)
+    change = np.zeros((len(trial.time), 6))
+    for side in "rl":
+        place, row = (names.index(f"thigh_{side}") for names in (trial.skeleton.segments, trial.bsp.segments))
+        centre = pose.translation[:, place] + pose.rotation[:, place] @ trial.bsp.com_m[row]
+        carried = np.gradient(np.gradient(centre, step, axis=0), step, axis=0)
+        moved = _oscillator(carried, step)
+        rate = np.gradient(np.gradient(moved, step, axis=0), step, axis=0)
+        mass = share * trial.bsp.mass_kg[row]
+        pull = carried + np.array([0.0, GRAVITY_M_S2, 0.0])
+        change[:, :3] += mass * rate
+        change[:, 3:] += mass * (np.cross(centre + moved, pull + rate) - np.cross(centre, pull))
+    upward = np.maximum(trial.foot_loads[:, :, 1], 0.0)
+    return (upward / upward.sum(axis=1, keepdims=True))[..., None] * change[:, None]
+
+
+def _oscillator(base: np.ndarray, step: float) -> np.ndarray:
+    """(n, 3) displacement x of x'' + 2 d w x' + w^2 x = -base, by the bilinear transform, from rest at balance."""
+    w = 2.0 * np.pi * WOBBLE_HZ
+    k = 2.0 / step
+    a = np.array(
+        [k**2 + 2 * WOBBLE_DAMPING * w * k + w**2, 2 * w**2 - 2 * k**2, k**2 - 2 * WOBBLE_DAMPING * w * k + w**2]
+    )
+    b = -np.array([1.0, 2.0, 1.0])
+    swing = base - base[0]
+    return lfilter(b / a[0], a / a[0], swing, axis=0) - base[0] / w**2

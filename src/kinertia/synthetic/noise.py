@@ -1,0 +1,117 @@
+"""Measurement errors for synthetic trials: skin motion, cameras, force plates. Every function takes its own generator.
+
+Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that moves with the neighbouring joints
+(`SkinMotion`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset
+(`plate_noise`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.model.skeleton import Skeleton
+from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads
+
+STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S = 0.01, 25.0
+
+ARTEFACT_RANGE_M = {"thigh": (0.010, 0.018), "shank": (0.007, 0.017)}
+"""Peak-to-peak displacement over a step, m, by segment; other segments: `OTHER_ARTEFACT_RANGE_M`."""
+OTHER_ARTEFACT_RANGE_M = (0.004, 0.009)
+
+
+def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
+    """The study's noise (DESIGN section 5): A sin(w t + phi) on every marker coordinate.
+
+    Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm
+    RMS, below 4 Hz: no low-pass filter removes it (Chèze et al. 1995).
+    """
+    shape = markers.positions.shape[1:]
+    amplitude = rng.uniform(0.0, STUDY_AMPLITUDE_M, shape)
+    rate = rng.uniform(0.0, STUDY_RATE_RAD_S, shape)
+    phase = rng.uniform(0.0, 2 * np.pi, shape)
+    time = (markers.time - markers.time[0])[:, None, None]
+    return replace(markers, positions=markers.positions + amplitude * np.sin(rate * time + phase))
+
+
+@dataclass(frozen=True, eq=False)
+class SkinMotion:
+    """Skin motion of a person that goes with the joints: each segment's markers move together, linearly in the angles
+    of the joints at its two ends, and in every trial alike.
+
+    Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes from the review of Peters et al. (2010).
+
+    Attributes:
+        slopes: segment -> (k, 3) m/rad in the segment's frame, per angle of its joints.
+        reference: (c,) coordinates at which nothing is displaced.
+    """
+
+    slopes: Mapping[str, np.ndarray]
+    reference: np.ndarray
+
+    @classmethod
+    def draw(
+        cls, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator, others: Sequence[np.ndarray] = ()
+    ) -> SkinMotion:
+        """Random directions per joint angle, and peak-to-peak sizes over the coordinates q (n, c) of a walk from
+        `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere; less where the person's other
+        motions (each n, c) would draw the skin more than twice as far (no source).
+        """
+        reference, slopes, every = q.mean(axis=0), {}, np.concatenate([q, *others])
+        for segment in skeleton.segments:
+            if not any(marker.segment == segment for marker in skeleton.markers):
+                continue
+            columns = _neighbouring(skeleton, segment)
+            directions = rng.standard_normal((len(columns), 3))
+            low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
+            walking, overall = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
+            extent = max(walking, overall / 2.0)
+            slopes[segment] = directions * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
+        return cls(slopes, reference)
+
+    def moved(self, markers: Markers, skeleton: Skeleton, q: np.ndarray) -> Markers:
+        """The markers of a trial displaced; q (n, c) are its true coordinates at their frames."""
+        pose = skeleton.pose(q)
+        positions = markers.positions.copy()
+        for segment, slopes in self.slopes.items():
+            labels = [marker.label for marker in skeleton.markers if marker.segment == segment]
+            columns = [markers.labels.index(label) for label in labels if label in markers.labels]
+            local = (q - self.reference)[:, _neighbouring(skeleton, segment)] @ slopes
+            turned = pose.rotation[:, skeleton.segments.index(segment)] @ local[..., None]
+            positions[:, columns] += turned[:, None, :, 0]
+        return replace(markers, positions=positions)
+
+
+def _neighbouring(skeleton: Skeleton, segment: str) -> list[int]:
+    """Columns of the angles of the joints at both ends of a segment; a massless one in between belongs to the joint."""
+    names = set()
+    for joint in skeleton.joints:
+        if joint.child == segment or joint.parent == segment:
+            names |= {axis.coordinate for axis in joint.axes if axis.kind == "rotation"}
+    chosen = [i for i, name in enumerate(skeleton.coordinates) if name in names and not name.startswith("pelvis")]
+    return chosen
+
+
+def camera_noise(markers: Markers, sd_m: float, rng: np.random.Generator) -> Markers:
+    """White noise of this deviation (m) on every marker coordinate and frame."""
+    return replace(markers, positions=markers.positions + rng.normal(0.0, sd_m, markers.positions.shape))
+
+
+def plate_noise(
+    plates: PlateLoads, force_sd_n: float, offset_sd_n: float, moment_sd_nm: float, rng: np.random.Generator
+) -> PlateLoads:
+    """White noise on forces (N) and moments (N m), and a constant force offset (N) per plate, on loaded samples.
+
+    Errors of force act at the middle of the plate's corners (at the ground origin where they are unknown). Samples
+    below the load threshold are zero, as the readers of this package have them.
+    """
+    shape = plates.force.shape
+    offset = rng.normal(0.0, offset_sd_n, (1, *shape[1:]))
+    error = rng.normal(0.0, force_sd_n, shape) + offset
+    centre = np.zeros(3) if plates.corners is None else plates.corners.mean(axis=1)
+    force = plates.force + error
+    moment = plates.moment + np.cross(centre, error) + rng.normal(0.0, moment_sd_nm, shape)
+    loaded = (plates.force[..., 1:2] > 0) & (force[..., 1:2] >= LOAD_THRESHOLD_N)
+    return replace(plates, force=np.where(loaded, force, 0.0), moment=np.where(loaded, moment, 0.0))

@@ -1,0 +1,316 @@
+"""A synthetic person and gait trial of which everything is known: BSPs, coordinates, ground reactions, markers.
+
+Two ways to an exactly consistent trial, both with root residual P = 0 at every frame and a pelvis whose position and
+velocity are the trapezoid integrals of its acceleration (so that the study's pelvis correction, at the true BSPs, gives
+back the motion itself):
+
+- `walk`: the walk that comes with the package, any length; the ground reactions are what the motion asks for, shared
+  out between the feet.
+- `consistent_trial`: as in the study, any measured window; the ground reactions are kept and the pelvis is modified
+  until equation (1) holds with P = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib import resources
+
+import numpy as np
+import pandas as pd
+
+from kinertia.errors import KinertiaError
+from kinertia.estimation.two_level import Integration, Window
+from kinertia.model.anthropometry import literature_bsp
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.gait27 import build_gait27
+from kinertia.model.marker_set import MarkerSet, read_marker_set
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual
+from kinertia.trial.data import Markers, Recording
+
+MASS_KG, HEIGHT_M, SEX = 72.6, 1.803, "male"
+"""The walker: the subject of OpenSim's gait2354 example."""
+STATIC_ONLY = tuple(
+    f"{side}.{joint}.{place}" for side in "RL" for joint in ("Knee", "Ankle") for place in ("Lat", "Med")
+)
+"""Markers that are taken off after the static trial, as in the measured walk; 41 remain."""
+UNLIKE_MASS, UNLIKE_COM_M, UNLIKE_INERTIA = 0.1, 0.01, 0.1
+"""How far people are from the literature: standard deviations of masses and moments (share), CoM coordinates (m)."""
+_MAX_ITERATIONS = 100
+_RESIDUAL_TOLERANCE = 1e-9
+_HANDOVER = 0.3
+"""Share of double support over which the shares of the load set in, and over which they end."""
+
+
+@dataclass(frozen=True, eq=False)
+class SyntheticSubject:
+    """A person who does not exist.
+
+    Attributes:
+        static: standing, Cleveland Clinic markers.
+        marker_set: theirs.
+        skeleton: the model of `static`.
+        literature: Dumas' values for this person; CoMs lie off the segment axes.
+        bsp: the truth.
+    """
+
+    static: Recording
+    marker_set: MarkerSet
+    skeleton: Skeleton
+    literature: BodySegmentParameters
+    bsp: BodySegmentParameters
+
+
+@dataclass(frozen=True, eq=False)
+class SyntheticTrial:
+    """An exactly consistent trial.
+
+    Attributes:
+        skeleton, bsp: the truth.
+        time: (n,) s, uniform.
+        motion: coordinates and derivatives; pelvis integrated by the trapezoid rule.
+        foot_loads: (n, 2, 6) on the right and left foot: force (N), moment about the ground origin (N m), ground axes.
+        deviation: (6,) largest change of each pelvis coordinate from the start motion (m, rad).
+    """
+
+    skeleton: Skeleton
+    bsp: BodySegmentParameters
+    time: np.ndarray
+    motion: Motion
+    foot_loads: np.ndarray
+    deviation: np.ndarray
+
+    @cached_property
+    def markers(self) -> Markers:
+        """Exact marker positions."""
+        positions = self.skeleton.marker_positions(self.skeleton.pose(self.motion.q))
+        return Markers(self.time, self.skeleton.labels, positions)
+
+    @property
+    def window(self) -> Window:
+        """What an estimator takes: exact coordinates and the sum of the ground reactions."""
+        return Window(self.time, self.motion, self.foot_loads.sum(axis=1))
+
+
+def without_products(bsp: BodySegmentParameters) -> BodySegmentParameters:
+    """The same with principal axes along the segment axes: products of inertia zero, moments as they are."""
+    table = bsp.table()
+    table[:, 7:] = 0.0
+    return BodySegmentParameters.from_table(bsp.segments, table)
+
+
+def walking_subject() -> SyntheticSubject:
+    """The person of the package's synthetic walk: 72.6 kg, 1.803 m, male.
+
+    The truth is the literature with zero products of inertia: principal axes along the segment axes, as in the study.
+    """
+    table = _data("standing.csv").set_index("label")
+    rate_hz, n = 100.0, 20
+    positions = np.tile(table[["x", "y", "z"]].to_numpy(float), (n, 1, 1))
+    static = Recording("static", Markers(np.arange(n) / rate_hz, tuple(table.index), positions))
+    marker_set = read_marker_set("cleveland-clinic")
+    model = build_gait27(static, marker_set, HEIGHT_M, SEX)
+    literature = literature_bsp(MASS_KG, HEIGHT_M, SEX, model.geometry)
+    return SyntheticSubject(static, marker_set, model.skeleton, literature, without_products(literature))
+
+
+def unlike_literature(subject: SyntheticSubject, rng: np.random.Generator) -> SyntheticSubject:
+    """The same skeleton with a body that differs from the literature as people do, left mirroring right.
+
+    Every mass off by 10 %, every CoM coordinate by 10 mm, every moment of inertia by 10 % (standard deviations of
+    normal draws); products of inertia change with their moments. The total mass stays, a scale tells it. Drawn again
+    until every segment is physically possible.
+    """
+    bsp = subject.literature
+    left = np.array([segment.endswith("_l") for segment in bsp.segments])
+    while True:
+        shape = bsp.com_m.shape
+        mass = bsp.mass_kg * (1.0 + rng.normal(0.0, UNLIKE_MASS, len(left)))
+        com = bsp.com_m + rng.normal(0.0, UNLIKE_COM_M, shape)
+        root = np.sqrt(np.maximum(1.0 + rng.normal(0.0, UNLIKE_INERTIA, shape), 0.01))
+        drawn = BodySegmentParameters(bsp.segments, mass, com, bsp.inertia_kgm2 * root[:, :, None] * root[:, None, :])
+        table = np.where(left[:, None], drawn.mirrored().table(), drawn.table())
+        table[:, 0] *= bsp.total_mass_kg / table[:, 0].sum()
+        result = BodySegmentParameters.from_table(bsp.segments, table)
+        if result.physically_consistent().all():
+            return replace(subject, bsp=result)
+
+
+def walk(
+    subject: SyntheticSubject,
+    duration_s: float | None = None,
+    rate_hz: float = 100.0,
+    start: float = 0.0,
+    trapezoid: bool = True,
+    pace: float = 1.0,
+) -> SyntheticTrial:
+    """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same; without the markers `STATIC_ONLY`.
+
+    Args:
+        subject: who walks.
+        duration_s: one stride if None.
+        rate_hz: frames per second.
+        start: share of the stride at which the trial begins (0: shortly before the left heel strikes).
+        trapezoid: integrate the pelvis by the trapezoid rule, as the study's pelvis correction does; False keeps
+            position and velocity that are exact integrals of the acceleration.
+        pace: the same steps this many times as fast.
+    """
+    series = _WalkSeries.read()
+    series = replace(series, period_s=series.period_s / pace, speed_m_s=series.speed_m_s * pace)
+    skeleton = subject.skeleton.with_markers([m for m in subject.skeleton.markers if m.label not in STATIC_ONLY])
+    duration_s = series.period_s if duration_s is None else duration_s
+    time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
+    motion = series.motion(skeleton.coordinates, time + start * series.period_s)
+    periodic = motion.q[:, :6]
+    if trapezoid:
+        motion = motion.with_root(*Integration(time).track(motion.qdd[:, :6], periodic), motion.qdd[:, :6])
+    deviation = np.abs(motion.q[:, :6] - periodic).max(axis=0)
+    at_pelvis = residual(skeleton, subject.bsp, motion, np.zeros((len(time), 6)))
+    force = at_pelvis[:, :3]
+    wrench = np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])
+    loads = _on_feet(skeleton, motion, wrench, *series.support(time + start * series.period_s))
+    return SyntheticTrial(skeleton, subject.bsp, time, motion, loads, deviation)
+
+
+def consistent_trial(
+    skeleton: Skeleton, bsp: BodySegmentParameters, time: np.ndarray, motion: Motion, foot_loads: np.ndarray
+) -> SyntheticTrial:
+    """The trial of a measured window with the pelvis modified until P = 0 at every frame.
+
+    Equation (2) gives the pelvis acceleration at the current pelvis motion; it is integrated twice by the trapezoid
+    rule, tracking the measured pelvis; and again, until nothing changes (Picard iteration; some 15 rounds for one
+    stride).
+
+    Raises:
+        KinertiaError: the iteration does not settle; the window is longer than about two strides, or the BSPs are far
+            off.
+    """
+    wrench = foot_loads.sum(axis=1)
+    start, integration, current = motion.q[:, :6], Integration(time), motion
+    for _ in range(_MAX_ITERATIONS):
+        acceleration, _ = consistent_root_acceleration(skeleton, bsp, current, wrench)
+        position, velocity = integration.track(acceleration, start)
+        current = motion.with_root(position, velocity, acceleration)
+        left = np.abs(residual(skeleton, bsp, current, wrench)).max()
+        if left < _RESIDUAL_TOLERANCE:
+            deviation = np.abs(position - start).max(axis=0)
+            return SyntheticTrial(skeleton, bsp, time, current, foot_loads, deviation)
+        if not np.isfinite(left) or left > 1e6:
+            break
+    raise KinertiaError(
+        f"no pelvis motion near the measured one balances the ground reactions over {time[-1] - time[0]:.2f} s "
+        f"(a residual of {left:.2g} N remains); use a window of about one stride (window_s)"
+    )
+
+
+@dataclass(frozen=True)
+class _WalkSeries:
+    """Fourier series of every coordinate over one stride (`data/walk.csv`)."""
+
+    table: pd.DataFrame
+    period_s: float
+    speed_m_s: float
+    contacts: tuple[tuple[float, float], tuple[float, float]]
+
+    @classmethod
+    def read(cls) -> _WalkSeries:
+        text = (resources.files("kinertia.synthetic") / "data" / "walk.csv").read_text(encoding="utf-8")
+        entries = dict(line[1:].split(" = ") for line in text.splitlines() if line.startswith("#") and " = " in line)
+        told = {key.strip(): [float(part) for part in value.split(",")] for key, value in entries.items()}
+        contacts = tuple((told[f"contact_{side}"][0], told[f"contact_{side}"][1]) for side in "rl")
+        return cls(
+            _data("walk.csv").set_index("coordinate"),
+            told["period_s"][0],
+            told["speed_m_s"][0],
+            (contacts[0], contacts[1]),
+        )
+
+    def motion(self, coordinates: tuple[str, ...], time: np.ndarray) -> Motion:
+        """Coordinates and their derivatives at these times."""
+        values = self.table.loc[list(coordinates)].to_numpy(float)
+        mean, cosine, sine = values[:, 0], values[:, 1::2], values[:, 2::2]
+        rate = 2 * np.pi / self.period_s * np.arange(1, cosine.shape[1] + 1)
+        phase = np.outer(time, rate)
+        c, s = np.cos(phase), np.sin(phase)
+        q = mean + c @ cosine.T + s @ sine.T
+        qd = (-s * rate) @ cosine.T + (c * rate) @ sine.T
+        qdd = -(c * rate**2) @ cosine.T - (s * rate**2) @ sine.T
+        forward = coordinates.index("pelvis_tx")
+        q[:, forward] += self.speed_m_s * time
+        qd[:, forward] += self.speed_m_s
+        return Motion(q, qd, qdd)
+
+    def support(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Per frame: index of the foot that stands alone, or trails in double support (0 right, 1 left), and the
+        progress (0 to 1) through the double support; 0 in single support.
+        """
+        phase = (time / self.period_s) % 1.0
+        (start_r, end_r), (start_l, end_l) = self.contacts
+        right, left = _between(phase, start_r, end_r), _between(phase, start_l, end_l)
+        right_trails = right & (~left | _between(phase, start_l, end_r))
+        begin = np.where(right_trails, start_l, start_r)
+        span = np.where(right_trails, (end_r - start_l) % 1.0, (end_l - start_r) % 1.0)
+        progress = np.where(right & left, ((phase - begin) % 1.0) / span, 0.0)
+        return np.where(right_trails, 0, 1), progress
+
+
+def _between(phase: np.ndarray, start: float, end: float) -> np.ndarray:
+    return (phase - start) % 1.0 <= (end - start) % 1.0
+
+
+def _on_feet(
+    skeleton: Skeleton, motion: Motion, wrench: np.ndarray, behind: np.ndarray, progress: np.ndarray
+) -> np.ndarray:
+    """Share a wrench (n, 6) out to the feet (n, 2, 6): `behind` has it all but what the other takes over.
+
+    The shares of force follow from the lever between the trailing forefoot and the leading heel, handed over
+    smoothly. As the load passes on, the leading foot's first share acts at its heel and the trailing foot's last at
+    its forefoot, so that both centres of pressure stay under the feet. Only the sum is exact.
+    """
+    force = wrench[:, :3]
+    toe, heel = _foot_points(skeleton, motion, "metatarsal"), _foot_points(skeleton, motion, "heel")
+    rows = np.arange(len(wrench))
+    tip, strike = toe[rows, behind], heel[rows, 1 - behind]
+    along = strike - tip
+    lever = np.einsum("ni,ni->n", strike - centre_of_pressure(wrench), along) / np.einsum("ni,ni->n", along, along)
+    early = np.where(progress < 0.5, 1.0, 0.0)
+    handover = _smooth_step(np.minimum(progress, 1.0 - progress) / _HANDOVER)
+    share = (early + handover * (np.clip(lever, 0.0, 1.0) - early))[:, None]
+    at_heel = wrench[:, 3:] - np.cross(strike, (1.0 - share) * force)
+    at_forefoot = np.cross(tip, share * force)
+    blend = _smooth_step(progress)[:, None]
+    trailing = np.hstack([share * force, (1.0 - blend) * at_heel + blend * at_forefoot])
+    loads = np.empty((len(wrench), 2, 6))
+    loads[rows, behind] = trailing
+    loads[rows, 1 - behind] = wrench - trailing
+    return loads
+
+
+def _smooth_step(x: np.ndarray) -> np.ndarray:
+    x = np.clip(x, 0.0, 1.0)
+    return x**2 * (3.0 - 2.0 * x)
+
+
+def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
+    """(..., 3) m, where on the ground (y = 0) a wrench (..., 6) acts with no moment but a vertical one."""
+    upward = np.where(wrench[..., 1] == 0.0, np.inf, wrench[..., 1])
+    return np.stack([wrench[..., 5] / upward, np.zeros_like(upward), -wrench[..., 3] / upward], axis=-1)
+
+
+def _foot_points(skeleton: Skeleton, motion: Motion, landmark: str) -> np.ndarray:
+    """(n, 2, 3) m, a landmark of the right and left foot, projected to the ground."""
+    marker_set = read_marker_set("cleveland-clinic")
+    positions = skeleton.marker_positions(skeleton.pose(motion.q))
+    points = [
+        positions[:, [skeleton.labels.index(label) for label in marker_set.landmarks[f"{landmark}_{side}"]]].mean(
+            axis=1
+        )
+        for side in "rl"
+    ]
+    return np.stack(points, axis=1) * np.array([1.0, 0.0, 1.0])
+
+
+def _data(name: str) -> pd.DataFrame:
+    with (resources.files("kinertia.synthetic") / "data" / name).open(encoding="utf-8") as file:
+        return pd.read_csv(file, comment="#")

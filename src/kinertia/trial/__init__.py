@@ -1,0 +1,1 @@
+"""What was measured: markers and loads, which foot is on which plate, and when."""

@@ -1,0 +1,273 @@
+"""What the files of one trial hold, and what the estimators take from it.
+
+`Recording` is what was read: markers, force plates and the subject's measurements, before anything is known
+about feet or models. `Trial` is what the estimators work on: the same markers, the loads sorted by foot, and
+for every marker frame whether all ground contact was measured. `kinertia.trial.plate_assignment` makes the second from
+the first.
+
+Everything is in SI units and in the ground frame: X forward, Y up, Z right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+
+import numpy as np
+import numpy.typing as npt
+
+from kinertia.errors import MarkerSetError
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+FEET = ("r", "l")
+"""Order of the foot axis of `FootLoads`: index 0 is the right foot, index 1 the left."""
+
+LOAD_THRESHOLD_N = 20.0
+"""A plate that carries less than this vertical force counts as unloaded.
+
+Below it the centre of pressure is a quotient of two noises (346 m off the origin in one published trial), so
+the readers set force and moment of such samples to zero.
+"""
+
+_TIME_TOLERANCE_S = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Markers:
+    """Marker trajectories.
+
+    Attributes:
+        time: (n,) s, uniform.
+        labels: the m marker names, each once.
+        positions: (n, m, 3) m in ground axes; NaN where a marker was not seen.
+    """
+
+    time: FloatArray
+    labels: tuple[str, ...]
+    positions: FloatArray
+
+    def __post_init__(self) -> None:
+        _expect_shape("positions", self.positions, (len(self.time), len(self.labels), 3))
+        if len(set(self.labels)) != len(self.labels):
+            raise ValueError("marker labels must differ from each other")
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames per second; NaN for a single frame."""
+        if len(self.time) < 2:
+            return float("nan")
+        return round(float((len(self.time) - 1) / (self.time[-1] - self.time[0])), 9)
+
+    def cut(self, start_s: float, end_s: float) -> Markers:
+        """The frames with start_s <= time <= end_s."""
+        keep = (self.time >= start_s - _TIME_TOLERANCE_S) & (self.time <= end_s + _TIME_TOLERANCE_S)
+        return Markers(self.time[keep], self.labels, self.positions[keep])
+
+    def select(self, labels: Sequence[str]) -> Markers:
+        """These markers only, in this order.
+
+        Raises:
+            MarkerSetError: a label is not among the markers; names the ones that look most like it.
+        """
+        missing = [label for label in labels if label not in self.labels]
+        if missing:
+            nearest = {label: get_close_matches(label, self.labels, n=3) for label in missing}
+            hints = "; ".join(f"'{label}' (nearest: {', '.join(near) or 'none'})" for label, near in nearest.items())
+            raise MarkerSetError(
+                f"the trial has no marker {hints}; give labels that are among its {len(self.labels)} markers",
+                missing,
+                nearest,
+            )
+        columns = [self.labels.index(label) for label in labels]
+        return Markers(self.time, tuple(labels), self.positions[:, columns])
+
+    def arranged(self, labels: Sequence[str]) -> FloatArray:
+        """Positions (n, len(labels), 3) m in this order; NaN for a label that the trial does not have."""
+        positions = np.full((len(self.time), len(labels), 3), np.nan)
+        for column, label in enumerate(labels):
+            if label in self.labels:
+                positions[:, column] = self.positions[:, self.labels.index(label)]
+        return positions
+
+    def rotated(self, rotation: FloatArray) -> Markers:
+        """The same markers in axes turned by `rotation` (3, 3): new = rotation @ old."""
+        return replace(self, positions=self.positions @ rotation.T)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateLoads:
+    """What p force plates (or column groups of a force file) measured.
+
+    Attributes:
+        time: (k,) s, on the same clock as the markers.
+        names: the p plate names.
+        force: (k, p, 3) N, the force ON THE PERSON, in ground axes.
+        moment: (k, p, 3) N m, its moment about the ground origin, in ground axes.
+        declared_feet: for each plate "r" or "l" where file or column names say so, else None. Only a claim:
+            the loads file may be wrong, `kinertia.trial.plate_assignment` decides by the data.
+        corners: (p, 4, 3) m, or None where the file does not tell.
+    """
+
+    time: FloatArray
+    names: tuple[str, ...]
+    force: FloatArray
+    moment: FloatArray
+    declared_feet: tuple[str | None, ...]
+    corners: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        shape = (len(self.time), len(self.names), 3)
+        _expect_shape("force", self.force, shape)
+        _expect_shape("moment", self.moment, shape)
+        if len(self.declared_feet) != len(self.names):
+            raise ValueError(f"{len(self.names)} plates but {len(self.declared_feet)} declared feet")
+        if self.corners is not None:
+            _expect_shape("corners", self.corners, (len(self.names), 4, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What the files of one trial hold. Knows nothing of models or marker sets.
+
+    Attributes:
+        name: the trial's name, from the marker file.
+        markers: the marker trajectories.
+        plates: the force plates, or None where no forces were recorded (statics need none).
+        mass_kg: body mass if the file tells, else None.
+        height_m: body height if the file tells, else None.
+        measurements: further lengths of the subject in m, by the file's own keys (`LKneeWidth`).
+        notes: one sentence for each assumption made while reading.
+        length_unit: of the marker file ("mm"); everything here is in m.
+        vertical: the marker file's axis that points up ("+Z"); here it is +Y.
+    """
+
+    name: str
+    markers: Markers
+    plates: PlateLoads | None = None
+    mass_kg: float | None = None
+    height_m: float | None = None
+    measurements: dict[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    length_unit: str = "m"
+    vertical: str = "+Y"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: frames, markers and their gaps, force plates, notes."""
+        from kinertia.report.notebook import recording_html
+
+        return recording_html(self)
+
+
+@dataclass(frozen=True, eq=False)
+class FootLoads:
+    """What the ground does to each foot.
+
+    Attributes:
+        time: (k,) s, on the same clock as the markers.
+        force: (k, 2, 3) N on the person in ground axes; index 0 right foot, 1 left foot.
+        moment: (k, 2, 3) N m about the ground origin, in ground axes.
+        plates: names of the plates.
+        on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
+            where each foot has a plate of its own.
+    """
+
+    time: FloatArray
+    force: FloatArray
+    moment: FloatArray
+    plates: tuple[str, ...] = ("right foot", "left foot")
+    on_plate: npt.NDArray[np.int_] | None = None
+
+    def __post_init__(self) -> None:
+        shape = (len(self.time), 2, 3)
+        _expect_shape("force", self.force, shape)
+        _expect_shape("moment", self.moment, shape)
+        if self.on_plate is not None:
+            _expect_shape("on_plate", self.on_plate, shape[:2])
+
+    @property
+    def carrier(self) -> npt.NDArray[np.int_]:
+        """(k, 2) index of the plate that each foot stands on."""
+        return np.tile([0, 1], (len(self.time), 1)) if self.on_plate is None else self.on_plate
+
+    @property
+    def wrench(self) -> FloatArray:
+        """(k, 2, 6) force and moment."""
+        return np.concatenate([self.force, self.moment], axis=-1)
+
+    def rotated(self, rotation: FloatArray) -> FootLoads:
+        """The same loads in axes turned by `rotation` (3, 3): new = rotation @ old."""
+        return replace(self, force=self.force @ rotation.T, moment=self.moment @ rotation.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What the estimators take.
+
+    Attributes:
+        name: the trial's name.
+        markers: the marker trajectories, n frames.
+        loads: the loads of the two feet, in their own (usually faster) time base.
+        measured: (n,) True where every foot on the ground stood on a loaded plate.
+        notes: one sentence for each assumption made on the way here.
+    """
+
+    name: str
+    markers: Markers
+    loads: FootLoads
+    measured: BoolArray
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        _expect_shape("measured", self.measured, (len(self.markers.time),))
+
+    def windows(self) -> list[tuple[float, float]]:
+        """First and last time (s) of every contiguous run of measured frames, longest run first."""
+        return windows(self.markers.time, self.measured)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: frames, markers and their gaps, measured windows, notes."""
+        # only when somebody looks: trials know nothing of reports
+        from kinertia.report.notebook import trial_html
+
+        return trial_html(self)
+
+    def rotated(self, rotation: FloatArray) -> Trial:
+        """The same trial in axes turned about the vertical: new = rotation @ old, for markers and loads
+        alike.
+
+        Raises:
+            ValueError: `rotation` is not a rotation about the vertical (Y) axis.
+        """
+        proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) and np.linalg.det(rotation) > 0
+        if not (proper and np.allclose(rotation[1], [0, 1, 0], atol=1e-9)):
+            raise ValueError(f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}")
+        return replace(self, markers=self.markers.rotated(rotation), loads=self.loads.rotated(rotation))
+
+
+def nearest_samples(time: FloatArray, at: FloatArray) -> npt.NDArray[np.int_]:
+    """Indices into `time` (ascending) of the samples nearest to the times `at`."""
+    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+    return after - (at - time[after - 1] < time[after] - at)
+
+
+def runs(mask: BoolArray) -> list[tuple[int, int]]:
+    """First and last index of every contiguous run of True, in order."""
+    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
+    return [
+        (int(start), int(end) - 1)
+        for start, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    ]
+
+
+def windows(time: FloatArray, mask: BoolArray) -> list[tuple[float, float]]:
+    """First and last time (s) of every contiguous run of True in `mask` (n,), longest run first."""
+    spans = [(float(time[first]), float(time[last])) for first, last in runs(mask)]
+    return sorted(spans, key=lambda span: span[0] - span[1])
+
+
+def _expect_shape(name: str, array: npt.NDArray[np.generic], shape: tuple[int, ...]) -> None:
+    if np.shape(array) != shape:
+        raise ValueError(f"{name} must have shape {shape}, got {np.shape(array)}")

@@ -1,0 +1,38 @@
+"""Heel strikes and toe offs, from the loads under the feet."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Trial, runs
+from kinertia.trial.ground_contact import bridged
+from kinertia.trial.plate_assignment import BRIDGED_GAP_S, SHORTEST_CONTACT_S
+
+
+class GaitEvent(NamedTuple):
+    """A foot meets the ground ("heel strike") or leaves it ("toe off") at a time (s)."""
+
+    time_s: float
+    side: str
+    kind: Literal["heel strike", "toe off"]
+
+
+def gait_events(trial: Trial) -> list[GaitEvent]:
+    """All events between measured frames, in order: elsewhere a load also begins and ends with the plate."""
+    loads, found = trial.loads, []
+    frames = trial.markers.time
+    for foot, side in enumerate(FEET):
+        loaded = bridged(loads.time, loads.force[:, foot, 1] > LOAD_THRESHOLD_N)
+        for first, last in runs(loaded):
+            if loads.time[last] - loads.time[first] < SHORTEST_CONTACT_S:
+                continue
+            if first > 0:
+                found.append(GaitEvent(float(loads.time[first]), side, "heel strike"))
+            if last < len(loads.time) - 1:
+                found.append(GaitEvent(float(loads.time[last]), side, "toe off"))
+    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S for event in found]
+    return sorted(
+        event for event, around in zip(found, near, strict=True) if around.any() and trial.measured[around].all()
+    )

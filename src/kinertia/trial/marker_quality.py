@@ -1,0 +1,121 @@
+"""What can be said of markers before any model: gaps, which way is up, which way the person goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
+
+STANDING_RANGE_M = 0.03
+"""In a standing trial the median marker stays within this (5th to 95th percentile)."""
+_LEAST_WALK_M = 0.5
+"""Less way than this is movement on the spot."""
+_UPRIGHT_SHARE = 0.7
+_PLAUSIBLE_EXTENT_M = (0.3, 2.8)
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """How much of a trial one marker is seen in.
+
+    Attributes:
+        label: the marker's name.
+        share: of the frames, 0 to 1.
+        longest_gap_s: longest run of frames without it; those at the ends of the trial count.
+    """
+
+    label: str
+    share: float
+    longest_gap_s: float
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Where the person goes, in ground axes.
+
+    Attributes:
+        kind: "stands still", "moves on the spot" or "walks".
+        distance_m: covered while markers are seen.
+        speed_m_s: mean, 0 unless walking.
+        direction_deg: about the vertical from +X towards -Z, so that 90 is along -Z; NaN unless walking.
+    """
+
+    kind: str
+    distance_m: float
+    speed_m_s: float
+    direction_deg: float
+
+    def sentence(self) -> str:
+        """In words: "walks along +X (12 degrees off), 2.1 m at 1.30 m/s"."""
+        if self.kind != "walks":
+            return self.kind
+        quarter = round(self.direction_deg / 90)
+        off = abs(self.direction_deg - 90 * quarter)
+        axis = ("+X", "-Z", "-X", "+Z")[quarter % 4]
+        aside = f" ({off:.0f} degrees off)" if off >= 1 else ""
+        return f"walks along {axis}{aside}, {self.distance_m:.2f} m at {self.speed_m_s:.2f} m/s"
+
+
+def visibility(markers: Markers) -> tuple[Visibility, ...]:
+    """Of every marker, in the file's order."""
+    seen = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    frame_s = 0.0 if len(markers.time) < 2 else 1.0 / markers.rate_hz
+    return tuple(
+        Visibility(label, float(shown.mean()), frame_s * _longest(~shown))
+        for label, shown in zip(markers.labels, seen.T, strict=True)
+    )
+
+
+def _longest(missing: BoolArray) -> int:
+    return max((last - first + 1 for first, last in runs(missing)), default=0)
+
+
+def travel(markers: Markers) -> Travel:
+    """What the person does: by how far the median marker comes from where it is first seen to where it is last."""
+    shown = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    spans = [(k, np.flatnonzero(on)) for k, on in enumerate(shown.T) if on.any()]
+    moved = [
+        np.linalg.norm(np.ptp(np.percentile(markers.positions[frames, k], (5, 95), axis=0), axis=0))
+        for k, frames in spans
+    ]
+    if not moved or float(np.median(moved)) < STANDING_RANGE_M:
+        return Travel("stands still", 0.0, 0.0, np.nan)
+    took = np.array([np.ptp(markers.time[frames]) for _, frames in spans])
+    way = np.array([markers.positions[frames[-1], k] - markers.positions[frames[0], k] for k, frames in spans])
+    long = took >= 0.5 * took.max()
+    velocity = np.median(way[long] / took[long, None], axis=0)
+    speed = float(np.hypot(velocity[0], velocity[2]))
+    distance = float(speed * np.ptp(markers.time[shown.any(axis=1)]))
+    if distance < _LEAST_WALK_M:
+        return Travel("moves on the spot", distance, 0.0, np.nan)
+    return Travel("walks", distance, speed, float(np.degrees(np.arctan2(-velocity[2], velocity[0]))))
+
+
+def extent_m(markers: Markers) -> FloatArray:
+    """(3,) m, median over the frames of how far the markers of one frame reach along x, y, z; NaN where unknown."""
+    shown = markers.positions[np.isfinite(markers.positions).all(axis=2).sum(axis=1) >= 2]
+    if not len(shown):
+        return np.full(3, np.nan)
+    return np.asarray(np.median(np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1), axis=0))
+
+
+def axes_trouble(extent: FloatArray) -> str:
+    """Why the vertical or the unit must be wrong, by the extent of a person's markers (m); empty if plausible."""
+    if np.isnan(extent).any():
+        return ""
+    low, high = _PLAUSIBLE_EXTENT_M
+    largest = float(extent.max())
+    if not low <= largest <= high:
+        return (
+            f"the markers of one frame reach {largest:.3g} m, which no person does; the file's unit of length must be "
+            f"wrong, correct it"
+        )
+    if extent[1] < _UPRIGHT_SHARE * largest:
+        axis = "XYZ"[int(np.argmax(extent))]
+        return (
+            f"the markers reach {largest:.2f} m along {axis} and {extent[1]:.2f} m along Y, which should be up; turn "
+            f"the file's axes to Y up before export"
+        )
+    return ""

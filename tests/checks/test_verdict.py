@@ -1,0 +1,133 @@
+"""Verdicts on a fit, with residuals and segments set to what the guideline names."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.checks.verdict import stands_against, verdicts
+from kinertia.model.bsp import BodySegmentParameters
+
+FRAMES = 50
+BODY = BodySegmentParameters(
+    ("pelvis", "thigh_r"), [10.0, 8.0], [[0, 0, 0], [0, -0.2, 0]], [np.eye(3) * 0.1, np.diag([0.15, 0.04, 0.15])]
+)
+
+
+def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes):
+    """A fit whose residual has this length throughout; a pair is RMS-filling base and one frame's peak."""
+    residual = np.zeros((FRAMES, 6))
+    for column, told in ((0, force_n), (4, moment_nm)):
+        base, peak = told if isinstance(told, tuple) else (told, told)
+        residual[:, column] = base
+        residual[7, column] = -peak
+    loads = np.zeros((FRAMES, 2, 6))
+    loads[:, :, 1] = external_n / 2
+    trial = SimpleNamespace(
+        name="walk",
+        residuals={"estimate": residual},
+        kinematics=SimpleNamespace(foot_loads=loads),
+        marker_errors_m={"final": np.full((FRAMES, 3), markers_m)},
+    )
+    given = {
+        "converged": True,
+        "estimate": BODY,
+        "literature": BODY,
+        "posterior": None,
+        "trials": (trial,),
+        "file": None,
+    }
+    return SimpleNamespace(**{**given, **changes})
+
+
+def level(found, start):
+    (verdict,) = [one for one in found if one.sentence.startswith(start)]
+    return verdict.level
+
+
+def test_a_good_fit_has_nothing_against_it():
+    found = verdicts(fit(4.0, 20.0))
+    assert {one.level for one in found} == {"good"}
+    assert not stands_against(found)
+
+
+@pytest.mark.parametrize(
+    ("force", "expected"),
+    [(5.0, "good"), (5.1, "okay"), (10.0, "okay"), (10.1, "against"), ((3.0, 9.9), "good"), ((3.0, 10.1), "okay"),
+     ((3.0, 25.0), "okay"), ((3.0, 25.1), "against")],
+)  # fmt: skip
+def test_force_by_the_guideline(force, expected):
+    found = verdicts(fit(force))
+    assert level(found, "walk: residual force") == expected
+    assert stands_against(found) == (expected == "against")
+
+
+@pytest.mark.parametrize(("markers_m", "expected"), [(0.012, "good"), (0.013, "okay"), (0.021, "against")])
+def test_markers_by_the_guideline(markers_m, expected):
+    start = "walk: model and measured markers"
+    assert level(verdicts(fit(markers_m=markers_m)), start) == expected
+    of_model = verdicts(fit(markers_m=markers_m, file=object()))
+    (told,) = [one.sentence for one in of_model if one.sentence.startswith(start)]
+    assert ("--calibrate" in told) == (expected == "against")
+
+
+@pytest.mark.parametrize(
+    ("moment", "expected"),
+    [
+        (30.0, "good"),
+        (30.1, "okay"),
+        (50.0, "okay"),
+        (50.1, "against"),
+        ((9.0, 50.1), "okay"),
+        ((9.0, 75.1), "against"),
+    ],
+)
+def test_moment_by_the_guideline(moment, expected):
+    assert level(verdicts(fit(0.0, moment)), "walk: residual moment") == expected
+
+
+def test_five_percent_of_the_external_force():
+    """A child of 20 kg: 12 N are okay by OpenSim's newtons, and too much for 200 N."""
+    found = verdicts(fit((3.0, 12.0), external_n=200.0))
+    assert level(found, "walk: residual force") == "okay"
+    assert level(found, "walk: the peak residual force is 6.0 % of") == "against"
+
+
+def test_not_converged():
+    found = verdicts(fit(converged=False))
+    assert level(found, "the estimate did not converge") == "against"
+
+
+def test_impossible_segments_are_named_and_bodies_without_mass_are_not():
+    table = BODY.table()
+    table[1, 4:7] = 0.1, 0.5, 0.1
+    wrong = BodySegmentParameters.from_table((*BODY.segments, "patella_r"), np.vstack([table, np.zeros(10)]))
+    found = verdicts(fit(estimate=wrong, literature=wrong))
+    assert level(found, "physically impossible segments: 1 of 3 (thigh_r)") == "against"
+
+
+def test_a_body_without_thickness_is_let_pass():
+    """The toes of OpenSim's gait2354: 0.0001 + 0.0001 = 0.0002, but not in binary."""
+    toes = np.array([[0.2166, 0.0346, 0.006, -0.0175, 0.0001, 0.0002, 0.0001, 0, 0, 0]])
+    flat = BodySegmentParameters.from_table((*BODY.segments, "toes_r"), np.vstack([BODY.table(), toes]))
+    assert not flat.physically_consistent().all()
+    assert not stands_against(verdicts(fit(estimate=flat, literature=flat)))
+
+
+def test_centre_of_mass_far_from_the_literature():
+    moved = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.12]]) * [0, 1, 0])
+    found = verdicts(fit(estimate=moved))
+    assert level(found, "centres of mass more than 100 mm from the literature: 1 (farthest, thigh_r: 120") == "against"
+    near = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.09]]) * [0, 1, 0])
+    assert not stands_against(verdicts(fit(estimate=near)))
+
+
+@pytest.mark.parametrize(("away", "expected"), [(2.9, "good"), (-3.1, "against")])
+def test_parameters_by_prior_deviations(away, expected):
+    sd = np.full((2, 10), 0.01)
+    estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + np.eye(2, 10) * away * 0.01)
+    found = verdicts(fit(estimate=estimate, posterior=SimpleNamespace(prior_sd=sd)))
+    (told,) = [one for one in found if "prior deviations" in one.sentence]
+    assert told.level == expected
+    assert "mass of pelvis" in told.sentence or "com_x of thigh_r" in told.sentence

@@ -1,0 +1,291 @@
+"""`kinertia check` as a user runs it."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from command_line import run
+from kinertia.io.trc import write_trc
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
+from kinertia.synthetic.walk import walk, walking_subject
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    subject = walking_subject()
+    trial = walk(subject, 2.7, 1000.0, 0.75)
+    return record(subject, trial, LabNoise(skin="none"), np.random.default_rng(3), 10)
+
+
+@pytest.fixture
+def lab(tmp_path, recordings):
+    """A folder with subject.toml, static.trc, walk.trc, walk_grf.mot of a synthetic person."""
+    write_lab(tmp_path / "lab", recordings)
+    return tmp_path / "lab"
+
+
+def text(outcome):
+    return " ".join(outcome.out.split())
+
+
+def test_subject_file(lab):
+    outcome = run("check", lab / "subject.toml")
+    assert outcome.status == 0, outcome.out + outcome.err
+    assert "static.trc" in outcome.out
+    assert "walk.trc, walk_grf.mot" in outcome.out
+    assert "walks along +X" in text(outcome)
+    assert "the scale says 72.6 kg" in text(outcome)
+    assert re.search(r"good: every foot on the ground stands on a plate from [\d.]+ to [\d.]+ s", text(outcome))
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    assert outcome.err.splitlines() == ["reading"]
+
+
+def test_files_find_each_other_by_name(lab):
+    outcome = run("check", lab / "static.trc", lab / "walk_grf.mot", lab / "walk.trc", "--mass", 72.6)
+    assert outcome.status == 0
+    assert "walk.trc, walk_grf.mot" in outcome.out
+    assert run("check", lab / "walk.trc", "--mass", 72.6).status == 0  # a look at markers alone is fine
+
+
+def test_forces_of_the_walk_never_go_to_the_static_trial(lab):
+    """Though the names are as like: Rajagopal's files are called so."""
+    static = (lab / "static.trc").rename(lab / "static_walk_1.trc")
+    walked = (lab / "walk.trc").rename(lab / "motion_capture_walk.trc")
+    forces = (lab / "walk_grf.mot").rename(lab / "grf_walk.mot")
+    outcome = run("check", static, walked, forces)
+    assert outcome.status == 0
+    assert "motion_capture_walk.trc, grf_walk.mot" in outcome.out
+    assert "grf_walk.mot" in run("check", static, forces).out  # two files can only go together
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["--mass", "90"], "the scale says 90.0 kg"), (["--markers", "plug-in-gait"], "no marker set fits")],
+)
+def test_a_verdict_against_is_status_1(lab, options, words):
+    outcome = run("check", lab / "walk.trc", lab / "walk_grf.mot", *options)
+    assert outcome.status == 1
+    assert "against: " in outcome.out
+    assert words in text(outcome)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["no.trc"], "no.trc: no such file"),
+        (["walk_grf.mot"], "holds forces only"),
+        (["walk.trc", "static.trc", "walk_grf.mot", "more_grf.mot"], "goes with none of the marker files"),
+        (["walk.trc", "--mass", "-5"], "mass_kg = -5"),
+        (["walk.trc", "--mass", "0"], "mass_kg = 0"),
+        (["walk.csv"], "a '.csv' file cannot be checked"),
+        (["loads.xml"], "give ExternalLoads with --loads"),
+        (["subject.toml", "walk.trc"], "give it alone"),
+        (["subject.toml", "--mass", "70"], "give it alone"),
+        (["subject.toml", "--sex", "male"], "give it alone"),
+        (["."], "is a folder"),
+        (["walk.trc", "static.trc", "--loads", "loads.xml"], "but 2 are given"),
+        (["model.osim", "--loads", "loads.xml"], "but 0 are given"),
+        (["walk.trc", "--markers", "nobodys"], "no such marker set"),
+        (["model.osim"], "model.osim, line 1: not XML"),
+        (["empty.c3d"], "the file is empty"),
+        (["no.osim"], "no.osim: no such file"),
+        (["walk.trc", "--height", "170"], "that looks like centimetres"),
+    ],
+)
+def test_mistakes_are_one_line_and_status_2(lab, monkeypatch, arguments, words):
+    monkeypatch.chdir(lab)
+    (lab / "loads.xml").write_text("<x/>")
+    (lab / "model.osim").write_text("not a model")
+    (lab / "empty.c3d").write_bytes(b"")
+    outcome = run("check", *arguments)
+    assert outcome.status == 2
+    assert words in outcome.err
+    assert [line for line in outcome.err.splitlines() if line != "reading"] == [outcome.err.splitlines()[-1]]
+
+
+def test_a_broken_file_does_not_hide_the_others(lab):
+    (lab / "broken.c3d").write_bytes(b"x" * 600)
+    outcome = run("check", lab / "broken.c3d", lab / "static.trc", "-o", lab / "out")
+    assert outcome.status == 2
+    assert "a static trial" in text(outcome)
+    assert "error: " in outcome.err
+    page = (lab / "out" / "check.html").read_text()
+    assert "not a C3D file" in page
+    assert "a static trial" in page
+
+
+def test_gaps_are_listed_and_all_markers_when_asked(lab, recordings):
+    markers = recordings.walk.markers
+    positions = markers.positions.copy()
+    positions[:20, markers.labels.index("R.Heel")] = np.nan
+    write_trc(lab / "walk.trc", type(markers)(markers.time, markers.labels, positions))
+    outcome = run("check", lab / "walk.trc", lab / "walk_grf.mot")
+    assert re.search(r"R\.Heel +\d+ +0\.20", outcome.out)
+    assert not re.search(r"L\.Heel +100", outcome.out)
+    assert re.search(r"L\.Heel +100 +0\.00", run("check", lab / "walk.trc", lab / "walk_grf.mot", "--verbose").out)
+
+
+def test_quiet_says_it_by_the_status(lab):
+    fine = run("check", lab / "walk.trc", lab / "walk_grf.mot", "--quiet")
+    assert (fine.status, fine.out, fine.err) == (0, "", "")
+    against = run("check", lab / "walk.trc", lab / "walk_grf.mot", "--mass", "90", "-q")
+    assert (against.status, against.out, against.err) == (1, "", "")
+    mistake = run("check", lab / "no.trc", "-q")
+    assert mistake.status == 2
+    assert mistake.err.startswith("error: ")
+    assert run("check", lab / "walk.trc").out  # the next command speaks again
+
+
+class Page(HTMLParser):
+    """What a page refers to, and its text."""
+
+    def __init__(self, content):
+        super().__init__()
+        self.tags, self.references, self.words = [], [], []
+        self.feed(content)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.references += [value for name, value in attrs if name in ("src", "href", "srcset", "data")]
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def test_page_is_one_file_that_needs_nothing_else(lab):
+    shutil.move(lab / "walk.trc", lab / "<script>alert(1)</script>.trc".replace("/", ""))
+    (spoilt,) = lab.glob("<script>*")
+    outcome = run("check", spoilt, lab / "walk_grf.mot", "-o", lab / "out", "--mass", 72.6)
+    assert outcome.status == 0
+    (written,) = (lab / "out").iterdir()
+    assert written.stat().st_size < 200_000
+    page = Page(written.read_text())
+    assert page.references == []
+    assert "script" not in page.tags
+    assert "url(" not in written.read_text()
+    words = " ".join(" ".join(page.words).split())
+    assert "<script>alert(1)<script>.trc" in words
+    for told in ("the scale says 72.6 kg", "walks along +X", "R.Heel", "who stood on it", "2 plates at 1000 Hz"):
+        assert told in words
+
+
+def test_page_goes_only_where_it_may(lab):
+    (lab / "foreign").mkdir()
+    (lab / "foreign" / "thesis.tex").write_text("mine")
+    refused = run("check", lab / "static.trc", "-o", lab / "foreign")
+    assert refused.status == 2
+    assert "--force" in refused.err
+    assert [path.name for path in (lab / "foreign").iterdir()] == ["thesis.tex"]
+    assert run("check", lab / "static.trc", "-o", lab / "foreign", "--force").status == 0
+    assert (lab / "foreign" / "thesis.tex").read_text() == "mine"
+    (lab / "foreign" / "thesis.tex").unlink()
+    assert run("check", lab / "static.trc", "-o", lab / "foreign").status == 0  # its own is replaced
+
+
+def test_files_of_two_people_keep_their_masses(shared_data):
+    """The walk of A carries no mass, the others do: with A's static alone it is A's, with B's files it is nobody's."""
+    a, b = ([shared_data / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
+    alone, both = text(run("check", *a)), text(run("check", *a, *b))
+    assert alone.count("the scale says 41.5 kg") == 2
+    assert (both.count("the scale says 41.5 kg"), both.count("the scale says 47.5 kg")) == (1, 2)
+
+
+def test_model(shared_data, tmp_path):
+    model = shared_data / "rajagopal_walk" / "scaled.osim"
+    person = ["--mass", "85", "--height", "1.83", "--sex", "male"]
+    outcome = run("check", model, *person, "-o", tmp_path / "out")
+    assert outcome.status == 0
+    assert "the torso seems to carry the arms' inertia" in text(outcome)
+    assert re.search(r"pelvis +model +13\.30", outcome.out)
+    assert re.search(r"de Leva +9\.49", outcome.out)
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    page = " ".join(Page((tmp_path / "out" / "check.html").read_text()).words)
+    assert "Segments, in ISB axes" in page
+    assert "13.30" in page
+    assert run("check", model, "--height", "183", "--sex", "male").status == 2
+    assert "needs --height and --sex" in text(run("check", model))
+
+
+def test_impossible_model_is_status_1(shared_data, tmp_path):
+    content = (shared_data / "rajagopal_walk" / "scaled.osim").read_text()
+    broken, count = re.subn(
+        r'(<Body name="tibia_l">.*?<inertia>)[^<]*', r"\g<1>0.9 0.0076 0.076 0 0 0", content, count=1, flags=re.DOTALL
+    )
+    assert count == 1
+    (tmp_path / "broken.osim").write_text(broken)
+    outcome = run("check", tmp_path / "broken.osim")
+    assert outcome.status == 1
+    assert "against: physically impossible: tibia_l: triangle inequality iyy + izz > ixx violated" in text(outcome)
+
+
+def test_every_measured_file_gets_an_answer(shared_data):
+    """No traceback on anything: each file is shown (0), warned of (1) or refused in one line (2)."""
+    files = sorted(path for kind in ("trc", "c3d", "osim") for path in shared_data.rglob(f"*.{kind}"))
+    assert len(files) > 20
+    seen = set()
+    for path in files:
+        outcome = run("check", path)
+        seen.add(outcome.status)
+        assert outcome.status in (0, 1, 2), path
+        if outcome.status == 2:
+            assert outcome.err.splitlines()[-1].startswith(f"error: {path}: ")
+        else:
+            assert ("against: " in outcome.out) == (outcome.status == 1)
+    assert seen == {0, 1, 2}
+
+
+def test_subject_file_with_a_model(shared_data, tmp_path):
+    """The markers are the model's: as for `kinertia fit`, no preset is asked for."""
+    data = shared_data / "subject4"
+    (tmp_path / "subject.toml").write_text(
+        f'[subject]\nname = "four"\nmass_kg = 60.0\n[model]\nosim = "{data / "addbiomechanics_scaled.osim"}"\n'
+        f'[[trial]]\nmarkers = "{data / "walking1.trc"}"\nforces = "{data / "walking1_grf.mot"}"\n'
+        f'loads = "{data / "walking1_external_forces.xml"}"\n'
+    )
+    told = text(run("check", tmp_path / "subject.toml"))
+    assert re.search(r"marker set addbiomechanics_scaled\.osim: \d+ of its \d+ labels", told)
+    assert "no marker set fits" not in told
+    assert "unknown foot" not in told
+    assert "good: every foot on the ground stands on a plate from" in told
+
+
+def test_model_of_other_markers_in_a_subject_file(lab, shared_data):
+    """None shared is against; none in the model is a mistake, as it is to a fit."""
+    model = shared_data / "subject4" / "addbiomechanics_scaled.osim"
+    body = f'[[trial]]\nmarkers = "{lab / "other.trc"}"\nforces = "{lab / "walk_grf.mot"}"\n'
+    (lab / "s.toml").write_text(f'[subject]\nname = "s"\nmass_kg = 72.6\n[model]\nosim = "{model}"\n{body}')
+    labels = (lab / "walk.trc").read_text().splitlines(keepends=True)
+    head = labels[3].split("\t")
+    labels[3] = "\t".join([*head[:2], *(f"x{name}" if name.strip() else name for name in head[2:])])
+    (lab / "other.trc").write_text("".join(labels))
+    outcome = run("check", lab / "s.toml")
+    assert outcome.status == 1, outcome.err
+    assert "against: no label of the model addbiomechanics_scaled.osim is in the file" in text(outcome)
+    bare, count = re.subn(r"<MarkerSet.*?</MarkerSet>", "", model.read_text(), flags=re.DOTALL)
+    assert count == 1
+    (lab / "bare.osim").write_text(bare)
+    (lab / "s.toml").write_text((lab / "s.toml").read_text().replace(str(model), str(lab / "bare.osim")))
+    outcome = run("check", lab / "s.toml")
+    assert outcome.status == 2
+    assert "no markers in it" in outcome.err
+
+
+@pytest.mark.parametrize(("mass", "status"), [("72.6", 0), ("90", 1)])
+def test_nobody_reads_on(lab, mass, status):
+    """As with `| head`: the page is there, and the status is the check's."""
+    files = [str(lab / name) for name in ("walk.trc", "walk_grf.mot")]
+    command = [sys.executable, "-c", "from kinertia.cli.app import main; main()", "check", *files, "--mass", mass]
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        ended = subprocess.run([*command, "-o", str(lab / "out")], stdout=write, stderr=subprocess.PIPE, text=True)
+    finally:
+        os.close(write)
+    assert (ended.returncode, ended.stderr) == (status, "reading\n")
+    assert "the scale says" in (lab / "out" / "check.html").read_text()

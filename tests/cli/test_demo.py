@@ -1,0 +1,100 @@
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from command_line import run
+from kinertia.cli import demo as demo_module
+from kinertia.cli.study import _two_level_verdict
+from kinertia.estimation.from_files import read_inputs
+from kinertia.estimation.prepare import prepare
+from kinertia.settings import read_subject
+from kinertia.synthetic.walk import unlike_literature, walking_subject
+from quick_two_level import given_back
+
+
+@pytest.fixture
+def quick_estimator(monkeypatch):
+    """The pipeline with an estimator that gives back its start: all but the seconds of iterating."""
+    monkeypatch.setattr("kinertia.estimation.estimate.estimate_two_level", given_back)
+
+
+def check_outcome(outcome, folder):
+    assert outcome.status == 0, outcome.err
+    for words in ("truth", "literature", "estimate", "kinertia init", "kinertia fit"):
+        assert words in outcome.out
+    for stage in ("measuring", "reading", "calibration", "inverse kinematics"):
+        assert stage in outcome.err
+    names = {"static.trc", "walk.trc", "walk_grf.mot", "subject.toml"}
+    assert {path.name for path in (folder / "lab").iterdir()} == names
+    table = pd.read_csv(folder / "bsp_truth.csv")
+    columns = ["segment", "parameter", "unit", "truth", "literature", "estimate", "sd", "two_level"]
+    assert list(table.columns) == columns
+    assert len(table) == 120
+    mass = table[table["parameter"] == "mass"]
+    assert mass["truth"].sum() == pytest.approx(72.6)
+    assert np.abs(mass["truth"] / mass["literature"] - 1).max() > 0.03
+    assert json.loads((folder / "fit.json").read_text())["trials"][0]["n_dynamic_frames"] > 90
+    for results in (folder, folder / "two-level"):
+        assert {"report.html", "bsp.csv", "kinematics.mot", "residuals.sto"} <= {
+            path.name for path in results.iterdir()
+        }
+    off = {name: np.sqrt(np.mean((mass[name] - mass["truth"]) ** 2)) for name in ("literature", "estimate")}
+    assert off["estimate"] < off["literature"]
+
+
+def test_demo_without_the_iterations(tmp_path, quick_estimator):
+    folder = tmp_path / "out"
+    check_outcome(run("demo", "-o", folder), folder)
+
+
+@pytest.mark.slow
+def test_demo_from_end_to_end(tmp_path):
+    folder = tmp_path / "out"
+    check_outcome(run("demo", "-o", folder), folder)
+    residuals = json.loads((folder / "two-level" / "fit.json").read_text())["trials"][0]["residual_force_rms_N"]
+    assert residuals["estimate"] < residuals["corrected"] < residuals["literature"]
+
+
+def test_same_seed_same_files(tmp_path, quick_estimator):
+    folders = [tmp_path / name for name in ("one", "again", "other")]
+    for folder, seed in zip(folders, (1, 1, 2), strict=True):
+        demo_module.run_demo(folder, seed)
+    texts = [(folder / "lab" / "walk.trc").read_text() for folder in folders]
+    assert texts[0] == texts[1] != texts[2]
+
+
+def test_files_hold_nothing_of_the_truth(tmp_path, quick_estimator):
+    """Whoever reads the laboratory's files starts from the literature for the skeleton they give."""
+    result = demo_module.run_demo(tmp_path / "out")
+    wanted = read_subject(result.subject_file)
+    static, inputs, marker_set = read_inputs(wanted)
+    ready = prepare(wanted.subject, static, inputs, wanted.settings, marker_set)
+    np.testing.assert_array_equal(ready.literature.table(), result.fit.literature.table())
+    off = np.abs(ready.literature.com_m - result.truth.com_m)
+    assert np.median(off) > 0.003
+
+
+def test_errors_against_the_truth():
+    subject = walking_subject()
+    truth = unlike_literature(subject, np.random.default_rng(0)).bsp
+    demo = demo_module.Demo(fit=None, two_level=None, truth=truth, subject_file=None)
+    assert demo.rms_errors(truth) == (0.0, 0.0, 0.0)
+    mass, com, inertia = demo.rms_errors(subject.literature)
+    assert mass == pytest.approx(np.sqrt(np.mean((subject.literature.mass_kg - truth.mass_kg) ** 2)))
+    assert com == pytest.approx(0.01 * np.sqrt(3), rel=0.4)
+    assert 0.0 < inertia < 0.1
+
+
+def test_verdict_follows_the_numbers():
+    assert "every class" in _two_level_verdict((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))
+    assert "2 of 3 classes" in _two_level_verdict((1.0, 1.0, 1.0), (2.0, 0.5, 2.0))
+    assert "luck" in _two_level_verdict((1.0, 1.0, 1.0), (0.5, 0.5, 0.5))
+
+
+def test_demo_refuses_a_folder_that_is_a_file(tmp_path):
+    (tmp_path / "out").write_text("")
+    outcome = run("demo", "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "is a file" in outcome.err

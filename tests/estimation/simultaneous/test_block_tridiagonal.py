@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
+
+
+def random_system(blocks: int, size: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Dense positive definite block tridiagonal matrix, its diagonal blocks and the blocks below them."""
+    rng = np.random.default_rng(seed)
+    lower = np.zeros((blocks * size, blocks * size))
+    for i in range(blocks):
+        rows = slice(i * size, (i + 1) * size)
+        lower[rows, rows] = np.tril(rng.normal(size=(size, size))) + 3.0 * np.eye(size)
+        if i:
+            lower[rows, (i - 1) * size : i * size] = rng.normal(size=(size, size))
+    dense = lower @ lower.T
+    tiles = dense.reshape(blocks, size, blocks, size)
+    diagonal = np.stack([tiles[i, :, i] for i in range(blocks)])
+    below = np.stack([tiles[i + 1, :, i] for i in range(blocks - 1)]) if blocks > 1 else np.empty((0, size, size))
+    return dense, diagonal, below
+
+
+@pytest.mark.parametrize(("blocks", "size"), [(1, 3), (2, 1), (6, 4)])
+def test_factor_and_solutions_agree_with_dense_cholesky(blocks, size):
+    dense, diagonal, below = random_system(blocks, size)
+    lower = np.linalg.cholesky(dense)
+    right = np.random.default_rng(1).normal(size=(blocks * size, 3))
+    band = BlockBand.factor(diagonal, below)
+    forward = band.forward(right.reshape(blocks, size, 3))
+    np.testing.assert_allclose(forward.reshape(-1, 3), np.linalg.solve(lower, right), atol=1e-12)
+    backward = band.backward(right.reshape(blocks, size, 3))
+    np.testing.assert_allclose(backward.reshape(-1, 3), np.linalg.solve(lower.T, right), atol=1e-12)
+    solution = band.backward(forward).reshape(-1, 3)
+    np.testing.assert_allclose(dense @ solution, right, atol=1e-10)
+
+
+def test_a_matrix_that_is_not_positive_definite_is_refused():
+    _, diagonal, below = random_system(4, 3)
+    diagonal[2] -= 1e3 * np.eye(3)
+    with pytest.raises(np.linalg.LinAlgError):
+        BlockBand.factor(diagonal, below)

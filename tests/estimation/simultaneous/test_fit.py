@@ -1,0 +1,230 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from threadpoolctl import threadpool_limits
+
+from kinertia.estimation.estimate import Fit, estimate_bsp
+from kinertia.estimation.prepare import TrialInput
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.fit import CLOCK_SD_S, PLATE_SD, fit_simultaneous
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, JOINT_CENTRE_SD_M
+from kinertia.io.recording import read_recording
+from kinertia.report.files import save_fit
+from kinertia.settings import Settings, Subject
+from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
+from synthetic_walks import kinematics_of
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return walk(walking_subject(), 0.9, trapezoid=False)
+
+
+def fitted(trial: SyntheticTrial, literature=None, disturb=lambda positions, loads: None):
+    """Outcome for 2 mm of camera noise, after `disturb` has changed marker positions and loads in place."""
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions
+    loads = trial.foot_loads.copy()
+    disturb(positions, loads)
+    kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
+    with threadpool_limits(1, user_api="blas"):
+        prior = literature_prior(literature or walking_subject().literature)
+        return fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
+
+
+@pytest.fixture(scope="module")
+def plain(trial):
+    return fitted(trial)
+
+
+def test_a_person_like_the_literature_raises_no_warning(plain):
+    assert plain.warnings == ()
+    assert plain.result.converged
+    assert plain.result.bsp.physically_consistent().all()
+
+
+def test_information_is_between_nothing_and_everything(plain):
+    posterior = plain.posterior
+    assert posterior.information.shape == (12, 10)
+    assert posterior.information.min() > -1e-6
+    assert posterior.information.max() < 1.0
+    np.testing.assert_allclose(posterior.sd, posterior.prior_sd * np.sqrt(1 - posterior.information))
+    np.testing.assert_allclose(np.sqrt(np.diag(posterior.covariance)), posterior.sd.ravel())
+    mass = dict(zip(plain.result.bsp.segments, posterior.information[:, 0], strict=True))
+    assert mass["thigh_r"] > mass["forearm_r"]
+
+
+def test_calibration_is_told_with_its_deviations(plain):
+    told = plain.posterior.calibration
+    assert told["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
+    assert told["plate right foot: x"]["prior_sd"] == PLATE_SD["x"]
+    assert told["plate left foot: gain"]["prior_sd"] == PLATE_SD["gain"]
+    assert told["clock: forces late by"] == {
+        "value": plain.result.clock_s[0],
+        "prior_sd": CLOCK_SD_S,
+        "sd": plain.result.clock_s[1],
+        "unit": "s",
+    }
+    for name, one in told.items():
+        assert 0 < one["sd"] <= one["prior_sd"] * (1 + 1e-9), name
+
+
+def test_loads_and_motion_cover_the_window(trial, plain):
+    (motion,), (loads,) = plain.motions, plain.foot_loads
+    assert len(motion.q) == len(loads)
+    assert loads.shape[1:] == (2, 6)
+    window = trial.window.wrench[5 : 5 + len(loads)]
+    np.testing.assert_allclose(loads.sum(axis=1)[10:-10], window[10:-10], atol=25.0)
+
+
+def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
+    wrong = {"knee_tilt_1_r": 0.12, "knee_tilt_2_r": 0.08}
+    off = replace(trial, skeleton=trial.skeleton.lock(wrong))
+    noisy = camera_noise(trial.markers, 0.002, np.random.default_rng(0))
+    prior = literature_prior(walking_subject().literature)
+    with threadpool_limits(1, user_api="blas"):
+        outcome = fit_simultaneous(
+            off.skeleton, prior, [kinematics_of(off, noisy, trial.foot_loads)], "gcv", GAIT27_FREEDOM.with_axes()
+        )
+    told = outcome.posterior.calibration
+    for name, put_in in wrong.items():
+        assert told[name]["unit"] == "rad"
+        assert told[name]["prior_sd"] == pytest.approx(np.radians(5.0))
+        assert told[name]["sd"] < 0.7 * told[name]["prior_sd"]
+        assert abs(told[name]["value"] + put_in) < 3.0 * told[name]["sd"]
+    assert "knee_tilt_1_r" not in fitted(trial).posterior.calibration
+
+
+@pytest.mark.parametrize("gap", [slice(40, 41), slice(40, 48), slice(2, 14)])
+def test_the_motion_is_known_in_every_frame_of_the_window_though_the_pelvis_is_not_seen(trial, gap):
+    pelvis = [trial.markers.labels.index(m.label) for m in trial.skeleton.markers if m.segment == "pelvis"]
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions
+    positions[gap, pelvis] = np.nan
+    kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), trial.foot_loads)
+    with threadpool_limits(1, user_api="blas"):
+        prior = literature_prior(walking_subject().literature)
+        outcome = fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
+    assert outcome.result.converged
+    at = np.searchsorted(trial.time, kinematics.time - 1e-9)
+    np.testing.assert_allclose(outcome.motions[0].q, trial.motion.q[at], atol=0.06)
+    assert outcome.foot_loads[0].shape == (len(at), 2, 6)
+    assert outcome.result.moment_sd[0].shape == trial.motion.q[at].shape
+
+
+def test_a_displaced_plate_is_named(trial):
+    def shift(positions, loads):
+        loads[:, 0, 3:] += np.cross([0.0, 0.0, 0.03], loads[:, 0, :3])
+
+    outcome = fitted(trial, disturb=shift)
+    (said,) = [w for w in outcome.warnings if "check the instruments" in w]
+    assert said.startswith("plate right foot: z: -")
+
+
+def test_a_wandering_marker_is_named(trial):
+    def wander(positions, loads):
+        at = trial.markers.labels.index("R.Bicep")
+        positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
+
+    assert any("wandering markers" in w and "R.Bicep (" in w for w in fitted(trial, disturb=wander).warnings)
+
+
+def test_a_marker_attached_anew_between_trials_is_named(trial):
+    at = trial.markers.labels.index("R.Thigh.Front")
+    turned = trial.skeleton.pose(trial.motion.q).rotation[:, trial.skeleton.marker_segments[at]]
+    positions = [camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions for seed in (0, 1)]
+    positions[1][:, at] += turned @ [0.0, -0.05, 0.0]
+    kinematics = [kinematics_of(trial, replace(trial.markers, positions=each), trial.foot_loads) for each in positions]
+    with threadpool_limits(1, user_api="blas"):
+        outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics, "gcv")
+    assert len(outcome.warnings) == 2, outcome.warnings  # of two trials, either may be the odd one
+    for said in outcome.warnings:
+        assert "attached anew" in said
+        assert "R.Thigh.Front (" in said
+        assert said.count(" mm)") == 1, said
+    places = [skeleton.markers[skeleton.labels.index("R.Thigh.Front")].position[1] for skeleton in outcome.skeletons]
+    assert places[1] - places[0] == pytest.approx(-0.05, abs=0.01)
+
+
+def test_markers_that_stay_do_so_in_every_trial(trial):
+    """Else a second trial would make a model with wrong marker places look right."""
+    rng = np.random.default_rng(0)
+    places = trial.skeleton.marker_locals + rng.normal(0.0, 0.012, trial.skeleton.marker_locals.shape)
+    wrong = replace(trial, skeleton=trial.skeleton.with_places(places))
+    markers = [camera_noise(trial.markers, sd_m, rng) for sd_m in (0.001, 0.002)]
+    kinematics = [kinematics_of(wrong, each, trial.foot_loads) for each in markers]
+    prior, staying = literature_prior(walking_subject().literature), replace(GAIT27_FREEDOM, marker_sd_m=None)
+    with threadpool_limits(1, user_api="blas"):
+        outcome = fit_simultaneous(wrong.skeleton, prior, kinematics, "gcv", staying)
+    for skeleton in (outcome.skeleton, *outcome.skeletons):
+        np.testing.assert_array_equal(skeleton.marker_locals, wrong.skeleton.marker_locals)
+
+
+def test_a_model_that_is_contradicted_is_called_so(trial):
+    literature = walking_subject().literature
+    com = literature.com_m.copy()
+    com[literature.segments.index("torso"), 0] += 0.15
+    said = [w for w in fitted(trial, replace(literature, com_m=com)).warnings if "contradict the model" in w]
+    assert any("com_x of torso -" in w for w in said)
+
+
+def test_a_wrong_gain_is_named(trial):
+    def weaken(positions, loads):
+        loads[:, 0] *= 0.9
+
+    outcome = fitted(trial, disturb=weaken)
+    assert any(w.startswith("plate right foot: gain: +") and "check the instruments" in w for w in outcome.warnings)
+    assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
+
+
+def test_a_free_moment_that_is_not_there_is_named(trial):
+    """Nobody turns to the left all the time."""
+
+    def crosstalk(positions, loads):
+        loads[:, 1, 4] += 0.008 * loads[:, 1, 1]
+
+    outcome = fitted(trial, disturb=crosstalk)
+    told = outcome.posterior.calibration["plate left foot: free moment"]
+    assert told["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_SD["free moment"])
+    assert any(w.startswith("plate left foot: free moment: -") and "N m/kN" in w for w in outcome.warnings)
+
+
+def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
+    monkeypatch.setattr("kinertia.estimation.simultaneous.solver._MAX_ITERATIONS", 1)
+    assert any("did not converge within 1 steps" in w for w in fitted(trial).warnings)
+
+
+@pytest.fixture(scope="module")
+def measured(shared_data) -> Fit:
+    walked, static = (read_recording(shared_data / "pig_c3d" / f"subject_b_{kind}.c3d") for kind in ("walk", "static"))
+    return estimate_bsp(Subject(name="B", sex="female"), static, [TrialInput(walked)], Settings(method="simultaneous"))
+
+
+def test_measured_walk_meets_residuals_and_markers(measured):
+    (trial,) = measured.trials
+    residual = np.sqrt(np.square(trial.residuals["estimate"]).reshape(-1, 2, 3).sum(axis=2).mean(axis=0))
+    assert residual[0] < 5.0
+    assert residual[1] < 3.0
+    rms = {stage: np.sqrt(np.nanmean(np.square(errors))) for stage, errors in trial.marker_errors_m.items()}
+    assert rms["final"] < 0.012
+    assert rms["final"] < 1.3 * rms["ik"]
+    assert measured.converged
+    assert measured.estimate.physically_consistent().all()
+
+
+def test_files_of_a_simultaneous_fit(measured, tmp_path):
+    folder = save_fit(measured, tmp_path / "out")
+    bsp = pd.read_csv(folder / "bsp.csv")
+    assert len(bsp) == 120
+    np.testing.assert_allclose(bsp["information"], 1 - (bsp["sd"] / bsp["prior_sd"]) ** 2, atol=1e-9)
+    told = json.loads((folder / "fit.json").read_text())
+    assert told["method"] == "simultaneous"
+    assert told["converged"] is True
+    assert told["iterations"] > 1
+    assert set(told["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
+    noise = told["marker_noise"][measured.trials[0].name]
+    assert noise["correlation_s"] > 0
+    assert min(noise["sd_m"].values()) >= 0.001
+    assert isinstance(noise["wandering"], list)

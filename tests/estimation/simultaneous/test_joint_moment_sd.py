@@ -1,0 +1,186 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
+from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, moment_derivatives
+from kinertia.estimation.simultaneous.normal_equations import reduced
+from kinertia.estimation.simultaneous.problem import MapProblem, Point
+from kinertia.estimation.simultaneous.solver import _deviations, _step, root_of_covariance
+from kinertia.motion.dynamics import Motion, inverse_dynamics
+from small_problem import curved_problem, point, small_problem
+from study_bound import dense_band
+
+
+@pytest.fixture(scope="module", params=["27 DOF", "curved axes"])
+def estimate(request, tmp_path_factory):
+    """Also of a model in which several axes follow one coordinate by curves."""
+    curved = request.param == "curved axes"
+    problem = curved_problem(tmp_path_factory.mktemp("curved") / "small.osim") if curved else small_problem()
+    (coefficients,), static = point(problem)
+    return problem, coefficients, static
+
+
+def moments(problem, coefficients: np.ndarray, static: np.ndarray, added: np.ndarray | None = None) -> np.ndarray:
+    """(d, c) joint moments at a point, by `inverse_dynamics`; with other loads added to those on the feet."""
+    names = problem.calibration.coordinates
+    values = dict(zip(names, static[problem.layout.coordinates].tolist(), strict=True))
+    dynamic = np.flatnonzero(problem.trials[0].dynamic)
+    motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
+    loads = problem.foot_loads(0, static) + (0.0 if added is None else added)
+    loads = loads[dynamic]
+    return inverse_dynamics(problem.skeleton.lock(values), problem.bsp(static), motion, loads)
+
+
+def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """Information on all coefficients and static unknowns as one matrix."""
+    normal = problem.normal(0, coefficients, static)
+    band = dense_band(normal.band)
+    n, s = len(band), problem.layout.size
+    full = np.zeros((n + s, n + s))
+    full[:n, :n] = band
+    full[:n, n:] = normal.border.reshape(n, s)
+    full[n:, :n] = full[:n, n:].T
+    full[n:, n:] = normal.static + problem.prior_terms(static)[0]
+    return full
+
+
+def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns."""
+    basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
+    motion = [part[frames] for part in problem.full(basis.evaluate(coefficients), static)]
+    by = moment_derivatives(problem, 0, motion, static, frames)
+    size, c = coefficients.shape
+    through = np.zeros((len(frames), c, size, c))
+    for row, t in enumerate(frames):
+        for a, spline in enumerate(basis.active[t]):
+            parts = zip(basis.values[:, t, a], (by.q, by.qd, by.qdd), strict=True)
+            through[row, :, spline] = sum(value * part[row] for value, part in parts)
+    rest = np.zeros((len(frames), c, problem.layout.size - by.static.shape[2]))
+    return np.concatenate([through.reshape(len(frames), c, -1), by.static, rest], axis=2)
+
+
+def test_derivatives_agree_with_finite_differences(estimate):
+    """In random directions of one kind of unknown each, by `inverse_dynamics`."""
+    problem, coefficients, static = estimate
+    n, layout = coefficients.size, problem.layout
+    derivative = dense_derivative(problem, coefficients, static)
+    rng = np.random.default_rng(0)
+    parts = [slice(0, n), *(slice(n + p.start, n + p.stop) for p in (layout.theta, layout.plates, layout.coordinates))]
+    parts.append(slice(n + layout.clock, n + layout.clock + 1))
+    for part in parts:
+        for _ in range(3):
+            h = np.zeros(n + layout.size)
+            h[part] = rng.normal(0.0, 1e-5, part.stop - part.start)
+            ahead, behind = (
+                moments(problem, coefficients + s * h[:n].reshape(coefficients.shape), static + s * h[n:])
+                for s in (1.0, -1.0)
+            )
+            found = derivative @ h
+            np.testing.assert_allclose(found, (ahead - behind) / 2.0, atol=1e-6 * np.abs(found).max())
+
+
+def test_deviations_are_those_of_the_dense_covariance(estimate):
+    problem, coefficients, static = estimate
+    root = root_of_covariance(dense(problem, coefficients, static))
+    full = root @ root.T
+    n = coefficients.size
+    by = dense_derivative(problem, coefficients, static)
+    expected = np.sqrt(np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + lost(problem, coefficients, static))
+    part = reduced(problem.normal(0, coefficients, static), 0.0)
+    root = root_of_covariance(problem.prior_terms(static)[0] + part.information)
+    np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
+    found = joint_moment_sd(problem, 0, coefficients, static, part, root)
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
+    """The first counts for two: what its motion leaves open is that of the errors alone."""
+    problem, coefficients, static = estimate
+    (trial,) = problem.trials
+    sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
+    trials = [replace(trial, displacement_sd_m=sd).repeated(2.0), replace(trial, displacement_sd_m=sd[::-1].copy())]
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials, 0.1)
+    rng = np.random.default_rng(0)
+    here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
+    chains, information, right = dense_pair(pair, here)
+    covariance = inverse(information)
+    found, moment_sd = _deviations(pair, here)
+    s = pair.layout.size
+    scale = np.sqrt(np.diag(found))
+    np.testing.assert_allclose(found / np.outer(scale, scale), covariance[:s, :s] / np.outer(scale, scale), atol=1e-6)
+    _, promised, _ = _step(pair, here, 0.0, np.zeros(s))
+    assert promised == pytest.approx(0.5 * right @ covariance @ right, rel=1e-6)
+
+    in_trial = pair.in_trial(0, here.point)
+    by = dense_derivative(problem, coefficients, in_trial)
+    n = coefficients.size
+    motion = inverse(dense_band(here.normals[0].band))
+    carried = -motion @ here.normals[0].border.reshape(n, s)
+    through = by[..., n:] + by[..., :n] @ carried
+    expected = np.einsum("dri,ij,drj->dr", by[..., :n], motion / 2.0, by[..., :n], optimize=True)
+    of_static = chains[0] @ covariance @ chains[0].T
+    expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
+    expected = np.sqrt(expected + lost(problem, coefficients, in_trial))
+    np.testing.assert_allclose(moment_sd[0], expected, rtol=1e-3)
+
+
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    return scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale
+
+
+def dense_pair(pair, here) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """Static unknowns, displacements and motions of two trials in one matrix: per trial the derivative of its static
+    unknowns by all, information, right-hand side.
+    """
+    s, wide = pair.layout.size, len(here.point.displaced[0])
+    sizes = [normal.right.size for normal in here.normals]
+    ends = s + 2 * wide + np.cumsum(sizes)
+    information, right = np.zeros((ends[-1],) * 2), np.zeros(ends[-1])
+    information[:s, :s], right[:s] = here.information, here.right
+    chains = []
+    for k, normal in enumerate(here.normals):
+        own, moving = slice(s + k * wide, s + (k + 1) * wide), slice(ends[k] - sizes[k], ends[k])
+        chain = np.zeros((s, ends[-1]))
+        chain[:, :s] = np.eye(s)
+        chain[pair.layout.locals, own] = np.diag(pair.displacement_sd_m[k])
+        across = normal.border.reshape(-1, s) @ chain
+        information += chain.T @ normal.static @ chain
+        information[moving] += across
+        information[:, moving] += across.T
+        information[moving, moving] += dense_band(normal.band)
+        information[own, own] += np.eye(wide)
+        right += chain.T @ normal.static_right
+        right[moving] += normal.right.ravel()
+        right[own] -= here.point.displaced[k]
+        chains.append(chain)
+    return chains, information, right
+
+
+def lost(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(d, c) moving mean square of what the loads that smoothing took off would have added to the joint moments."""
+    (trial,) = problem.trials
+    more = moments(problem, coefficients, static, trial.ground.lost) - moments(problem, coefficients, static)
+    basis = problem.bases[0]
+    half = round(2.0 * len(basis.first) / (basis.size - 5))
+    rows = np.clip(np.arange(len(more))[:, None] + np.arange(-half, half + 1), 0, len(more) - 1)
+    return np.square(more)[rows].mean(axis=1)
+
+
+def test_blocks_of_the_inverse():
+    rng = np.random.default_rng(0)
+    b, k = 4, 3
+    factor = np.tril(rng.normal(size=(b * k, b * k)))
+    for i in range(b):
+        factor[k * (i + 2) :, k * i : k * i + k] = 0.0
+    matrix = factor @ factor.T + np.eye(b * k)
+    blocks = matrix.reshape(b, k, b, k).transpose(0, 2, 1, 3)
+    band = BlockBand.factor(
+        np.array([blocks[i, i] for i in range(b)]), np.array([blocks[i + 1, i] for i in range(b - 1)])
+    )
+    inverse = np.linalg.inv(matrix).reshape(b, k, b, k).transpose(0, 2, 1, 3)
+    diagonal, below = band.inverse_blocks()
+    np.testing.assert_allclose(diagonal, [inverse[i, i] for i in range(b)])
+    np.testing.assert_allclose(below, [inverse[i + 1, i] for i in range(b - 1)])

@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
+
+PLACES = slice(4, 10)
+SIZE = 10
+
+
+@pytest.fixture
+def told():
+    """Information and right-hand side of a trial, that of everything else, and deviations, two of them zero."""
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(30, SIZE))
+    elsewhere = np.diag(rng.uniform(1.0, 3.0, SIZE))
+    return rows.T @ rows, rng.normal(size=SIZE), elsewhere, np.array([0.5, 1.0, 0.0, 0.0, 2.0, 0.3]), rng.normal(size=6)
+
+
+def together(information, right, elsewhere, sd, own):
+    """Normal equations on static unknowns and displacements (in prior deviations), from x in the trial = s + sd u."""
+    chain = np.hstack([np.eye(SIZE), np.zeros((SIZE, 6))])
+    chain[PLACES, SIZE:] = np.diag(sd)
+    whole = chain.T @ information @ chain
+    whole[:SIZE, :SIZE] += elsewhere
+    whole[SIZE:, SIZE:] += np.eye(6)
+    return whole, chain.T @ right - np.concatenate([np.zeros(SIZE), own]), chain
+
+
+def test_eliminated_is_what_the_whole_system_gives(told):
+    information, right, elsewhere, sd, own = told
+    whole, both, _ = together(information, right, elsewhere, sd, own)
+    expected = np.linalg.solve(whole, both)
+    found = Displaced.of(information, right, PLACES, sd, own)
+    step = np.linalg.solve(found.information + elsewhere, found.right)
+    np.testing.assert_allclose(step, expected[:SIZE], rtol=1e-10)
+    np.testing.assert_allclose(found.step(step), expected[SIZE:], rtol=1e-10)
+    np.testing.assert_allclose(np.linalg.inv(found.information + elsewhere), np.linalg.inv(whole)[:SIZE, :SIZE])
+
+
+def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(told):
+    information, right, elsewhere, sd, own = told
+    whole, _, chain = together(information, right, elsewhere, sd, own)
+    expected = chain @ np.linalg.inv(whole) @ chain.T
+    found = information + as_displaced(elsewhere, PLACES, sd)
+    np.testing.assert_allclose(np.linalg.inv(found), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_without_deviation_there_are_no_displacements(told):
+    information, right, _, _, _ = told
+    found = Displaced.of(information, right, PLACES, np.zeros(6), np.zeros(6))
+    np.testing.assert_array_equal(found.information, information)
+    assert not found.step(np.ones(SIZE)).any()

@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+
+TIME = 3.0 + np.arange(101) / 100.0
+
+
+@pytest.fixture(scope="module")
+def basis():
+    return MotionBasis(TIME, 0.07)
+
+
+def test_splines_are_a_partition_of_unity(basis):
+    np.testing.assert_allclose(basis.values[0].sum(axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(basis.values[1].sum(axis=1), 0.0, atol=1e-10)
+    np.testing.assert_allclose(basis.values[2].sum(axis=1), 0.0, atol=1e-8)
+    assert basis.values[0].min() > -1e-15
+    assert basis.active.min() == 0
+    assert basis.active.max() == basis.size - 1
+
+
+def test_knots_are_no_farther_apart_than_asked(basis):
+    steps = np.diff(basis.knots)
+    np.testing.assert_allclose(steps, steps[0])
+    assert 0.06 < steps[0] <= 0.07
+    assert basis.size == round(1.0 / steps[0]) + 5
+
+
+def test_derivatives_agree_with_finite_differences():
+    """Three grids, shifted by h, share their knots: the first and last frame of each stand on the outer ones."""
+    h = 1e-4
+    inner = np.linspace(0.1, 0.9, 33)
+    q, qd, qdd = {}, {}, {}
+    coefficients = np.random.default_rng(0).normal(size=(15, 2))
+    for shift in (-h, 0.0, h):
+        basis = MotionBasis(np.concatenate([[0.0], inner + shift, [1.0]]), 0.1)
+        parts = basis.evaluate(coefficients)
+        q[shift], qd[shift], qdd[shift] = (part[1:-1] for part in parts)
+    np.testing.assert_allclose(qd[0.0], (q[h] - q[-h]) / (2 * h), rtol=0, atol=1e-6 * np.abs(qd[0.0]).max())
+    np.testing.assert_allclose(qdd[0.0], (qd[h] - qd[-h]) / (2 * h), rtol=0, atol=1e-5 * np.abs(qdd[0.0]).max())
+
+
+@pytest.mark.parametrize("degree", range(6))
+def test_polynomials_up_to_the_degree_are_met_exactly(basis, degree):
+    at = TIME - 3.5
+    polynomial = np.polynomial.Polynomial([0.3, -1.0, 2.0, 1.0, -4.0, 5.0][: degree + 1])
+    design = np.zeros((len(TIME), basis.size))
+    np.put_along_axis(design, basis.active, basis.values[0], axis=1)
+    coefficients = np.linalg.lstsq(design, polynomial(at)[:, None])[0]
+    for derivative, found in enumerate(basis.evaluate(coefficients)):
+        np.testing.assert_allclose(found[:, 0], polynomial.deriv(derivative)(at), atol=1e-7)
+    # the fit has a small ridge, which tells where splines hardly show in the data
+    np.testing.assert_allclose(basis.evaluate(basis.fit(polynomial(at)[:, None]))[0][:, 0], polynomial(at), atol=1e-5)
+
+
+def test_missing_frames_have_no_weight(basis):
+    q = np.column_stack([np.sin(5 * TIME), np.cos(5 * TIME)])
+    holed = q.copy()
+    holed[40:44, 0] = np.nan
+    filled = basis.evaluate(basis.fit(holed))[0]
+    np.testing.assert_allclose(filled[:, 0], q[:, 0], atol=1e-4)
+    np.testing.assert_allclose(filled[:, 1], basis.evaluate(basis.fit(q))[0][:, 1], atol=1e-12)
+
+
+def test_last_frame_belongs_to_the_last_interval():
+    basis = MotionBasis(np.linspace(0.0, 1.0, 11), 0.1)
+    assert basis.first[-1] == basis.size - 6
+    np.testing.assert_allclose(basis.values[0, -1].sum(), 1.0)

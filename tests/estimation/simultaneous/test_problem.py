@@ -1,0 +1,202 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.problem import MapProblem, Point
+from kinertia.model.log_cholesky import nearest_consistent
+from small_problem import curved_problem, point, residuals, small_problem
+from study_bound import dense_band
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return small_problem()
+
+
+@pytest.fixture(scope="module", params=["27 DOF", "curved axes"])
+def any_problem(request, problem, tmp_path_factory):
+    """Also one in which several axes follow one coordinate by curves, and the root stands on turned frames."""
+    if request.param == "27 DOF":
+        return problem
+    return curved_problem(tmp_path_factory.mktemp("curved") / "small.osim")
+
+
+@pytest.fixture(scope="module")
+def here(problem):
+    coefficients, static = point(problem)
+    return coefficients[0], static
+
+
+def cost(problem: MapProblem, coefficients: np.ndarray, static: np.ndarray) -> float:
+    return problem.at(Point((coefficients,), static, problem.beginning.displaced)).cost
+
+
+def sloped(function, size: float) -> float:
+    """Derivative at zero of a function of one number, by central differences."""
+    return (function(size) - function(-size)) / (2 * size)
+
+
+@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "plates", "clock"])
+def test_gradient_of_static_unknowns(problem, here, kind):
+    coefficients, static = here
+    part = getattr(problem.layout, kind)
+    part = slice(part, part + 1) if isinstance(part, int) else part
+    step = np.zeros_like(static)
+    step[part] = np.random.default_rng(0).normal(size=step[part].shape)
+    right = problem.normal(0, coefficients, static).static_right + problem.prior_terms(static)[1]
+    slope = sloped(lambda h: cost(problem, coefficients, static + h * step), 1e-6)
+    assert -right @ step == pytest.approx(slope, rel=1e-5)
+
+
+@pytest.mark.parametrize("coordinate", ["pelvis_tx", "pelvis_list", "hip_flexion_r", "ankle_angle_l", "arm_add_l"])
+def test_gradient_of_the_motion(problem, here, coordinate):
+    coefficients, static = here
+    step = np.zeros_like(coefficients)
+    column = problem.skeleton.coordinates.index(coordinate)
+    step[:, column] = np.random.default_rng(0).normal(size=len(step))
+    slope = sloped(lambda h: cost(problem, coefficients + h * step, static), 1e-6)
+    assert -(problem.normal(0, coefficients, static).right * step).sum() == pytest.approx(slope, rel=1e-5)
+
+
+def test_cost_is_half_the_sum_of_squares(any_problem):
+    problem = any_problem
+    (coefficients,), static = point(problem)
+    expected = 0.5 * np.square(residuals(problem, 0, coefficients, static)).sum()
+    assert cost(problem, coefficients, static) == pytest.approx(expected + problem.prior_terms(static)[2])
+
+
+def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
+    problem = any_problem
+    (coefficients,), static = point(problem)
+    size, c = coefficients.shape
+    motion = np.arange(size * c)
+    still = size * c + np.arange(len(static))
+    start = np.concatenate([coefficients.ravel(), static])
+
+    def left(x):
+        return residuals(problem, 0, x[motion].reshape(size, c), x[still])
+
+    h = 1e-6
+    columns = []
+    for j in range(len(start)):
+        ahead, behind = start.copy(), start.copy()
+        ahead[j] += h
+        behind[j] -= h
+        columns.append((left(ahead) - left(behind)) / (2 * h))
+    jacobian = np.stack(columns, axis=1)
+    dense, gradient = jacobian.T @ jacobian, jacobian.T @ left(start)
+    normal = problem.normal(0, coefficients, static)
+
+    tolerance = 1e-6 * np.sqrt(np.outer(np.diag(dense), np.diag(dense))) + 1e-6
+    found = np.block(
+        [
+            [dense_band(normal.band), normal.border.reshape(size * c, -1)],
+            [normal.border.reshape(size * c, -1).T, normal.static],
+        ]
+    )
+    assert (np.abs(found - dense) <= tolerance).all()
+    right = np.concatenate([normal.right.ravel(), normal.static_right])
+    np.testing.assert_allclose(-right, gradient, atol=1e-6 * np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("at_once", [1, 4, 5])
+def test_frames_in_stretches_are_those_of_the_whole(any_problem, monkeypatch, at_once):
+    """Also where the last stretch is a single frame, which has none after it."""
+    (coefficients,), static = point(any_problem)
+    whole = any_problem.normal(0, coefficients, static)
+    monkeypatch.setattr("kinertia.estimation.simultaneous.marker_terms.FRAMES_AT_ONCE", at_once)
+    parts = any_problem.normal(0, coefficients, static)
+    for name in ("band", "border", "static", "right", "static_right", "cost"):
+        one, other = getattr(whole, name), getattr(parts, name)
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+
+
+def test_prior_information_is_the_derivative_of_its_gradient(problem):
+    """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
+    static = problem.start_static
+    information, right, value = problem.prior_terms(static)
+    np.testing.assert_allclose(right / np.sqrt(np.diag(information)), 0.0, atol=1e-6)
+    assert value == pytest.approx(0.0, abs=1e-12)
+    scale = 1.0 / np.sqrt(np.diag(information))
+    h = 1e-5
+    for j in np.random.default_rng(0).choice(len(static), 30, replace=False):
+        step = np.zeros_like(static)
+        step[j] = h * scale[j]
+        slope = (problem.prior_terms(static - step)[1] - problem.prior_terms(static + step)[1]) / (2 * h)
+        np.testing.assert_allclose(slope * scale, information[:, j] * scale[j] * scale, atol=1e-4)
+
+
+def test_prior_cost_counts_deviations(problem):
+    """One deviation of a quantity that nothing else is tied to costs one half."""
+    layout = problem.layout
+    prior = problem.calibration
+    cases = [(layout.coordinates.start, 0.01), (layout.locals.start + 4, float(prior.marker_sd_m[1]))]
+    plate = layout.plates.start
+    cases += [(plate + i, sd) for i, sd in enumerate(prior.plate_sd.values())]
+    cases.append((layout.clock, prior.clock_sd_s))
+    for at, deviation in cases:
+        static = problem.start_static.copy()
+        static[at] += deviation
+        assert problem.prior_terms(static)[2] == pytest.approx(0.5)
+
+
+def test_prior_cost_of_a_body_is_its_mahalanobis_distance_and_the_scale(problem, here):
+    _, static = here
+    static = np.where(np.arange(len(static)) < problem.layout.theta.stop, static, problem.start_static)
+    bsp, prior = problem.bsp(static), problem.prior
+    gap = (bsp.table() - prior.mean.table()).ravel()
+    scale = (bsp.total_mass_kg - prior.mass_kg) / prior.mass_sd_kg
+    expected = 0.5 * (gap @ np.linalg.solve(prior.covariance, gap) + scale**2)
+    assert problem.prior_terms(static)[2] == pytest.approx(expected, rel=1e-6)
+
+
+def test_start_is_the_prior_s_mean(problem):
+    start = problem.bsp(problem.start_static)
+    np.testing.assert_allclose(start.table(), nearest_consistent(problem.prior.mean).table(), rtol=1e-9, atol=1e-12)
+    positions = problem.start_static[problem.layout.locals].reshape(-1, 3)
+    np.testing.assert_array_equal(positions, problem.skeleton.marker_locals)
+    assert not problem.start_static[problem.layout.plates].any()
+    assert problem.start_static[problem.layout.clock] == 0.0
+
+
+def test_trials_share_plates_by_name_and_the_clock():
+    pair = small_problem(2)
+    other = replace(pair.trials[1], ground=replace(pair.trials[1].ground, plates=("second", "fourth", "third")))
+    pair = MapProblem(pair.skeleton, pair.prior, pair.calibration, [pair.trials[0], other], 0.1)
+    assert pair.plates == ("first", "second", "third", "fourth")
+    coefficients, static = point(pair)
+    for k, foreign in ((0, "fourth"), (1, "first")):
+        static_terms = pair.normal(k, coefficients[k], static).static
+        for i, name in enumerate(pair.plates):
+            own = np.abs(static_terms[pair.layout.plates][4 * i : 4 * i + 4]).max(axis=1)
+            assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
+        assert static_terms[pair.layout.clock, pair.layout.clock] > 0
+
+
+def test_displacements_move_the_markers_of_their_trial_only(problem, here):
+    coefficients, static = here
+    trial = problem.trials[0]
+    sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
+    displaced = replace(trial, displacement_sd_m=sd)
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial], 0.1)
+    own = np.random.default_rng(0).normal(size=(len(sd), 3))
+    at = Point((coefficients, coefficients), static, (own.ravel(), np.zeros(own.size)))
+    moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - static[pair.layout.locals].reshape(-1, 3)
+    np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
+    np.testing.assert_array_equal(pair.in_trial(1, at), static)
+    together = pair.at(at)
+    assert together.normals[1].cost == pytest.approx(problem.normal(0, coefficients, static).cost)
+    expected = sum(normal.cost for normal in together.normals) + problem.prior_terms(static)[2]
+    assert together.cost == pytest.approx(expected + 0.5 * np.square(own).sum())
+
+
+def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):
+    """Body segment parameters appear in the root equations only."""
+    coefficients, static = here
+    normal = problem.normal(0, coefficients, static)
+    basis, trial = problem.bases[0], problem.trials[0]
+    touched = np.unique(basis.active[trial.dynamic])
+    silent = np.setdiff1d(np.arange(basis.size), touched)
+    assert not normal.border[silent][..., problem.layout.theta].any()
+    assert np.abs(normal.border[touched][..., problem.layout.theta]).max(axis=(1, 2)).min() > 0

@@ -1,0 +1,145 @@
+"""The four measured walks from the command line, and what must hold on them."""
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.estimate import estimate_bsp
+from kinertia.estimation.prepare import TrialInput
+from kinertia.io.recording import read_recording
+from kinertia.settings import Settings, Subject
+
+walks = pytest.mark.parametrize(
+    "name",
+    [
+        "gait2354",
+        "pig_a",
+        pytest.param("pig_b", marks=pytest.mark.slow),
+        pytest.param("rajagopal", marks=pytest.mark.slow),
+    ],
+)
+LONGEST_WINDOW_S = {"gait2354": (0.0, 2.5), "rajagopal": (0.43, 1.97), "pig_a": (2.70, 3.75), "pig_b": (2.55, 3.70)}
+"""Outside these times a foot is on the ground and on no plate (gait2354: the trial ends)."""
+
+
+@walks
+def test_inverse_kinematics_follows_the_markers(fit_of, name):
+    assert 0.001 < fit_of(name).trial["marker_rms_m"]["ik"] <= 0.015
+
+
+@walks
+@pytest.mark.parametrize(("quantity", "demanded"), [("residual_force_rms_N", 5.0), ("residual_moment_rms_Nm", 3.0)])
+def test_correction_and_estimate_lower_the_residual(fit_of, name, quantity, demanded):
+    """The estimate weighs it against the markers: with moments far below, its force may be that of the correction."""
+    residual = fit_of(name).trial[quantity]
+    assert max(residual["estimate"], residual["corrected"]) < residual["literature"]
+    assert residual["estimate"] < demanded
+
+
+@walks
+def test_total_mass_is_the_scale_s_or_a_warning_says_why(fit_of, name):
+    told = fit_of(name).summary
+    mass = told["total_mass_kg"]
+    assert mass["literature"] == pytest.approx(mass["measured"], rel=1e-6)
+    off = abs(mass["estimate"] / mass["measured"] - 1) > 0.03
+    warned = any(warning.startswith("the estimated total mass is") for warning in told["warnings"])
+    assert warned == off
+
+
+@walks
+def test_unmeasured_steps_are_left_out(fit_of, name):
+    trial = fit_of(name).trial
+    first, last = trial["window_s"]
+    earliest, latest = LONGEST_WINDOW_S[name]
+    assert earliest <= first < last <= latest
+    assert last - first > 0.75 * (latest - earliest)
+    assert trial["n_dynamic_frames"] <= trial["n_frames"]
+    if name != "gait2354":
+        assert trial["n_dynamic_frames"] < 0.7 * trial["n_frames"]
+
+
+@walks
+def test_estimated_motion_stays_near_the_markers(fit_of, name):
+    """Hardly farther than inverse kinematics, or nearer: the estimate calibrates where they sit."""
+    markers = fit_of(name).trial["marker_rms_m"]
+    assert 0.8 * markers["ik"] < markers["final"] < min(1.3 * markers["ik"], 0.012)
+
+
+@walks
+def test_time_is_told_for_every_stage(fit_of, name):
+    seconds = fit_of(name).trial["seconds"]
+    assert {"read", "ik", "estimate", "total"} <= set(seconds)
+    assert min(seconds.values()) > 0
+    assert seconds["total"] == pytest.approx(sum(v for stage, v in seconds.items() if stage != "total"), abs=1e-3)
+
+
+@walks
+def test_an_impossible_body_is_warned_about(fit_of, name):
+    fit = fit_of(name)
+    table = np.genfromtxt(fit.folder / "bsp.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    moments = {p: table["estimate"][table["parameter"] == p] for p in ("ixx", "iyy", "izz")}
+    largest = np.maximum.reduce(list(moments.values()))
+    impossible = int((2 * largest > sum(moments.values())).sum())
+    told = any("physically impossible" in warning for warning in fit.summary["warnings"])
+    assert told == (impossible > 0)
+
+
+def test_mass_and_height_come_from_the_c3d_file(short_fit):
+    assert short_fit.subject.mass_kg == pytest.approx(41.5, abs=0.1)
+    assert short_fit.subject.height_m == pytest.approx(1.61, abs=0.02)
+    assert not any("is taken as" in warning for warning in short_fit.warnings)
+
+
+def test_several_trials_share_one_body(short_fit):
+    early, late = short_fit.trials
+    assert (early.name, late.name) == ("early", "late")
+    assert early.time[[0, -1]] == pytest.approx([2.8, 3.1], abs=0.011)
+    assert late.time[[0, -1]] == pytest.approx([3.2, 3.5], abs=0.011)
+    for trial in short_fit.trials:
+        frames = len(trial.time)
+        assert {stage: values.shape for stage, values in trial.residuals.items()} == dict.fromkeys(
+            ("literature", "corrected", "estimate"), (frames, 6)
+        )
+        assert trial.moments["estimate"].shape == trial.motion.q.shape == (frames, 27)
+        assert list(trial.coordinates) == list(short_fit.skeleton.coordinates)
+        assert np.isfinite(trial.motion.qdd).all()
+
+
+def test_root_rows_of_inverse_dynamics_are_the_residual(short_fit):
+    """Pelvis translations are along the ground axes, so their loads are the residual force."""
+    for trial in short_fit.trials:
+        for stage in ("literature", "estimate"):
+            np.testing.assert_allclose(trial.moments[stage][:, :3], trial.residuals[stage][:, :3], atol=1e-6)
+
+
+def test_left_mirrors_right_unless_told_otherwise(short_fit):
+    bsp = short_fit.estimate
+    index = bsp.segments.index
+    mirrored = bsp.com_m[index("thigh_l")] * [1, 1, -1]
+    np.testing.assert_allclose(mirrored, bsp.com_m[index("thigh_r")], atol=1e-9)
+    assert bsp.mass_kg[index("thigh_l")] == pytest.approx(bsp.mass_kg[index("thigh_r")])
+
+
+@pytest.mark.usefixtures("few_evaluations")
+def test_settings_and_subject_reach_the_result(shared_data, short_fit):
+    """De Leva's table, 84 parameters, a fixed cutoff, and a mass that the file contradicts."""
+    walk, static = (read_recording(shared_data / "pig_c3d" / f"subject_a_{kind}.c3d") for kind in ("walk", "static"))
+    shares = []
+    fit = estimate_bsp(
+        Subject(name="A", sex="male", mass_kg=44.0),
+        static,
+        [TrialInput(walk, (2.8, 3.05))],
+        Settings(method="two-level", bsp="deleva", symmetry=False, cutoff_hz=6.0, hip_centre="harrington"),
+        progress=lambda stage, share: shares.append((stage, share)),
+    )
+    assert fit.literature.total_mass_kg == pytest.approx(44.0)
+    (said,) = [warning for warning in fit.warnings if "is taken as" in warning]
+    assert said.startswith("mass_kg is taken as 44")
+    assert "41.5" in said
+    assert fit.trials[0].kinematics.cutoff_hz == pytest.approx(6.0)
+    thighs = [fit.estimate.mass_kg[fit.estimate.segments.index(f"thigh_{side}")] for side in "rl"]
+    assert abs(thighs[0] - thighs[1]) > 1e-3
+    share = [fit.literature.mass_kg / 44.0, short_fit.literature.mass_kg / short_fit.literature.total_mass_kg]
+    assert np.abs(share[0] - share[1]).max() > 0.005
+    assert [stage for stage, _ in shares][:2] == ["calibration", "inverse kinematics"]
+    assert shares[-1][0] == "estimate"
+    assert all(0 <= share <= 1 for _, share in shares)

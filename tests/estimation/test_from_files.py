@@ -1,0 +1,30 @@
+import pytest
+
+from kinertia.errors import SettingsError
+from kinertia.estimation.from_files import read_inputs, read_trials
+from kinertia.settings import read_subject
+from osim_models import PEOPLE, subject_file
+
+
+@pytest.fixture
+def subject(shared_data, tmp_path):
+    path = tmp_path / "subject.toml"
+    path.write_text(subject_file(shared_data, PEOPLE["subject4"], False))
+    return read_subject(path)
+
+
+def test_columns_of_two_force_files_are_plates_of_their_own(subject):
+    """In subject4's walks one column holds two steps in two places: it is a foot's, not a plate's."""
+    walking1, walking2, _ = (item.recording.plates.names for item in read_trials(subject))
+    assert walking1 == ("ForcePlate1 (walking1)", "ForcePlate2 (walking1)")
+    assert not set(walking1) & set(walking2)
+
+
+def test_one_trial_keeps_its_names(subject):
+    (item,) = read_trials(subject.model_copy(update={"trials": subject.trials[:1]}))
+    assert item.recording.plates.names == ("ForcePlate1", "ForcePlate2")
+
+
+def test_a_static_trial_is_missing_where_one_is_needed(subject):
+    with pytest.raises(SettingsError, match="needs a static trial"):
+        read_inputs(subject)

@@ -1,0 +1,122 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.errors import SubjectError, TrialError
+from kinertia.estimation.input_checks import (
+    check_masses,
+    check_same_person,
+    complete_subject,
+    fit_warnings,
+    mass_from_force_kg,
+    two_level_warnings,
+)
+from kinertia.settings import Subject
+from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.data import FootLoads, Markers, Recording, Trial
+
+MARKERS = Markers(np.array([0.0, 0.1]), ("A",), np.zeros((2, 1, 3)))
+STATIC = Recording("static", MARKERS, mass_kg=60.0, height_m=1.7)
+WALK = Recording("walk", MARKERS)
+
+
+def test_files_fill_in_what_the_user_left_out():
+    subject, warnings = complete_subject(Subject(name="a", sex="female"), [WALK, STATIC])
+    assert (subject.mass_kg, subject.height_m) == (60.0, 1.7)
+    assert warnings == []
+
+
+@pytest.mark.parametrize(("mass", "warned"), [(60.5, False), (61.0, True), (59.0, True)])
+def test_the_user_goes_before_the_files_and_disagreement_is_told(mass, warned):
+    subject, warnings = complete_subject(Subject(name="a", sex="female", mass_kg=mass), [WALK, STATIC])
+    assert (subject.mass_kg, subject.height_m) == (mass, 1.7)
+    assert [("static" in w and "60" in w and f"{mass:g}" in w) for w in warnings] == [True] * warned
+
+
+def test_files_that_disagree_with_each_other_are_told():
+    other = Recording("second", MARKERS, mass_kg=66.0)
+    subject, (warning,) = complete_subject(Subject(name="a", sex="female"), [STATIC, other])
+    assert subject.mass_kg == 60.0
+    assert "second" in warning
+    assert "66" in warning
+
+
+@pytest.mark.parametrize(("field", "option"), [("mass_kg", "--mass"), ("height_m", "--height")])
+def test_nobody_tells(field, option):
+    known = {"mass_kg": 60.0, "height_m": 1.7}
+    del known[field]
+    with pytest.raises(SubjectError, match=option) as caught:
+        complete_subject(Subject(name="a", sex="male", **known), [WALK])
+    assert caught.value.field == field
+
+
+def test_a_file_with_an_impossible_mass():
+    with pytest.raises(SubjectError, match="mass_kg = 0"):
+        complete_subject(Subject(name="a", sex="male"), [Recording("static", MARKERS, mass_kg=0.0, height_m=1.7)])
+
+
+def test_mass_by_force_knows_the_movement_of_the_body(short_fit):
+    """It must not change when the literature's mass does: the residual changes with it."""
+    trial, literature = short_fit.trials[0], short_fit.literature
+    measured = mass_from_force_kg(literature, trial)
+    force = trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean()
+    # at the same accelerations a body 10 % heavier needs 10 % more force
+    heavier = trial.residuals["literature"].copy()
+    heavier[:, 1] += 0.1 * (force + trial.residuals["literature"][:, 1].mean())
+    other = SimpleNamespace(kinematics=trial.kinematics, residuals={"literature": heavier})
+    body = SimpleNamespace(total_mass_kg=1.1 * literature.total_mass_kg)
+    assert mass_from_force_kg(body, other) == pytest.approx(measured)
+    assert 36 < measured < 46
+
+
+def warned(fit, mass_kg=None, **changes):
+    result = SimpleNamespace(**{"bsp": fit.literature, "converged": True, "evaluations": 7, **changes})
+    mass = mass_from_force_kg(fit.literature, fit.trials[0]) if mass_kg is None else mass_kg
+    return fit_warnings(mass, fit.literature, result.bsp, fit.trials[:1]) + two_level_warnings(result)
+
+
+def test_warnings_come_one_by_one(short_fit):
+    literature = short_fit.literature
+    by_force = mass_from_force_kg(literature, short_fit.trials[0])
+    fine = replace(literature, mass_kg=literature.mass_kg * by_force / literature.total_mass_kg)
+    assert warned(short_fit, bsp=fine) == []
+    assert any("did not converge within 7" in w for w in warned(short_fit, bsp=fine, converged=False))
+    light = replace(fine, mass_kg=fine.mass_kg * 0.96)
+    assert any("estimated total mass" in w and "-4.0 %" in w for w in warned(short_fit, bsp=light))
+    assert any("mean vertical force" in w and "early" in w for w in warned(short_fit, by_force * 1.021, bsp=fine))
+    far = replace(fine, com_m=literature.com_m + np.eye(12, 3) * 0.11)
+    assert any("contradicts the literature" in w and "110 mm" in w for w in warned(short_fit, bsp=far))
+    flat = fine.inertia_kgm2.copy()
+    flat[2] = np.diag([1.0, 0.1, 0.1])
+    (said,) = warned(short_fit, bsp=replace(fine, inertia_kgm2=flat))
+    assert "physically impossible for 1 of 12 segments (thigh_r)" in said
+
+
+def test_masses_that_contradict_each_other_or_the_scale():
+    check_masses(70.0, {"a": 68.0, "b": 72.0})
+    with pytest.raises(TrialError, match=r"trial 'b'.*90\.0 kg.*'a' 70\.0 kg.*one person"):
+        check_masses(70.0, {"a": 70.0, "b": 90.0})
+    with pytest.raises(TrialError, match=r"trial 'a'.*60\.0 kg, the scale says 70\.0 kg"):
+        check_masses(70.0, {"a": 60.0, "b": 63.5})
+
+
+def two_trials(stretch_m=0.0, label="R.Shank.Rear"):
+    made = walk(walking_subject(), 0.3)
+    trials = []
+    for name, more in (("one", 0.0), ("two", stretch_m)):
+        positions = made.markers.positions.copy()
+        positions[:, made.markers.labels.index(label), 1] += more
+        loads = FootLoads(made.time, made.foot_loads[..., :3], made.foot_loads[..., 3:])
+        trials.append(Trial(name, replace(made.markers, positions=positions), loads, np.ones(len(made.time), bool)))
+    return made.skeleton, trials
+
+
+def test_trials_of_one_person_may_differ_a_little():
+    check_same_person(*two_trials(0.03))
+
+
+def test_trials_of_different_people_are_not_pooled():
+    with pytest.raises(TrialError, match=r"trial 'two'.*R\.Shank\.Rear.*mm apart, in 'one' \d+ mm; pool only"):
+        check_same_person(*two_trials(-0.08))

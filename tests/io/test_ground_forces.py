@@ -1,0 +1,236 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from kinertia.errors import FileError
+from kinertia.io.ground_forces import read_forces, read_forces_with_notes
+from kinertia.io.sto import write_sto
+
+GRAVITY = 9.80665
+
+
+def column_group(force, point, torque, stems=("vx", "px", "mx")):
+    """Columns of one plate: 100 samples of constant load, unloaded in the first ten."""
+    loaded = np.arange(100) >= 10
+    values = {}
+    for stem, vector, elsewhere in zip(stems, (force, point, torque), (0.0, 300.0, 0.0), strict=True):
+        for axis, value in zip("xyz", vector, strict=True):
+            values[stem[:-1] + axis] = np.where(loaded, value, elsewhere)
+    return values
+
+
+FORCE, POINT, TORQUE = (10.0, 700.0, -20.0), (1.0, 0.0, 0.2), (0.0, 3.0, 0.0)
+MOMENT = np.cross(POINT, FORCE) + TORQUE
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(*groups, rate_hz=1000.0, **changes):
+        columns = {name: values for group in groups for name, values in group.items()}
+        table = pd.DataFrame(columns, index=pd.Index(np.arange(100) / rate_hz, name="time"))
+        for name, change in changes.items():
+            table.loc[table.index[change[0]], name] = change[1]
+        path = tmp_path / "grf.mot"
+        write_sto(path, table, in_degrees=False, name="grf")
+        return path
+
+    return write
+
+
+EXTERNAL_FORCE = """<ExternalForce name="{name}">
+  <applied_to_body>{body}</applied_to_body>
+  <force_expressed_in_body>ground</force_expressed_in_body>
+  <point_expressed_in_body>ground</point_expressed_in_body>
+  <force_identifier>f{name}_v</force_identifier>
+  <point_identifier>f{name}_p</point_identifier>
+  <torque_identifier>f{name}_m</torque_identifier>
+</ExternalForce>"""
+
+
+@pytest.fixture
+def write_xml(tmp_path):
+    def write_xml(*names, body="calcn_r", replace=("", ""), datafile="grf.mot"):
+        forces = "".join(EXTERNAL_FORCE.format(name=name, body=body) for name in names)
+        loads = f"<objects>{forces}</objects><datafile>{datafile}</datafile>"
+        document = f"<OpenSimDocument><ExternalLoads>{loads}</ExternalLoads></OpenSimDocument>"
+        path = tmp_path / "loads.xml"
+        path.write_text(document.replace(*replace) if replace[0] else document)
+        return path
+
+    return write_xml
+
+
+def named(name):
+    return column_group(FORCE, POINT, TORQUE, (f"f{name}_vx", f"f{name}_px", f"f{name}_mx"))
+
+
+REAL = {
+    "gait2354/subject01_walk1_grf": ("gait2354/subject01_walk1_grf.xml", ("r", "l")),
+    "rajagopal_walk/grf_walk": ("rajagopal_walk/grf_walk.xml", ("r", "l")),
+    "subject4/squats1_grf": ("subject4/squats1_external_forces.xml", ("r", "r", "r")),
+    "subject4/walking1_grf": ("subject4/walking1_external_forces.xml", ("r", "r")),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_files_with_and_without_loads_file(shared_data, name):
+    xml, feet = REAL[name]
+    by_name = read_forces(shared_data / f"{name}.mot")
+    by_identifier = read_forces(shared_data / f"{name}.mot", shared_data / xml)
+    np.testing.assert_array_equal(by_name.force, by_identifier.force)
+    np.testing.assert_array_equal(by_name.moment, by_identifier.moment)
+    assert by_identifier.declared_feet == feet
+    assert len(set(by_name.names)) == len(feet)
+
+
+WEIGHTS = {
+    "gait2354/subject01_walk1_grf": (0.0, 2.5, 72.6),
+    "rajagopal_walk/grf_walk": (0.6, 1.8, 85.0),
+    "subject4/squats1_grf": (0.0, 13.45, 60.0),
+    "subject4/static1_grf": (0.0, 5.16, 60.0),
+}
+
+
+@pytest.mark.parametrize("name", WEIGHTS)
+def test_mean_vertical_force_is_body_weight(shared_data, name):
+    start, end, mass_kg = WEIGHTS[name]
+    plates = read_forces(shared_data / f"{name}.mot")
+    during = (plates.time >= start) & (plates.time <= end)
+    mean = plates.force[during, :, 1].sum(axis=1).mean() / GRAVITY
+    assert mean == pytest.approx(mass_kg, rel=0.02)
+
+
+def test_point_of_application_is_kept_where_loaded(shared_data):
+    plates = read_forces(shared_data / "rajagopal_walk" / "grf_walk.mot")
+    loaded = plates.force[:, 0, 1] > 100
+    x = plates.moment[loaded, 0, 2] / plates.force[loaded, 0, 1]
+    assert x.min() > -1.0
+    assert x.max() < 3.0
+    assert not plates.moment[plates.force[..., 1] == 0].any()
+
+
+STEMS = {
+    "ground_force_vx": ("ground_force_vx", "ground_force_px", "ground_torque_x", None),
+    "1_ground_force_vx": ("1_ground_force_vx", "1_ground_force_px", "1_ground_torque_x", None),
+    "ground_force_r_vx": ("ground_force_r_vx", "ground_force_r_px", "ground_torque_r_x", "r"),
+    "ground_force_1_vx": ("ground_force_1_vx", "ground_force_1_px", "ground_force_1_mx", None),
+    "ground_moment_1_mx": ("ground_force_1_vx", "ground_force_1_px", "ground_moment_1_mx", None),
+    "l_ground_force_vx": ("l_ground_force_vx", "l_ground_force_px", "l_ground_torque_x", "l"),
+    "Left_force_vx": ("Left_force_vx", "Left_force_px", "Left_torque_x", "l"),
+}
+
+
+@pytest.mark.parametrize("case", STEMS)
+def test_column_names(write, case):
+    *stems, foot = STEMS[case]
+    plates, notes = read_forces_with_notes(write(column_group(FORCE, POINT, TORQUE, stems)))
+    assert plates.declared_feet == (foot,)
+    assert notes == ()
+    np.testing.assert_allclose(plates.force[10:, 0], np.tile(FORCE, (90, 1)))
+    np.testing.assert_allclose(plates.moment[10:, 0], np.tile(MOMENT, (90, 1)))
+    assert not plates.moment[:10].any()
+
+
+def test_load_below_threshold_is_zero(write):
+    group = column_group((1.0, 15.0, 1.0), (300.0, 0.0, 300.0), TORQUE, ("a_vx", "a_px", "a_mx"))
+    plates, notes = read_forces_with_notes(write(group))
+    assert not plates.force.any()
+    assert not plates.moment.any()
+    assert notes == ("grf.mot: a never carries 20 N",)
+
+
+def test_without_torque_the_free_moment_is_zero(write, write_xml):
+    group = {name: values for name, values in named("A").items() if not name.startswith("fA_m")}
+    for plates, notes in (
+        read_forces_with_notes(write(group)),
+        read_forces_with_notes(write(group), write_xml("A", replace=("fA_m", ""))),
+        read_forces_with_notes(write(group), write_xml("A", replace=("fA_m", "Unassigned"))),
+    ):
+        np.testing.assert_allclose(plates.moment[50, 0], np.cross(POINT, FORCE))
+        assert "free moment was taken as zero" in notes[0]
+
+
+def test_identifiers_say_which_column_is_what(write, write_xml):
+    path = write(named("A"), named("B"))
+    plates = read_forces(path, write_xml("B", body="/bodyset/calcn_l"))
+    assert plates.names == ("B",)
+    assert plates.declared_feet == ("l",)
+    assert read_forces(path, write_xml("A", body="pelvis")).declared_feet == (None,)
+
+
+def test_datafile_is_used_only_without_a_force_file(write, write_xml, tmp_path):
+    path = write(named("A"))
+    assert read_forces(None, write_xml("A")).names == ("A",)
+    assert read_forces(path, write_xml("A", datafile="gone.mot")).names == ("A",)
+    with pytest.raises(FileError, match=r"loads.xml: its datafile gone.mot is not at .*give the force file"):
+        read_forces(None, write_xml("A", datafile="gone.mot"))
+    with pytest.raises(FileError, match="names no datafile"):
+        read_forces(None, write_xml("A", datafile="Unassigned"))
+    with pytest.raises(ValueError, match="force file or"):
+        read_forces(None)
+
+
+@pytest.mark.parametrize("tag", ["<isDisabled> true </isDisabled>", "<appliesForce>false</appliesForce>"])
+def test_disabled_loads_are_left_out(write, write_xml, tag):
+    xml = write_xml("A", "B", replace=('name="A">', f'name="A">{tag}'))
+    plates, notes = read_forces_with_notes(write(named("A"), named("B")), xml)
+    assert plates.names == ("B",)
+    assert notes == ("loads.xml: A is disabled there and was left out",)
+    with pytest.raises(FileError, match="all its external forces are disabled"):
+        read_forces(write(named("A")), write_xml("A", replace=('name="A">', f'name="A">{tag}')))
+
+
+XML_TROUBLE = {
+    "force body": (("force_expressed_in_body>ground", "force_expressed_in_body>hand"), "force_expressed_in_body = h"),
+    "point body": (("point_expressed_in_body>ground", "point_expressed_in_body>hand"), "point_expressed_in_body = h"),
+    "no point": (("fA_p", ""), "A has no point_identifier"),
+    "no force": (("fA_v", ""), "A has no force_identifier"),
+    "column": (("fA_p", "gA_p"), "no column gA_px, gA_py, gA_pz, which loads.xml names for A by the identifier 'gA_p'"),
+    "not XML": (("</ExternalLoads>", ""), "not XML"),
+    "no loads": (("ExternalForce", "Force"), "no ExternalForce"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", XML_TROUBLE)
+def test_loads_file_trouble(write, write_xml, case):
+    replace, words = XML_TROUBLE[case]
+    with pytest.raises(FileError) as caught:
+        read_forces(write(named("A")), write_xml("A", replace=replace))
+    assert words in str(caught.value)
+
+
+def test_missing_column_lists_those_that_exist(write, write_xml):
+    with pytest.raises(FileError, match="the columns are fB_vx, fB_vy") as caught:
+        read_forces(write(named("B")), write_xml("A"))
+    assert caught.value.path.name == "grf.mot"
+
+
+def test_no_force_columns(write):
+    with pytest.raises(FileError, match=r"no ground reaction forces.*knee_x, knee_y, knee_z"):
+        read_forces(write({f"knee_{axis}": np.zeros(100) for axis in "xyz"}))
+    with pytest.raises(FileError, match="a_vx has no point of application; expected a_px"):
+        read_forces(write({f"a_v{axis}": np.zeros(100) for axis in "xyz"}))
+
+
+def test_nan_in_loaded_rows(write):
+    with pytest.raises(FileError, match=r"column fA_pz has no number at 0.02 s"):
+        read_forces(write(named("A"), fA_pz=(20, np.nan)))
+    with pytest.raises(FileError, match=r"column fA_vx has no number at 0.002 s"):
+        read_forces(write(named("A"), fA_vx=(2, np.nan)))
+    assert read_forces(write(named("A"), fA_pz=(2, np.nan))).force.any()
+
+
+def test_force_that_points_down(write):
+    with pytest.raises(FileError, match="largest vertical force in fA_vy is -700 N, downward"):
+        read_forces(write(column_group((0, -700, 0), POINT, TORQUE, ("fA_vx", "fA_px", "fA_mx"))))
+
+
+def test_uneven_time(write, tmp_path):
+    path = write(named("A"))
+    path.write_text(path.read_text().replace("\n0.050000000000000003\t", "\n0.04\t"))
+    with pytest.raises(FileError, match=r"time goes from 0.049 s to 0.04 s where its step is 0.001 s"):
+        read_forces(path)
+    lines = write(named("A")).read_text().replace("nRows=100", "nRows=90").split("\n")
+    path.write_text("\n".join(lines[:50] + lines[60:]))
+    with pytest.raises(FileError, match="without gaps"):
+        read_forces(path)

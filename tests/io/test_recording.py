@@ -1,0 +1,84 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from c3d_writer import write_c3d
+from kinertia.errors import FileError, TrialError
+from kinertia.io.recording import read_recording
+from kinertia.io.sto import write_sto
+from kinertia.io.trc import write_trc
+from kinertia.trial.data import Markers
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A second of markers, as TRC and C3D, and of forces."""
+    markers = Markers(np.arange(101) / 100, ("R.Heel",), np.ones((101, 1, 3)))
+    write_trc(tmp_path / "walk.trc", markers)
+    write_c3d(tmp_path / "walk.c3d", 1000 * markers.positions, ["R.Heel"], parameters={"POINT": {"Y_SCREEN": ["+Y"]}})
+    write_forces(tmp_path / "walk_grf.mot", 0.0)
+    return tmp_path
+
+
+def write_forces(path, start_s):
+    columns = {f"ground_force_{kind}{axis}": np.full(1001, 400.0 * (axis == "y")) for kind in "vp" for axis in "xyz"}
+    write_sto(path, pd.DataFrame(columns, index=start_s + np.arange(1001) / 1000), in_degrees=False, name="grf")
+
+
+def test_text_files(files):
+    recording = read_recording(files / "walk.trc", files / "walk_grf.mot")
+    assert recording.name == "walk"
+    assert recording.markers.labels == ("R.Heel",)
+    assert recording.plates.force[0, 0, 1] == 400.0
+    assert recording.notes == ("walk_grf.mot: no torque columns for ground_force; the free moment was taken as zero",)
+
+
+def test_statics_need_no_forces(files):
+    for name in ("walk.trc", "walk.c3d"):
+        recording = read_recording(files / name)
+        assert recording.plates is None
+        assert recording.mass_kg is None
+
+
+def test_forces_of_a_force_file_go_before_those_of_the_c3d_file(files, shared_data):
+    recording = read_recording(shared_data / "pig_c3d" / "subject_b_static.c3d", files / "walk_grf.mot")
+    assert recording.plates.names == ("ground_force",)
+    assert recording.mass_kg == 47.5
+    assert "subject_b_static.c3d: its own force plates were not used, the force file was" in recording.notes
+
+
+def test_loads_file_alone_names_its_forces(shared_data):
+    folder = shared_data / "gait2354"
+    recording = read_recording(folder / "subject01_walk1.trc", loads_path=folder / "subject01_walk1_grf.xml")
+    assert recording.plates.declared_feet == ("r", "l")
+    assert recording.plates.names == ("right", "left")
+
+
+def test_strings_will_do(files):
+    assert read_recording(str(files / "walk.trc"), str(files / "walk_grf.mot")).plates is not None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("walk_grf.mot",), "cannot read markers from a '.mot' file; expected .trc or .c3d"),
+        (("walk.csv",), "cannot read markers from a '.csv' file; expected .trc or .c3d"),
+        (("walk.trc", "walk.c3d"), "cannot read forces from a '.c3d' file; expected .mot or .sto"),
+        (("walk.trc", "walk_grf.mot", "walk.trc"), "cannot read external loads from a '.trc' file; expected .xml"),
+        (("wlak.trc",), "no such file; looked in {folder}, the nearest names there are walk.trc"),
+        (("walk.trc", "walk_grff.mot"), "nearest names there are walk_grf.mot"),
+        (("walk.trc", "walk_grf.mot", "walk.xml"), "no such file"),
+    ],
+)
+def test_wrong_and_missing_files(files, arguments, words):
+    with pytest.raises(FileError) as caught:
+        read_recording(*(files / name for name in arguments))
+    assert words.format(folder=files) in str(caught.value)
+
+
+def test_forces_and_markers_that_do_not_overlap(files):
+    write_forces(files / "late.mot", 5.0)
+    with pytest.raises(
+        TrialError, match=r"trial 'walk': forces from 5.000 to 6.000 s and markers from 0.000 to 1.000 s"
+    ):
+        read_recording(files / "walk.trc", files / "late.mot")

@@ -1,0 +1,406 @@
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kinertia.errors import FileError
+from kinertia.io.subject_draft import init_subject
+from kinertia.settings import Settings, _line, _lines, read_subject
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured data are not at {DATA}")
+
+GOOD = """\
+[subject]
+sex = "female"
+mass_kg = 61.5
+height_m = 1.68
+
+[model]
+static = "static.trc"
+markers = "plug-in-gait"
+
+[[trial]]
+markers = "data/walk1.trc"
+forces = "data/walk1.mot"   # comment
+loads = "data/walk1.xml"
+window_s = [0.4, 2]
+
+[[trial]]
+markers = "data/walk2.c3d"
+name = "second"
+
+[settings]
+bsp = "deleva"
+symmetry = false
+cutoff_hz = 6
+hip_centre = "harrington"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    root = tmp_path / "anna"
+    (root / "data").mkdir(parents=True)
+    for name in (
+        "static.trc",
+        "data/walk1.trc",
+        "data/walk1.mot",
+        "data/walk1.xml",
+        "data/walk2.c3d",
+        "my.toml",
+    ):
+        (root / name).touch()
+    return root
+
+
+def read(folder, text):
+    (folder / "subject.toml").write_text(text, encoding="utf-8")
+    return read_subject(folder / "subject.toml")
+
+
+def changed(old, new):
+    assert GOOD.count(old) == 1, old
+    return GOOD.replace(old, new)
+
+
+def test_reads_everything(folder):
+    result = read(folder, GOOD)
+    assert result.subject.model_dump() == {"name": "anna", "sex": "female", "mass_kg": 61.5, "height_m": 1.68}
+    assert result.model.static == folder / "static.trc"
+    assert result.model.markers == "plug-in-gait"
+    first, second = result.trials
+    assert first.name == "walk1"
+    assert first.markers == folder / "data/walk1.trc"
+    assert first.forces == folder / "data/walk1.mot"
+    assert first.loads == folder / "data/walk1.xml"
+    assert first.window_s == (0.4, 2.0)
+    assert (second.name, second.forces, second.loads, second.window_s) == ("second", None, None, None)
+    assert result.settings.model_dump() == {
+        "method": "simultaneous",
+        "bsp": "deleva",
+        "symmetry": False,
+        "cutoff_hz": 6.0,
+        "joint_axes": False,
+        "hip_centre": "harrington",
+    }
+
+
+def test_least_file_gets_defaults(folder):
+    result = read(
+        folder,
+        '[subject]\nsex = "male"\n[model]\nstatic = "static.trc"\n[[trial]]\nmarkers = "data/walk2.c3d"\n',
+    )
+    assert (result.subject.mass_kg, result.subject.height_m, result.model.markers) == (None, None, None)
+    assert result.settings == Settings()
+    assert Settings().model_dump() == {
+        "method": "simultaneous",
+        "bsp": "dumas",
+        "symmetry": True,
+        "cutoff_hz": "gcv",
+        "joint_axes": False,
+        "hip_centre": "bell",
+    }
+
+
+def test_own_marker_set_and_absolute_paths(folder):
+    result = read(folder, changed('"plug-in-gait"', '"my.toml"').replace('"static.trc"', f"'{folder}/static.trc'"))
+    assert result.model.markers == folder / "my.toml"
+    assert result.model.static == folder / "static.trc"
+
+
+def test_paths_do_not_depend_on_the_working_folder(folder, monkeypatch):
+    (folder / "subject.toml").write_text(GOOD)
+    monkeypatch.chdir(folder / "data")
+    assert read_subject("../subject.toml").trials[0].markers == folder / "data/walk1.trc"
+
+
+def test_inline_tables_and_dotted_keys(folder):
+    text = (
+        'subject.sex = "male"\nsubject.mass_kg = 70\nmodel = {static = "static.trc"}\n'
+        'trial = [{markers = "data/walk2.c3d"}]\n'
+    )
+    assert read(folder, text).subject.mass_kg == 70
+    for old, new, line in (("70", "70000", 2), ("walk2", "walk3", 4), ("static.trc", "nothing.trc", 3)):
+        with pytest.raises(FileError) as caught:
+            read(folder, text.replace(old, new))
+        assert caught.value.line == line
+
+
+def test_byte_order_mark_and_windows_line_ends(folder):
+    (folder / "subject.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
+    assert read_subject(folder / "subject.toml").subject.sex == "female"
+
+
+def test_result_is_frozen(folder):
+    with pytest.raises(ValueError, match="frozen"):
+        read(folder, GOOD).settings.symmetry = True
+
+
+CASES = [
+    ("mass_kg = 61.5", "mass = 61.5", 3, "unknown key 'mass' in [subject]; did you mean 'mass_kg'?"),
+    ("mass_kg = 61.5", "zzz = 1", 3, "unknown key 'zzz' in [subject]; known: name, sex, mass_kg, height_m"),
+    ("[settings]", "[setings]", 20, "unknown key 'setings'; did you mean 'settings'?"),
+    ("cutoff_hz = 6", "cut_off_hz = 6", 23, "did you mean 'cutoff_hz'?"),
+    ("loads =", "load =", 13, "unknown key 'load' in [trial]; did you mean 'loads'?"),
+    ('sex = "female"\n', "", 1, "[subject] lacks 'sex'"),
+    ('markers = "data/walk2.c3d"\n', "", 16, "[trial] lacks 'markers'"),
+    ('sex = "female"', 'sex = "f"', 2, 'sex = "f": must be "male" or "female"'),
+    ('bsp = "deleva"', 'bsp = "leva"', 21, 'must be "dumas" or "deleva"'),
+    ("symmetry = false", 'symmetry = "no"', 22, 'symmetry = "no"'),
+    ("cutoff_hz = 6", "cutoff_hz = 0", 23, 'must be "gcv" or a positive frequency in Hz'),
+    ("cutoff_hz = 6", 'cutoff_hz = "6"', 23, 'must be "gcv" or a positive frequency in Hz'),
+    ("cutoff_hz = 6", "cutoff_hz = true", 23, 'must be "gcv" or a positive frequency in Hz'),
+    ("[0.4, 2]", "[2, 0.4]", 14, "window_s = [2, 0.4]: must be [start, end] in seconds"),
+    ("[0.4, 2]", "[2]", 14, "must be [start, end] in seconds"),
+    ("mass_kg = 61.5", 'mass_kg = "61.5"', 3, "must be a valid number"),
+    ("mass_kg = 61.5", "mass_kg = 61500", 3, "grams"),
+    ("mass_kg = 61.5", "mass_kg = nan", 3, "mass_kg"),
+    ("height_m = 1.68", "height_m = 168", 4, "centimetres"),
+    ('"static.trc"', '"sttaic.trc"', 7, "did you mean 'static.trc'?"),
+    ('"static.trc"', "7", 7, "static = 7: must be a path in quotes"),
+    ('"plug-in-gait"', '"plugin"', 8, "'cleveland-clinic', 'plug-in-gait', 'rajagopal'"),
+    ('name = "second"', 'name = "walk1"', 18, "trial 'walk1' is there already"),
+    ('name = "second"', 'name = ""', 18, "must be a name that a folder can have"),
+    ('name = "second"', 'name = "../second"', 18, "must be a name that a folder can have"),
+    ('"data/walk2.c3d"', '"data"', 17, "data is a folder; give a file"),
+    ('sex = "female"', "sex = female", 2, "put text in quotes"),
+    ("height_m = 1.68", "height_m = 1.68\nheight_m = 1.7", 5, "not valid TOML"),
+    ('"data/walk1.mot"', '"C:\\walk1.mot"', 12, "write paths with /"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "line", "message"), CASES)
+def test_errors_name_the_line(folder, old, new, line, message):
+    with pytest.raises(FileError) as caught:
+        read(folder, changed(old, new))
+    assert caught.value.line == line
+    assert message in caught.value.problem
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        ("", 1, "there is no heading"),
+        (GOOD[: GOOD.index("[model]")], 6, "there is no heading [[trial]]"),
+        ("subject = 3\n" + GOOD[GOOD.index("[model]") :], 1, "heading [subject]"),
+        (re.sub(r"\[\[trial\]\](.|\n)*\[\[trial\]\]", "[trial]", GOOD), 10, "[[trial]], in double brackets"),
+        (
+            "trial = []\n" + re.sub(r"\[\[trial\]\](.|\n)*\[settings", "[settings", GOOD),
+            1,
+            "[[trial]], in double",
+        ),
+        (GOOD + "[settings", 25, "not valid TOML"),
+    ],
+)
+def test_errors_of_the_whole(folder, text, line, message):
+    with pytest.raises(FileError) as caught:
+        read(folder, text)
+    assert message in caught.value.problem
+    assert caught.value.line == line
+
+
+def test_file_that_is_not_text_or_not_there(folder):
+    (folder / "subject.toml").write_bytes(b"[subject]\nname = '\xff'\n")
+    with pytest.raises(FileError, match="UTF-8") as caught:
+        read_subject(folder / "subject.toml")
+    assert caught.value.line == 2
+    with pytest.raises(FileError, match="no such file"):
+        read_subject(folder / "nothing.toml")
+    with pytest.raises(FileError, match="no such file"):
+        read_subject(folder)
+
+
+@given(
+    st.lists(
+        st.tuples(st.booleans(), st.lists(st.sampled_from(["a", "b-c", "d_1"]), unique=True), st.integers(0, 2)),
+        max_size=6,
+    )
+)
+def test_locator_finds_every_key(tables):
+    text, expected, counts = [], {}, {}
+    for number, (array, keys, blank) in enumerate(tables):
+        name = "trial" if array else f"t{number}"
+        place = (name, counts.setdefault(name, 0)) if array else (name,)
+        counts[name] = counts.get(name, 0) + 1
+        text += [""] * blank + [f"[[ {name} ]]  # x" if array else f"[{name}]"]
+        expected[place] = len(text)
+        for key in keys:
+            text += [f"  {key} = [1,", "   2]"]
+            expected[(*place, key)] = len(text) - 1
+    lines = _lines("\n".join(text))
+    for place, line in expected.items():
+        assert _line(lines, place) == line
+    assert _line(lines, ("nowhere", 1)) is None
+
+
+def completed(text):
+    """A draft as a user would complete it: nothing but the sex."""
+    return text.replace("# sex", "sex", 1)
+
+
+def draft(folder, text):
+    (folder / "subject.toml").write_text(text, encoding="utf-8")
+    return read_subject(folder / "subject.toml")
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "static", "trials"),
+    [
+        (
+            "gait2354",
+            "subject01_static.trc",
+            [("subject01_walk1.trc", "subject01_walk1_grf.mot", "subject01_walk1_grf.xml")],
+        ),
+        (
+            "rajagopal_walk",
+            "static_walk_1.trc",
+            [("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")],
+        ),
+        (
+            "subject4",
+            "static1.trc",
+            [(f"{t}.trc", f"{t}_grf.mot", f"{t}_external_forces.xml") for t in ("squats1", "walking1", "walking2")],
+        ),
+    ],
+)
+def test_init_matches_measured_files(name, static, trials, tmp_path):
+    text = init_subject(DATA / name)
+    for file in (DATA / name).iterdir():
+        (tmp_path / file.name).touch()
+    with pytest.raises(FileError, match="lacks 'sex'"):
+        draft(tmp_path, text)
+    result = draft(tmp_path, completed(text))
+    assert result.model.static.name == static
+    assert [(t.markers.name, t.forces.name, t.loads.name) for t in result.trials] == trials
+    assert result.settings == Settings()
+    assert "# mass_kg = 70.0  # FILL IN" in text
+    assert "Left out" not in text
+
+
+@needs_data
+def test_init_takes_the_first_of_two_subjects_and_says_so(tmp_path):
+    text = init_subject(DATA / "pig_c3d")
+    for file in (DATA / "pig_c3d").iterdir():
+        (tmp_path / file.name).touch()
+    result = draft(tmp_path, completed(text))
+    assert result.model.static.name == "subject_a_static.c3d"
+    assert [trial.markers.name for trial in result.trials] == ["subject_a_walk.c3d"]
+    assert (result.subject.mass_kg, result.subject.height_m) == pytest.approx((41.5, 1.61))
+    left_out = next(line for line in text.splitlines() if line.startswith("# Left out"))
+    assert "subject_b_static.c3d, subject_b_walk.c3d" in left_out
+
+
+def trc(path, frames):
+    rows = [f"{k + 1}\t{k / 100:.2f}\t1\t2\t3" for k in range(frames)]
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"100\t100\t{frames}\t1\tmm\t100\t1\t{frames}",
+        "Frame#\tTime\tA\t\t",
+        "\t\tX1\tY1\tZ1",
+        "",
+    ]
+    path.write_text("\n".join(head + rows) + "\n")
+
+
+def test_init_takes_the_shortest_where_no_name_says_static(tmp_path):
+    for name, frames in (("a.trc", 30), ("b.trc", 9), ("calf_raise.trc", 20)):
+        trc(tmp_path / name, frames)
+    text = init_subject(tmp_path)
+    assert 'static = "b.trc"' in text
+    assert "shortest" in text
+    result = draft(tmp_path, completed(text))
+    assert [trial.markers.name for trial in result.trials] == ["a.trc", "calf_raise.trc"]
+    assert text.count("# forces = ") == 2
+
+
+def test_init_matches_one_force_file_to_each_trial(tmp_path):
+    for name in ("cal_01.trc", "walk_1.trc", "walk_2.trc", "run_12.trc"):
+        (tmp_path / name).touch()
+    for name in ("walk_2_forces.mot", "walk_1_forces.mot", "cal_01_forces.mot"):
+        (tmp_path / name).write_text("x\nendheader\ntime\tground_force_vx\tground_force_vy\n")
+    (tmp_path / "run_12_ik.mot").write_text("x\nendheader\ntime\tpelvis_tilt\n")
+    result = draft(tmp_path, completed(init_subject(tmp_path)))
+    found = {trial.name: trial.forces and trial.forces.name for trial in result.trials}
+    assert found == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
+
+
+def test_init_prefers_c3d_to_its_export_and_says_so(tmp_path):
+    for name in ("static.trc", "walk.c3d", "walk.trc"):
+        (tmp_path / name).touch()
+    text = init_subject(tmp_path)
+    assert 'markers = "walk.c3d"' in text
+    assert re.search("Left out.*walk.trc", text)
+
+
+@pytest.mark.parametrize("name", ["static.trc", "walk.trc"])
+def test_init_with_one_recording_leaves_the_other_to_fill_in(tmp_path, name):
+    (tmp_path / name).touch()
+    text = init_subject(tmp_path)
+    missing = '# markers = "walk.trc"' if name == "static.trc" else '# static = "static.trc"'
+    assert f"{missing}  # FILL IN" in text
+    with pytest.raises(FileError):
+        draft(tmp_path, completed(text))
+
+
+def test_init_explains_every_setting(tmp_path):
+    (tmp_path / "walk.trc").touch()
+    lines = init_subject(tmp_path).splitlines()
+    for name in Settings.model_fields:
+        assert any(re.match(rf"{name} = .+  # .{{10,}}", line) for line in lines)
+
+
+def test_init_without_recordings(tmp_path):
+    with pytest.raises(FileError, match=r"no \.c3d or \.trc"):
+        init_subject(tmp_path)
+    with pytest.raises(FileError, match="no such folder"):
+        init_subject(tmp_path / "nowhere")
+
+
+OWN = """\
+[subject]
+mass_kg = 61.5
+
+[model]
+osim = "scaled.osim"
+
+[[trial]]
+markers = "data/walk1.trc"
+"""
+
+
+def test_an_opensim_model_needs_neither_static_trial_nor_sex(folder):
+    (folder / "scaled.osim").touch()
+    result = read(folder, OWN)
+    assert result.model.osim == folder / "scaled.osim"
+    assert (result.model.static, result.subject.sex, result.model.calibrate) == (None, None, False)
+    assert read(folder, OWN.replace("[[trial]]", "calibrate = true\n[[trial]]")).model.calibrate
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("osim = ", 'static = "static.trc"\nosim = ', 5, "[model] has both osim and static"),
+        ("osim = ", 'markers = "plug-in-gait"\nosim = ', 5, "[model] has both osim and markers"),
+        ('osim = "scaled.osim"', "", 4, "[model] lacks 'static'"),
+        ('osim = "scaled.osim"', 'static = "static.trc"', 1, "[subject] lacks 'sex'"),
+        ("[[trial]]", '[settings]\nmethod = "two-level"\n[[trial]]', 8, "works on the built-in model only"),
+        ('osim = "scaled.osim"', 'osim = "scald.osim"', 5, "did you mean 'scaled.osim'?"),
+    ],
+)
+def test_what_does_not_go_with_an_opensim_model(folder, old, new, line, message):
+    (folder / "scaled.osim").touch()
+    with pytest.raises(FileError, match=re.escape(message)) as error:
+        read(folder, OWN.replace(old, new))
+    assert error.value.line == line
+
+
+def test_calibration_is_of_opensim_models(folder):
+    with pytest.raises(FileError, match="calibrate goes with osim") as error:
+        read(folder, changed('markers = "plug-in-gait"', "calibrate = true"))
+    assert error.value.line == 8

@@ -1,0 +1,231 @@
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from kinertia.errors import FileError
+from kinertia.io.trc import read_trc, read_trc_recording, write_trc
+from kinertia.trial.data import Markers
+
+HEADER = (
+    "PathFileType\t4\t(X/Y/Z)\tx.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+    "100\t100\t3\t2\tmm\t100\t1\t3\n"
+    "Frame#\tTime\tR.Heel\t\t\tL Heel\t\t\n"
+    "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n"
+)
+ROWS = "1\t0.00\t1\t2\t3\t4\t5\t6\n2\t0.01\t1\t2\t3\t4\t5\t6\n3\t0.02\t1\t2\t3\t4\t5\t6\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text: str) -> Path:
+        path = tmp_path / "x.trc"
+        path.write_text(text, newline="")
+        return path
+
+    return write
+
+
+REAL = {
+    "gait2354/subject01_static.trc": (300, 49, 60),
+    "gait2354/subject01_walk1.trc": (151, 41, 60),
+    "rajagopal_walk/motion_capture_walk.trc": (238, 41, 100),
+    "rajagopal_walk/static_walk_1.trc": (287, 64, 100),
+    "subject4/static1.trc": (517, 55, 100),
+    "subject4/walking1.trc": (131, 51, 100),
+    "subject4/squats1.trc": (1346, 51, 100),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_files(shared_data, name):
+    frames, count, rate = REAL[name]
+    markers = read_trc(shared_data / name)
+    assert markers.positions.shape == (frames, count, 3)
+    assert markers.rate_hz == pytest.approx(rate, rel=1e-9)
+    height = np.nanmax(markers.positions[..., 1]) - np.nanmin(markers.positions[..., 1])
+    assert 1.2 < height < 2.0
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_files_as_opensim_reads_them(shared_data, opensim, name):
+    table = opensim.TimeSeriesTableVec3(str(shared_data / name))
+    markers = read_trc(shared_data / name)
+    assert markers.labels == table.getColumnLabels()
+    scale = 1000.0 if "subject4" not in name else 1.0
+    for frame in (0, len(markers.time) // 2, len(markers.time) - 1):
+        row = table.getRowAtIndex(frame)
+        theirs = np.array([row.getElt(0, k).to_numpy() for k in range(row.ncol())])
+        np.testing.assert_allclose(scale * markers.positions[frame], theirs, atol=1e-6, equal_nan=True)
+
+
+def test_reads_quickly(shared_data):
+    path = shared_data / "rajagopal_walk" / "motion_capture_walk.trc"
+    best = min(_seconds(path) for _ in range(3))
+    assert best < 0.1
+
+
+def _seconds(path):
+    start = time.perf_counter()
+    read_trc(path)
+    return time.perf_counter() - start
+
+
+def test_rounded_times_are_put_back_on_their_grid(shared_data):
+    recording = read_trc_recording(shared_data / "gait2354" / "subject01_walk1.trc")
+    markers, notes = recording.markers, recording.notes
+    assert recording.length_unit == "mm"
+    np.testing.assert_allclose(markers.time, np.arange(151) / 60, atol=1e-12)
+    assert len(notes) == 1
+    assert "rounded by up to 0.33 ms" in notes[0]
+
+
+@pytest.mark.parametrize(("rate", "decimals"), [(240, 3), (59.94, 3), (100, 2), (1000, 3)])
+def test_rates_whose_times_are_rounded(write, rate, decimals):
+    rows = "".join(f"{k}\t{k / rate:.{decimals}f}\t1\t2\t3\t4\t5\t6\n" for k in range(500))
+    header = HEADER.replace("\t3\t2\t", "\t500\t2\t").replace("\n100\t", f"\n{rate}\t")
+    markers = read_trc(write(header + rows))
+    np.testing.assert_allclose(markers.time, np.arange(500) / rate, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        HEADER + ROWS,
+        HEADER + "\n" + ROWS,
+        HEADER + " \n\n" + ROWS + "\n\n",
+        (HEADER + "\n" + ROWS).replace("\n", "\r\n"),
+        (HEADER + ROWS).replace("6\n", "6\t\n").replace("\t\t\n", "\t\t\t\t\n"),
+        (HEADER + ROWS).replace("L Heel", "L.Heel").expandtabs(8),
+        (HEADER + ROWS).replace("100\t100\t3\t2\tmm", "  100.0\t\t 100.0\t\t  3\t\t 2\t\t mm "),
+        (HEADER + ROWS).replace("PathFileType\t4\t", "PathFileType  4\t"),
+        "\ufeff" + HEADER + ROWS,
+        HEADER.replace("\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n", "") + ROWS,
+    ],
+    ids=["plain", "blank line", "blank lines", "CRLF", "trailing tabs", "blanks", "ragged header", "old first line",
+         "byte order mark", "no X1 line"],
+)  # fmt: skip
+def test_header_variants(write, text):
+    markers = read_trc(write(text))
+    assert [label.replace(".", " ") for label in markers.labels] == ["R Heel", "L Heel"]
+    np.testing.assert_allclose(markers.positions[2], [[0.001, 0.002, 0.003], [0.004, 0.005, 0.006]])
+    np.testing.assert_allclose(markers.time, [0, 0.01, 0.02])
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("MM", 0.001)])
+def test_units(write, unit, metres):
+    markers = read_trc(write(HEADER.replace("mm", unit) + ROWS))
+    np.testing.assert_allclose(markers.positions[0, 0], metres * np.array([1, 2, 3]))
+
+
+@pytest.mark.parametrize("cells", ["4\t5\t6\t\t\t", "4\t5\t6", "4\t5\t6\tNaN\tnan\tNaN", "4\t5\t6\t0\t0\t0.0"])
+def test_missing_markers(write, cells):
+    recording = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3\t4\t5\t6", cells)))
+    markers, notes = recording.markers, recording.notes
+    assert np.isnan(markers.positions[:, 1]).all()
+    np.testing.assert_allclose(markers.positions[0, 0], [0.004, 0.005, 0.006])
+    assert [note for note in notes if "0 0 0" in note] == list(notes)
+    assert bool(notes) == cells.endswith("0.0")
+
+
+BROKEN = {
+    "frame count": (HEADER.replace("\t3\t2\t", "\t4\t2\t") + ROWS, 3, "announces 4 frames but the file has 3"),
+    "marker count": (HEADER.replace("\t3\t2\t", "\t3\t3\t") + ROWS, 4, "2 marker labels, expected 3"),
+    "odd count": (HEADER.replace("\t3\t2\t", "\t3.5\t2\t") + ROWS, 3, "NumFrames is 3.5"),
+    "unit": (HEADER.replace("mm", "inch") + ROWS, 3, "unknown unit 'inch'"),
+    "not a number": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\tx"), 7, "'x' in column 3"),
+    "decimal comma": (HEADER + ROWS.replace("0.01", "0,01"), 7, "'0,01' in column 2"),
+    "too long": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\t1\t1"), 7, "9 values, expected 8"),
+    "half a marker": (HEADER + ROWS.replace("2\t0.01\t1\t2\t3\t4\t5\t6", "2\t0.01\t1\t2\t3\t4\t5"), 7, "L Heel"),
+    "infinite": (HEADER + ROWS.replace("3\t0.02\t1", "3\t0.02\tinf"), 8, "infinite value in column 3"),
+    "no time": (HEADER + ROWS.replace("2\t0.01", "2\t"), 7, "no time"),
+    "time goes back": (HEADER + ROWS.replace("0.02", "0.01"), 8, "time goes from 0.01 s to 0.01 s"),
+    "uneven": (HEADER + ROWS.replace("0.01", "0.013"), 7, "expected 0.01 s for equal steps"),
+    "wrong rate": (HEADER.replace("100\t100\t3", "60\t60\t3") + ROWS, 3, "DataRate is 60 Hz"),
+    "rate nan": (HEADER.replace("100\t100\t3", "nan\t100\t3") + ROWS, 3, "DataRate is 'nan'"),
+    "count nan": (HEADER.replace("\t3\t2\t", "\tnan\t2\t") + ROWS, 3, "NumFrames is 'nan'"),
+    "count inf": (HEADER.replace("\t3\t2\t", "\t3\tinf\t") + ROWS, 3, "NumMarkers is 'inf'"),
+    "no rate": (HEADER.replace("100\t100\t3", "x\t100\t3") + ROWS, 3, "DataRate is 'x'"),
+    "repeated label": (HEADER.replace("L Heel", "R.Heel") + ROWS, 4, "repeated marker labels R.Heel"),
+    "no key": (HEADER.replace("NumMarkers", "Markers") + ROWS, 2, "lacks NumMarkers"),
+    "lost value": (HEADER.replace("100\t100\t3\t2\tmm", "100\t100\t3\t2") + ROWS, 3, "7 values for 8"),
+    "another file": ("nColumns=3\nendheader\n" + ROWS, 1, "begin with 'PathFileType'"),
+    "ends in header": ("\n".join(HEADER.split("\n")[:3]), 3, "ends within its header"),
+    "no rows": (HEADER, 3, "the file has 0"),
+    "truncated": ((HEADER + ROWS)[:-10], 8, "R.Heel has only some"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files(write, case):
+    text, line, words = BROKEN[case]
+    with pytest.raises(FileError, match="line") as caught:
+        read_trc(write(text))
+    assert words in str(caught.value)
+    assert caught.value.line == line
+
+
+def test_lost_frame_in_the_middle(write):
+    rows = "".join(f"{k}\t{0.01 * (k + (k > 50)):.2f}\t1\t2\t3\t4\t5\t6\n" for k in range(100))
+    with pytest.raises(FileError, match=r"line 57: time goes from 0.5 s to 0.52 s"):
+        read_trc(write(HEADER.replace("\t3\t2\t", "\t100\t2\t") + rows))
+
+
+def test_missing_empty_and_binary_files(write, tmp_path):
+    path = write("")
+    with pytest.raises(FileError, match="empty"):
+        read_trc(path)
+    with pytest.raises(FileError, match=r"no such file; looked in .*nearest names there are x.trc"):
+        read_trc(tmp_path / "X.trc")
+    with pytest.raises(FileError, match="no folder"):
+        read_trc(tmp_path / "nowhere" / "x.trc")
+    path.write_bytes(b"PathFileType\0\0\1")
+    with pytest.raises(FileError, match="binary"):
+        read_trc(path)
+
+
+coordinates = st.floats(-100, 100).filter(lambda x: abs(x) > 1e-6)
+
+
+@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    positions=hnp.arrays(float, st.tuples(st.integers(1, 6), st.integers(1, 4), st.just(3)), elements=coordinates),
+    lost=st.integers(0, 2**24 - 1),
+    rate_hz=st.sampled_from([50.0, 59.94, 60.0, 100.0, 120.0, 1000.0]),
+    start_s=st.floats(0, 100),
+)
+def test_round_trip(tmp_path, positions, lost, rate_hz, start_s):
+    n, m = positions.shape[:2]
+    gone = np.array([lost >> k & 1 for k in range(n * m)], bool).reshape(n, m)
+    labels = tuple(f"marker {k}" for k in range(m))
+    markers = Markers(start_s + np.arange(n) / rate_hz, labels, np.where(gone[..., None], np.nan, positions))
+    write_trc(tmp_path / "x.trc", markers)
+    back = read_trc(tmp_path / "x.trc")
+    assert back.labels == labels
+    np.testing.assert_allclose(back.time, markers.time, atol=1e-8)
+    np.testing.assert_allclose(back.positions, markers.positions, atol=1e-9)
+
+
+def test_opensim_reads_what_we_write(tmp_path, opensim):
+    positions = np.random.default_rng(0).standard_normal((5, 3, 3))
+    positions[2, 1] = np.nan
+    positions[4] = np.nan
+    markers = Markers(np.arange(5) / 60, ("R.Heel", "r should", "C7"), positions)
+    write_trc(tmp_path / "x.trc", markers)
+    table = opensim.TimeSeriesTableVec3(str(tmp_path / "x.trc"))
+    assert table.getColumnLabels() == markers.labels
+    np.testing.assert_allclose(table.getIndependentColumn(), markers.time, atol=1e-9)
+    theirs = [[table.getRowAtIndex(k).getElt(0, j).to_numpy() for j in range(3)] for k in range(5)]
+    np.testing.assert_allclose(theirs, 1000 * positions, atol=1e-6)
+
+
+@pytest.mark.parametrize("label", ["a\tb", "a\nb", " "])
+def test_labels_that_trc_cannot_hold(tmp_path, label):
+    with pytest.raises(ValueError, match="labels"):
+        write_trc(tmp_path / "x.trc", Markers(np.zeros(1), (label,), np.zeros((1, 1, 3))))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,113 @@
+import ezc3d
+import numpy as np
+import pytest
+
+from generic_static import recording, standing_positions
+from kinertia.errors import MarkerSetError
+from kinertia.io.recording import read_recording
+from kinertia.model import joint_centres as jc
+from kinertia.model.gait27 import build_gait27
+from kinertia.model.marker_set import read_marker_set
+from kinertia.motion.inverse_kinematics import solve_ik
+
+PLUG_IN = read_marker_set("plug-in-gait")
+
+
+@pytest.fixture(scope="module", params=[("a", 1.61), ("b", 1.505)], ids=["A", "B"])
+def vicon(request, shared_data):
+    """Our static model and its angles (deg), and Plug-in Gait's own outputs in ground axes (m, deg)."""
+    subject, height = request.param
+    path = shared_data / f"pig_c3d/subject_{subject}_static.c3d"
+    static = read_recording(path)
+    skeleton = build_gait27(static, PLUG_IN, height, "male").skeleton
+    ik = solve_ik(skeleton, static.markers)
+    pose = skeleton.pose(ik.q[:1])
+    origins = dict(zip(skeleton.segments, pose.translation[0], strict=True))
+    angles = dict(zip(ik.coordinates, np.degrees(ik.q.mean(axis=0)), strict=True))
+    file = ezc3d.c3d(str(path))
+    labels = file["parameters"]["POINT"]["LABELS"]["value"]
+    mean = dict(zip(labels, file["data"]["points"][:3].mean(axis=2).T, strict=True))
+    median = jc.find_landmarks(static, PLUG_IN).markers
+    lab = np.array([mean[label] for label in median]) * 1e-3
+    to_ground, *_ = np.linalg.lstsq(lab, np.array(list(median.values())), rcond=None)
+    return origins, angles, mean, to_ground
+
+
+@pytest.mark.parametrize("side", "rl")
+def test_knee_and_ankle_centres_are_plug_in_gaits(vicon, side):
+    """Within the difference of the hip centres (Bell's, not Davis') and the medians' from the means."""
+    origins, _, mean, to_ground = vicon
+    for segment, label, tolerance in (("shank", "FEO", 0.004), ("talus", "TIO", 0.002)):
+        theirs = 1e-3 * mean[side.upper() + label] @ to_ground
+        assert np.linalg.norm(origins[f"{segment}_{side}"] - theirs) < tolerance
+
+
+@pytest.mark.parametrize("side", "rl")
+def test_sagittal_angles_are_plug_in_gaits(vicon, side):
+    _, angles, mean, _ = vicon
+    for coordinate, output in (("hip_flexion", "Hip"), ("knee_angle", "Knee"), ("ankle_angle", "Ankle")):
+        assert angles[f"{coordinate}_{side}"] == pytest.approx(mean[f"{side.upper()}{output}Angles"][0], abs=2.0)
+
+
+def test_hip_regressions_by_hand():
+    np.testing.assert_allclose(jc.hip_in_pelvis(0.25, 0.14, "bell", "r"), [-0.0475, -0.075, 0.09])
+    expected = [-0.24 * 0.14 - 0.0099, -0.30 * 0.25 - 0.0109, -(0.33 * 0.25 + 0.0073)]
+    np.testing.assert_allclose(jc.hip_in_pelvis(0.25, 0.14, "harrington", "l"), expected)
+
+
+def test_chord_sees_the_joint_half_a_width_from_the_marker_and_square_to_the_thigh():
+    hip, lateral, wand = np.array([0.0, 0.9, 0.09]), np.array([0.0, 0.5, 0.15]), np.array([0.02, 0.7, 0.2])
+    centre = jc._chord(hip, lateral, wand, 0.055)
+    assert np.linalg.norm(centre - lateral) == pytest.approx(0.055)
+    assert (centre - lateral) @ (centre - hip) == pytest.approx(0.0, abs=1e-12)
+    normal = np.cross(hip - lateral, wand - lateral)
+    assert (centre - lateral) @ normal == pytest.approx(0.0, abs=1e-12)
+    assert centre[2] < lateral[2]
+
+
+def test_pelvis_frame_by_hand():
+    marks = jc.find_landmarks(recording(standing_positions(2.0)), read_marker_set("cleveland-clinic"))
+    rotation, origin, width, depth = jc.pelvis_frame(marks)
+    np.testing.assert_allclose(rotation, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(origin, [0.06, 1.12, 0.0])
+    assert width == pytest.approx(0.28)
+    assert depth == pytest.approx(0.19)
+
+
+def test_axes_of_the_left_foot_mirror_the_right():
+    right, left = jc.subtalar_axis("r"), jc.subtalar_axis("l")
+    np.testing.assert_allclose(left, right * [-1, -1, 1])
+    assert np.linalg.norm(right) == pytest.approx(1.0)
+    assert np.degrees(np.arcsin(right[1])) == pytest.approx(42.0)
+
+
+def test_landmarks_are_medians_over_the_frames_that_show_them():
+    static = recording(standing_positions(), frames=7)
+    column = static.markers.labels.index("R.Heel")
+    static.markers.positions[0, column] = np.nan
+    static.markers.positions[1, column] += 1.0
+    found = jc.find_landmarks(static, read_marker_set("cleveland-clinic"))
+    np.testing.assert_allclose(found["heel_r"], standing_positions()["R.Heel"])
+
+
+def test_plug_in_gait_without_widths_says_what_would_help():
+    rng = np.random.default_rng(0)
+    positions = {label: rng.normal(size=3) for label in PLUG_IN.labels}
+    marks = jc.find_landmarks(recording(positions), PLUG_IN)
+    with pytest.raises(MarkerSetError, match=r"knee_r needs a medial marker or the joint's width"):
+        jc.knee(marks, np.zeros(3), "r")
+
+
+@pytest.mark.parametrize(("sex", "raised_deg", "share"), [("male", 8.0, 0.55), ("female", 14.0, 0.53)])
+def test_cervical_joint_lies_above_the_line_from_c7_to_the_sternal_notch(sex, raised_deg, share):
+    c7, notch, lumbar = np.array([-0.06, 1.5, 0.0]), np.array([0.08, 1.5, 0.0]), np.array([0.0, 1.0, 0.0])
+    points = {"c7": c7, "sternal_notch": notch}
+    points |= {"acromion_r": np.array([0.0, 1.48, 0.18]), "acromion_l": np.array([0.0, 1.48, -0.18])}
+    marks = jc.Landmarks({}, points, {}, PLUG_IN)
+    rotation, length, shoulders = jc.torso_frame(marks, lumbar, 1.75, sex)
+    angle = np.radians(raised_deg)
+    top = c7 + share * 0.14 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    assert length == pytest.approx(np.linalg.norm(top - lumbar))
+    np.testing.assert_allclose(lumbar + length * rotation[:, 1], top, atol=1e-12)
+    np.testing.assert_allclose(rotation[:, 2], [0.0, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(shoulders["l"], points["acromion_l"] - 0.17 * 0.36 * rotation[:, 1])

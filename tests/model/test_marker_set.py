@@ -1,0 +1,98 @@
+import pytest
+
+from kinertia.errors import FileError, MarkerSetError
+from kinertia.io.recording import read_recording
+from kinertia.model.marker_set import check_marker_set, choose_marker_set, nearest_labels, preset_names, read_marker_set
+
+STATICS = {
+    "gait2354/subject01_static.trc": "Cleveland Clinic",
+    "rajagopal_walk/static_walk_1.trc": "Rajagopal",
+    "pig_c3d/subject_a_static.c3d": "Plug-in Gait",
+    "pig_c3d/subject_b_static.c3d": "Plug-in Gait",
+}
+SMALL = """
+name = "mine"
+[landmarks]
+asis_r = "RA"
+asis_l = ["LA", "LB"]
+[segments]
+pelvis = ["RA", "LA", "LB"]
+"""
+
+
+@pytest.mark.parametrize(("path", "name"), STATICS.items())
+def test_each_preset_finds_its_own_files(shared_data, path, name):
+    assert choose_marker_set(read_recording(shared_data / path).markers.labels).name == name
+
+
+def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(shared_data):
+    labels = read_recording(shared_data / "subject4/static1.trc").markers.labels
+    with pytest.raises(MarkerSetError, match=r"no marker-set preset fits.*nearest: ") as caught:
+        choose_marker_set(labels)
+    assert caught.value.missing
+    assert set(caught.value.nearest) == set(caught.value.missing)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_presets_refuse_each_others_labels(name):
+    preset = read_marker_set(name)
+    for other in preset_names():
+        labels = read_marker_set(other).labels
+        if other == name:
+            check_marker_set(preset, labels)
+            assert choose_marker_set(labels) == preset
+        else:
+            with pytest.raises(MarkerSetError, match=f"does not carry the marker set '{preset.name}'"):
+                check_marker_set(preset, labels)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_presets_are_symmetric_and_put_every_marker_on_one_segment(name):
+    preset = read_marker_set(name)
+    tracked = [label for labels in preset.segments.values() for label in labels]
+    assert len(tracked) == len(set(tracked))
+    for entries in (preset.landmarks, preset.widths):
+        for key in entries:
+            if key.endswith("_r"):
+                assert key[:-2] + "_l" in entries
+    assert set(preset.foot_labels()) == {"r", "l"}
+
+
+def test_nearest_labels_ignore_case_and_punctuation():
+    assert nearest_labels(["R.ASIS"], ["LHEE", "rasis", "r_knee"])["R.ASIS"][0] == "rasis"
+    assert nearest_labels(["C7"], ["XYZQ"]) == {"C7": []}
+
+
+def test_a_users_own_set(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(SMALL)
+    mine = read_marker_set(path)
+    assert mine.landmarks == {"asis_r": ("RA",), "asis_l": ("LA", "LB")}
+    assert mine.segments["torso"] == ()
+    assert mine.labels == ("RA", "LA", "LB")
+
+
+@pytest.mark.parametrize(
+    ("change", "message", "line"),
+    [
+        (("asis_r", "asis_rr"), r"unknown \[landmarks\] entry 'asis_rr'; did you mean asis_r", 4),
+        (("pelvis =", "hips ="), r"unknown \[segments\] entry 'hips'", 7),
+        (('"RA", "LA", "LB"]', '"RA", "LA"]'), "at least three markers", None),
+        (('"RA"\nasis_l', "3\nasis_l"), r"must be a label or a list of labels, not 3", 4),
+        (("[landmarks]", "[landmark]"), "unknown entry 'landmark'", 3),
+        (('name = "mine"', "name = mine"), "not valid TOML", None),
+        (('asis_r = "RA"\n', ""), r"\[landmarks\] must name asis_r", None),
+    ],
+)
+def test_a_broken_set_says_what_and_where(tmp_path, change, message, line):
+    path = tmp_path / "mine.toml"
+    assert change[0] in SMALL
+    path.write_text(SMALL.replace(*change))
+    with pytest.raises(FileError, match=message) as caught:
+        read_marker_set(path)
+    assert caught.value.line == line
+
+
+def test_an_unknown_preset_lists_those_that_exist():
+    with pytest.raises(FileError, match=r"no such marker set.*cleveland-clinic, plug-in-gait, rajagopal"):
+        read_marker_set("helen-hayes")

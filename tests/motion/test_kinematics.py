@@ -1,0 +1,162 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from generic_static import generic_model, smooth_motion
+from kinertia.errors import MarkerSetError, TrialError
+from kinertia.model.marker_set import read_marker_set
+from kinertia.motion.kinematics import _bridged, facing, solve_kinematics
+from kinertia.trial.data import FootLoads, Markers, Trial
+
+CLEVELAND = read_marker_set("cleveland-clinic")
+RATE = 100.0
+
+
+@pytest.fixture(scope="module")
+def skeleton():
+    return generic_model().skeleton
+
+
+@pytest.fixture(scope="module")
+def motion(skeleton):
+    return smooth_motion(skeleton, 201, RATE)[1]
+
+
+@pytest.fixture(scope="module")
+def trial(skeleton, motion) -> Trial:
+    time = np.arange(201) / RATE
+    exact = skeleton.marker_positions(skeleton.pose(motion.q))
+    markers = Markers(time, skeleton.labels, exact + np.random.default_rng(0).normal(0, 0.001, exact.shape))
+    fast = np.arange(2001) / 1000.0
+    force = np.zeros((2001, 2, 3))
+    force[:, :, 1] = 350.0 + 100.0 * np.sin(6.0 * fast)[:, None] * [1, -1]
+    loads = FootLoads(fast, force, np.zeros((2001, 2, 3)))
+    return Trial("walk", markers, loads, np.ones(201, dtype=bool), ("read from nowhere",))
+
+
+def hidden(trial: Trial, segments, start: float, end: float) -> Trial:
+    """The trial without the markers of these segments from start to end (s), both inclusive."""
+    columns = [
+        i for i, label in enumerate(trial.markers.labels) if any(label in CLEVELAND.segments[s] for s in segments)
+    ]
+    positions = trial.markers.positions.copy()
+    time = trial.markers.time
+    frames = np.flatnonzero((time >= start - 1e-9) & (time <= end + 1e-9))
+    positions[np.ix_(frames, columns)] = np.nan
+    return replace(trial, markers=replace(trial.markers, positions=positions))
+
+
+@pytest.mark.parametrize("heading", [0, 90, 180, -90])
+@pytest.mark.parametrize("askew", [-30, 0, 40])
+def test_facing_turns_every_heading_to_plus_x(trial, heading, askew):
+    """`heading`: the person's, about the vertical (Y) from +X."""
+    turn = Rotation.from_euler("y", heading + askew, degrees=True).as_matrix()
+    upright = replace(trial.markers, positions=np.tile(standing(trial), (3, 1, 1)), time=np.arange(3) / RATE)
+    rotation, angle = facing(upright.rotated(turn), CLEVELAND)
+    assert (angle + heading) % 360 == 0
+    back = Rotation.from_matrix(rotation @ turn).as_euler("yxz", degrees=True)
+    np.testing.assert_allclose(back, [askew, 0.0, 0.0], atol=1e-9)
+
+
+def standing(trial: Trial) -> np.ndarray:
+    skeleton = generic_model().skeleton
+    assert trial.markers.labels == skeleton.labels
+    return skeleton.marker_positions(skeleton.pose(np.zeros((1, 27))))
+
+
+def test_facing_needs_both_asis(trial):
+    markers = hidden(trial, ["pelvis"], 0.0, 3.0).markers
+    with pytest.raises(MarkerSetError, match=r"R\.ASIS and L\.ASIS together"):
+        facing(markers, CLEVELAND)
+
+
+def test_smoothed_coordinates_and_derivatives_are_near_the_truth(skeleton, trial, motion):
+    found = solve_kinematics(skeleton, trial, 0.0, "gcv")
+    here = found.frames
+    for name, share in (("q", 0.01), ("qd", 0.05), ("qdd", 0.15)):
+        truth = getattr(motion, name)[here]
+        error = getattr(found.motion, name) - truth
+        assert np.sqrt(np.mean(error**2)) < share * np.sqrt(np.mean(truth**2))
+    assert found.notes == ("read from nowhere",)
+    assert found.ik.converged.all()
+
+
+def test_the_window_keeps_off_the_ends_by_half_a_period(skeleton, trial):
+    found = solve_kinematics(skeleton, trial, 0.0, 10.0)
+    assert found.window_s == pytest.approx((0.05, 1.95))
+    np.testing.assert_allclose(found.time, trial.markers.time[5:196])
+    assert found.cutoff_hz == 10.0
+
+
+def test_loads_are_smoothed_at_the_cutoff_and_sampled_at_the_frames(skeleton, trial):
+    found = solve_kinematics(skeleton, trial, 0.0, 10.0)
+    expected = 350.0 + 100.0 * np.sin(6.0 * found.time)[:, None] * [1, -1]
+    np.testing.assert_allclose(found.foot_loads[:, :, 1], expected, atol=1.0)
+    assert found.foot_loads.shape == (len(found.time), 2, 6)
+
+
+def test_a_short_gap_is_bridged(skeleton, trial, motion):
+    gapped = hidden(trial, ["shank_r", "foot_r"], 1.0, 1.05)
+    found = solve_kinematics(skeleton, gapped, 0.0, 10.0)
+    knee = skeleton.coordinates.index("knee_angle_r")
+    assert np.isnan(found.ik.q[100:106, knee]).all()
+    assert found.window_s == pytest.approx((0.05, 1.95))
+    assert np.abs(found.motion.q[:, knee] - motion.q[found.frames, knee]).max() < np.radians(1.0)
+
+
+@pytest.mark.parametrize(("start", "window"), [(0.6, (0.91, 1.95)), (1.2, (0.05, 1.19))])
+def test_a_long_gap_ends_the_window(skeleton, trial, start, window):
+    gapped = hidden(trial, ["shank_r", "foot_r"], start, start + 0.3)
+    found = solve_kinematics(skeleton, gapped, 0.0, 10.0)
+    assert found.window_s == pytest.approx(window)
+    assert any("only the longest measured stretch" in note for note in found.notes)
+
+
+def test_the_foot_alone_tells_where_the_shank_is(skeleton, trial):
+    gapped = hidden(trial, ["shank_r"], 0.6, 0.9)
+    assert np.isfinite(solve_kinematics(skeleton, gapped, 0.0, 10.0).ik.q).all()
+
+
+def test_frames_without_measured_contact_are_left_out(skeleton, trial):
+    measured = np.ones(201, dtype=bool)
+    measured[80:90] = False
+    found = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
+    assert found.window_s == pytest.approx((0.90, 1.95))
+
+
+def test_no_usable_frame_names_trial_and_counts(skeleton, trial):
+    measured = np.zeros(201, dtype=bool)
+    measured[100:110] = True
+    gapped = hidden(replace(trial, measured=measured), ["foot_l", "shank_l"], 0.9, 1.2)
+    with pytest.raises(TrialError, match=r"trial 'walk': no frame has both .*frames with it: 10"):
+        solve_kinematics(skeleton, gapped, 0.0, 10.0)
+    with pytest.raises(TrialError, match=r"trial 'walk': the longest stretch .* is 10 frames"):
+        solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
+
+
+def test_a_coordinate_seen_too_seldom_is_named(skeleton, trial):
+    gapped = hidden(trial, ["forearm_r"], 0.04, 3.0)
+    with pytest.raises(TrialError, match=r"trial 'walk': .*elbow_flex_r are visible in 4 frames only"):
+        solve_kinematics(skeleton, gapped, 0.0, 10.0)
+
+
+def test_a_single_frame_is_too_short(skeleton, trial):
+    one = replace(
+        trial,
+        markers=Markers(np.zeros(1), trial.markers.labels, trial.markers.positions[:1]),
+        measured=np.ones(1, bool),
+    )
+    with pytest.raises(TrialError, match=r"trial 'walk': .*visible in 1 frames only"):
+        solve_kinematics(skeleton, one, 0.0, 10.0)
+
+
+def test_bridges_are_between_known_frames_and_at_most_a_tenth_of_a_second():
+    known = np.ones((40, 1), dtype=bool)
+    known[[0, 1, 10, 11, 38, 39]] = False
+    known[20:30] = False
+    filled = _bridged(known, np.arange(40) / 100.0)[:, 0]
+    assert filled[10:12].all()
+    assert not filled[[0, 1, 38, 39]].any()
+    assert not filled[20:30].any()

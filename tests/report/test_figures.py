@@ -1,0 +1,201 @@
+"""The report's figures show the numbers of the fit, and gait events are where the loads say."""
+
+import itertools
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kinertia.report.bsp_figures import bsp_figure, departures, information_figure
+from kinertia.report.coordinate_titles import panels_of, title_of
+from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
+from kinertia.report.page import render
+from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.time_figures import coordinate_figure, moment_figure, motion_change, residual_figure
+from kinertia.trial.data import FootLoads, Markers, Trial
+from kinertia.trial.gait_events import gait_events
+from report_page import figures_of, numbers
+
+
+def test_coordinates_are_drawn_in_degrees_by_side(fit):
+    trial, figure = fit.trials[0], figures_of(render(fit))["trial1-coordinates"]
+    titles = [note["text"] for note in figure["layout"]["annotations"]]
+    knee = titles.index("<b>Knee flexion + (degrees)</b>")
+    drawn = {trace["name"]: numbers(trace["y"]) for trace in figure["data"] if trace["xaxis"] == f"x{knee + 1}"}
+    for side, word in (("r", "right"), ("l", "left")):
+        column = fit.skeleton.coordinates.index(f"knee_angle_{side}")
+        np.testing.assert_allclose(drawn[f"{word}, estimate"], np.degrees(trial.motion.q[:, column]), atol=1e-4)
+        ik = np.degrees(trial.kinematics.ik.q[:, column])
+        measured = drawn[f"{word}, inverse kinematics"]
+        assert len(measured) >= len(trial.time)
+        assert np.isin(measured.astype(np.float32), ik.astype(np.float32)).all()
+    assert len(titles) == 18
+    assert sum("(m)" in title for title in titles) == 3
+
+
+def test_curves_are_thinned_but_not_moved(fit):
+    trial = fit.trials[0]
+    figure = residual_figure(trial, most_frames=20)
+    trace = next(t for t in figure.data if t.name == "estimate" and t.yaxis == "y")
+    assert len(trace.y) <= 20
+    step = -(-len(trial.time) // 20)
+    np.testing.assert_allclose(trace.x0 + trace.dx * np.arange(len(trace.y)), trial.time[::step], atol=1e-6)
+    np.testing.assert_allclose(trace.y, trial.residuals["estimate"][::step, 0], rtol=1e-6)
+
+
+def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit):
+    trial = fit.trials[0]
+    mass = fit.literature.total_mass_kg
+    hip = fit.skeleton.coordinates.index("hip_flexion_r")
+    assert trial.moment_sd is not None
+    plain = moment_figure(replace(trial, moment_sd=None), fit.skeleton, mass)
+    trace = next(t for t in plain.data if t.name == "right, estimate")
+    np.testing.assert_allclose(trace.y, trial.moments["estimate"][:, hip] / mass, rtol=1e-5)
+    assert not any("band" in (t.name or "") for t in plain.data)
+    banded = moment_figure(trial, fit.skeleton, mass)
+    upper = next(k for k, t in enumerate(banded.data) if t.name == "right 95 % band")
+    width = banded.data[upper].y - banded.data[upper - 1].y
+    assert banded.data[upper].xaxis == banded.data[upper - 1].xaxis
+    np.testing.assert_allclose(width, 2 * 1.96 * trial.moment_sd[:, hip] / mass, rtol=1e-3)
+
+
+def test_frames_outside_the_window_are_shaded(fit):
+    kinematics = fit.trials[0].kinematics
+    start, end = kinematics.window_s
+    figure = residual_figure(fit.trials[0])
+    spans = {(round(s.x0, 3), round(s.x1, 3)) for s in figure.layout.shapes if s.type == "rect"}
+    assert all(last <= start + 1e-3 or first >= end - 1e-3 for first, last in spans)
+    assert any(abs(last - start) < 1e-3 for _, last in spans)
+    assert any(abs(first - end) < 1e-3 for first, _ in spans)
+
+
+def test_intervals_are_those_of_the_posterior(fit):
+    figure = bsp_figure(fit)
+    away, posterior = departures(fit), fit.posterior
+    assert away is not None
+    found = {}
+    for trace in figure.data:
+        if (trace.name or "").startswith("estimate"):
+            for x, row, half in zip(trace.x, trace.y, trace.error_x.array, strict=True):
+                found[trace.yaxis, int(row)] = (x, half)
+    assert len(found) == away.size
+    np.testing.assert_allclose(
+        found["y", 3], (away[3, 0], 1.96 * posterior.sd[3, 0] / posterior.prior_sd[3, 0]), rtol=1e-5
+    )
+    lowest, highest = figure.layout.xaxis.range
+    assert all(lowest < x - half and x + half < highest for x, half in found.values())
+
+
+def test_information_map_is_in_percent(fit, two_level):
+    figure = information_figure(fit)
+    np.testing.assert_allclose(figure.data[0].z, 100 * np.clip(fit.posterior.information, 0, 1), rtol=1e-5)
+    assert information_figure(two_level) is None
+    assert not any(trace.error_x.array is not None for trace in bsp_figure(two_level).data)
+
+
+def test_markers_are_sorted_and_gaps_drawn(fit):
+    trial = fit.trials[0]
+    figure = marker_figure(trial, wandering=(trial.kinematics.ik.labels[0],))
+    final = next(t for t in figure.data if t.name == "estimate")
+    assert (np.diff(final.x) <= 1e-6).all()
+    assert sum("counts less" in label for label in final.y) == 1
+    np.testing.assert_allclose(sorted(final.x), sorted(1e3 * rms_by_marker(trial.marker_errors_m["final"])), rtol=1e-5)
+
+    kinematics = trial.kinematics
+    markers = kinematics.trial.markers
+    positions = markers.positions.copy()
+    label = kinematics.ik.labels[2]
+    column = markers.labels.index(label)
+    positions[:, :, 0] = np.where(np.isfinite(positions[:, :, 0]), positions[:, :, 0], 0.0)
+    positions = np.where(np.isfinite(positions), positions, 0.0)
+    assert gap_figure(_with_positions(trial, positions)) is None
+    positions[10:15, column, 1] = np.nan
+    gaps = gap_figure(_with_positions(trial, positions))
+    assert gaps.data[0].y == (label, label, None)
+    first, last, _ = gaps.data[0].x
+    half = 0.5 / markers.rate_hz
+    assert (first, last) == pytest.approx((markers.time[10] - half, markers.time[14] + half), abs=1e-3)
+
+
+def _with_positions(trial, positions):
+    kinematics = trial.kinematics
+    markers = replace(kinematics.trial.markers, positions=positions)
+    return replace(trial, kinematics=replace(kinematics, trial=replace(kinematics.trial, markers=markers)))
+
+
+def test_marker_never_seen_has_no_distance():
+    errors = np.array([[0.003, np.nan], [0.004, np.nan], [np.nan, np.nan]])
+    np.testing.assert_allclose(rms_by_marker(errors), [np.sqrt(12.5e-6), np.nan])
+
+
+@settings(max_examples=25)
+@given(count=st.integers(1, 20), legend=st.integers(0, 6))
+def test_panels_never_overlap(count, legend):
+    traces = [{"type": "scatter", "y": [1.0], "name": f"line {k}"} for k in range(legend)]
+    figure = small_multiples([Panel(f"panel {k}", traces) for k in range(count)], "alt", {})
+    for flat in figure.layout.meta["arrangements"].values():
+        boxes = []
+        for k in range(count):
+            suffix = "" if k == 0 else str(k + 1)
+            boxes.append((*flat[f"xaxis{suffix}.domain"], *flat[f"yaxis{suffix}.domain"]))
+        for i, (left, right, low, high) in enumerate(boxes):
+            assert 0 <= left < right <= 1
+            assert 0 <= low < high <= 1
+            for other_left, other_right, other_low, other_high in boxes[:i]:
+                assert right < other_left or other_right < left or high < other_low or other_high < low
+
+
+def test_coordinates_without_a_partner_keep_their_names():
+    skeleton = SimpleNamespace(
+        name="mine", coordinates=("tilt", "hip_r", "hip_l", "knee_r"), rotational=np.array([True] * 4)
+    )
+    assert [(one.title, one.columns) for one in panels_of(skeleton)] == [
+        ("tilt", {"": 0}),
+        ("hip", {"r": 1, "l": 2}),
+        ("knee r", {"": 3}),
+    ]
+    assert title_of(skeleton, 2) == "hip, left"
+
+
+def test_change_of_motion_matches_the_curves(fit):
+    trial = fit.trials[0]
+    figure = coordinate_figure(trial, fit.skeleton)
+    change = np.degrees(motion_change(trial)[:, np.asarray(fit.skeleton.rotational)])
+    assert f"{np.sqrt(np.nanmean(change**2)):.1f} degrees RMS" in figure.layout.meta["alt"]
+
+
+def walked(loaded, measured=True):
+    """A trial at 100 Hz whose right foot is loaded at these samples of 1000."""
+    time = np.arange(1000) / 1000
+    force = np.zeros((1000, 2, 3))
+    force[:, 0, 1] = np.where(loaded(time), 700.0, 0.0)
+    frames = np.arange(100) / 100
+    seen = np.full(100, measured) if isinstance(measured, bool) else measured(frames)
+    return Trial(
+        "t", Markers(frames, ("a",), np.zeros((100, 1, 3))), FootLoads(time, force, np.zeros_like(force)), seen
+    )
+
+
+def test_events_are_where_the_load_begins_and_ends():
+    trial = walked(lambda t: (t > 0.2) & (t < 0.7) & ~((t > 0.4) & (t < 0.41)))
+    assert [(event.kind, event.side) for event in gait_events(trial)] == [("heel strike", "r"), ("toe off", "r")]
+    assert [event.time_s for event in gait_events(trial)] == pytest.approx([0.2, 0.7], abs=0.002)
+
+
+def test_ends_of_the_record_and_of_the_plates_are_no_events():
+    assert gait_events(walked(lambda t: t < 0.6))[0].kind == "toe off"
+    assert len(gait_events(walked(lambda t: t < 0.6))) == 1
+    assert gait_events(walked(lambda t: (t > 0.2) & (t < 0.7), measured=False)) == []
+    only = gait_events(walked(lambda t: (t > 0.2) & (t < 0.7), measured=lambda t: t < 0.5))
+    assert [event.kind for event in only] == ["heel strike"]
+    assert gait_events(walked(lambda t: (t > 0.3) & (t < 0.32))) == []
+
+
+def test_events_of_the_demo_alternate(fit):
+    for side in "rl":
+        kinds = [event.kind for event in gait_events(fit.trials[0].kinematics.trial) if event.side == side]
+        assert kinds
+        assert all(one != other for one, other in itertools.pairwise(kinds))

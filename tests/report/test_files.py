@@ -1,0 +1,179 @@
+import csv
+import json
+from dataclasses import replace
+from importlib.metadata import version
+
+import numpy as np
+import pytest
+
+from kinertia.errors import FileError
+from kinertia.io.output_folder import check_folder
+from kinertia.report.files import save_fit, summary
+from kinertia.settings import Settings
+
+STAGES = {"literature", "corrected", "estimate"}
+RESULTS = {
+    "report.html", "fit.json", "model.osim",
+    "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
+}  # fmt: skip
+FOR_ALL = {"report.html", "fit.json", "bsp.csv", "model.osim"}
+PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
+
+
+@pytest.fixture(scope="module")
+def saved(short_fit, tmp_path_factory):
+    """One trial of the short fit alone, so that its files stand in the folder itself."""
+    fit = replace(short_fit, trials=short_fit.trials[:1])
+    return fit, save_fit(fit, tmp_path_factory.mktemp("saved") / "new" / "out")
+
+
+def test_files(saved):
+    _, folder = saved
+    assert {path.name for path in folder.iterdir()} == RESULTS
+    assert [path.name for path in folder.parent.iterdir()] == ["out"]
+
+
+def test_fit_json_keeps_its_contract(saved):
+    fit, folder = saved
+    told = json.loads((folder / "fit.json").read_text())
+    assert told["kinertia"] == version("kinertia")
+    assert told["method"] == "two-level"
+    assert told["subject"] == {
+        "name": "A",
+        "sex": "male",
+        "mass_kg": fit.subject.mass_kg,
+        "height_m": fit.subject.height_m,
+    }
+    assert told["settings"] == Settings(method="two-level").model_dump()
+    assert told["total_mass_kg"] == {
+        "measured": fit.subject.mass_kg,
+        "literature": fit.literature.mass_kg.sum(),
+        "estimate": fit.estimate.mass_kg.sum(),
+    }
+    assert told["warnings"] == list(fit.warnings)
+    assert told["notes"] == list(fit.notes)
+    assert told["converged"] == fit.converged
+    (trial,) = told["trials"]
+    assert trial["name"] == "early"
+    assert trial["n_frames"] == 364
+    assert trial["n_dynamic_frames"] == len(fit.trials[0].time) == 31
+    assert trial["window_s"] == pytest.approx([2.8, 3.1])
+    assert {"read", "ik", "estimate", "total"} <= set(trial["seconds"])
+    assert trial["seconds"]["read"] == 0.25
+    assert set(trial["marker_rms_m"]) == {"ik", "final"}
+    for quantity in ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm"):
+        assert set(trial[f"residual_{quantity}"]) == STAGES
+
+
+def test_bsp_csv_keeps_its_contract(saved):
+    fit, folder = saved
+    with (folder / "bsp.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0]) == ["segment", "parameter", "unit", "literature", "estimate"]
+    assert [(row["segment"], row["parameter"]) for row in rows] == [
+        (segment, parameter) for segment in fit.estimate.segments for parameter in PARAMETERS
+    ]
+    assert {row["parameter"]: row["unit"] for row in rows} == dict(
+        zip(PARAMETERS, ["kg"] + ["m"] * 3 + ["kg m2"] * 6, strict=True)
+    )
+    for column, bsp in (("literature", fit.literature), ("estimate", fit.estimate)):
+        values = np.array([float(row[column]) for row in rows]).reshape(12, 10)
+        np.testing.assert_array_equal(values[:, 0], bsp.mass_kg)
+        np.testing.assert_array_equal(values[:, 1:4], bsp.com_m)
+        np.testing.assert_array_equal(values[:, 4:7], np.diagonal(bsp.inertia_kgm2, axis1=1, axis2=2))
+        np.testing.assert_array_equal(values[:, 7], bsp.inertia_kgm2[:, 0, 1])
+        np.testing.assert_array_equal(values[:, 8:], bsp.inertia_kgm2[:, [0, 1], [2, 2]])
+
+
+def table(opensim, path):
+    read = opensim.TimeSeriesTable(str(path))
+    return np.array(read.getIndependentColumn()), list(read.getColumnLabels()), read.getMatrix().to_numpy()
+
+
+def test_opensim_reads_the_motion(saved, opensim):
+    fit, folder = saved
+    time, labels, values = table(opensim, folder / "kinematics.mot")
+    trial, skeleton = fit.trials[0], fit.skeleton
+    np.testing.assert_allclose(time, trial.time, atol=1e-9)
+    assert labels == list(skeleton.coordinates)
+    turning = np.asarray(skeleton.rotational)
+    assert turning.sum() == 24
+    np.testing.assert_allclose(values[:, turning], np.degrees(trial.motion.q[:, turning]), atol=1e-7)
+    np.testing.assert_allclose(values[:, ~turning], trial.motion.q[:, ~turning], atol=1e-9)
+    storage = opensim.Storage(str(folder / "kinematics.mot"))
+    assert storage.isInDegrees()
+    assert storage.getSize() == len(time)
+
+
+@pytest.mark.parametrize(
+    ("file", "stage"), [("inverse_dynamics", "estimate"), ("inverse_dynamics_literature", "literature")]
+)
+def test_opensim_reads_the_joint_loads(saved, opensim, file, stage):
+    fit, folder = saved
+    time, labels, values = table(opensim, folder / f"{file}.sto")
+    np.testing.assert_allclose(time, fit.trials[0].time, atol=1e-9)
+    assert labels[:4] == ["pelvis_tx_force", "pelvis_ty_force", "pelvis_tz_force", "pelvis_tilt_moment"]
+    assert "hip_flexion_r_moment" in labels
+    np.testing.assert_allclose(values, fit.trials[0].moments[stage], rtol=1e-6, atol=1e-9)
+    assert not opensim.Storage(str(folder / f"{file}.sto")).isInDegrees()
+
+
+def test_opensim_reads_residuals_that_give_the_numbers_of_fit_json(saved, opensim):
+    _, folder = saved
+    _, labels, values = table(opensim, folder / "residuals.sto")
+    told = json.loads((folder / "fit.json").read_text())["trials"][0]
+    assert len(labels) == 18
+    for stage in STAGES:
+        for kind, unit in (("force", "N"), ("moment", "Nm")):
+            size = np.linalg.norm(values[:, [labels.index(f"{stage}_{kind}_{axis}") for axis in "xyz"]], axis=1)
+            assert told[f"residual_{kind}_rms_{unit}"][stage] == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
+            assert told[f"residual_{kind}_max_{unit}"][stage] == pytest.approx(size.max(), rel=1e-5)
+
+
+def test_marker_rms_is_over_visible_markers(short_fit):
+    trial = short_fit.trials[0]
+    errors = {stage: values.copy() for stage, values in trial.marker_errors_m.items()}
+    errors["ik"][:, 0] = np.nan
+    errors["ik"][:, 1:] = 0.003
+    told = summary(replace(short_fit, trials=(replace(trial, marker_errors_m=errors),)))
+    assert told["trials"][0]["marker_rms_m"]["ik"] == pytest.approx(0.003)
+
+
+def test_several_trials_have_a_folder_each(short_fit, tmp_path):
+    folder = save_fit(short_fit, tmp_path / "out")
+    assert {path.name for path in folder.iterdir()} == {*FOR_ALL, "early", "late"}
+    for name in ("early", "late"):
+        assert {path.name for path in (folder / name).iterdir()} == RESULTS - FOR_ALL
+    assert [trial["name"] for trial in json.loads((folder / "fit.json").read_text())["trials"]] == ["early", "late"]
+
+
+def test_results_replace_older_ones_and_leave_other_files_alone(saved, tmp_path):
+    fit, _ = saved
+    (tmp_path / "fit.json").write_text("old")
+    (tmp_path / "mine.txt").write_text("kept")
+    save_fit(fit, tmp_path)
+    assert json.loads((tmp_path / "fit.json").read_text())["kinertia"] == version("kinertia")
+    assert (tmp_path / "mine.txt").read_text() == "kept"
+    assert {path.name for path in tmp_path.iterdir()} == RESULTS | {"mine.txt"}
+
+
+def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
+    fit, _ = saved
+
+    def full_disk(path, *_):
+        path.write_text("half a")
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr("kinertia.report.files.write_sto", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        save_fit(fit, tmp_path / "deep" / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder_that_is_a_file(tmp_path):
+    (tmp_path / "taken").write_text("")
+    for folder in (tmp_path / "taken", tmp_path / "taken" / "out"):
+        with pytest.raises(FileError, match="taken: is a file"):
+            check_folder(folder)
+    check_folder(tmp_path / "new" / "folder")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]

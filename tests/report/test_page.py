@@ -1,0 +1,375 @@
+"""What the report says, without a browser: words, safety of the page, provenance, notebooks."""
+
+import hashlib
+import json
+import os
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from command_line import run
+from kinertia.checks.verdict import verdicts
+from kinertia.io.provenance import provenance_of
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.dynamics import Motion
+from kinertia.report.headline import words
+from kinertia.report.page import MOST_TRIALS, bsp_rows, render
+from kinertia.report.wording import fixed
+from kinertia.settings import read_subject
+from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
+from report_page import Elements, figures_of
+
+MOST_BYTES = 8_000_000
+PARTS = ["verdict", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
+
+
+@pytest.fixture(scope="module")
+def page(fit):
+    return render(fit)
+
+
+@pytest.mark.parametrize("which", ["fit", "two_level"])
+def test_headline_follows_the_worst_judgement(which, request):
+    fit = request.getfixturevalue(which)
+    told = words(fit)
+    levels = [verdict.level for verdict in verdicts(fit)]
+    assert told.judgements == tuple(verdicts(fit))
+    worst = "against" if "against" in levels else "okay" if "okay" in levels else "good"
+    assert told.level == worst
+    stopped = words(replace(fit, converged=False))
+    assert stopped.level == "against"
+    assert f"{levels.count('against') + fit.converged} of {len(levels)} checks" in stopped.headline
+
+
+def test_estimates_far_from_the_literature_are_named(fit):
+    table = fit.literature.table().copy()
+    row = fit.literature.segments.index("shank_l")
+    table[row, 2] -= 2.5 * fit.posterior.prior_sd[row, 2]
+    moved = replace(fit, estimate=BodySegmentParameters.from_table(fit.literature.segments, table))
+    (said,) = words(moved).departures
+    assert said.startswith("CoM upward of shank, left:")
+    assert "-2.5 deviations" in said
+    table[row, 2] += 0.6 * fit.posterior.prior_sd[row, 2]
+    near = replace(fit, estimate=BodySegmentParameters.from_table(fit.literature.segments, table))
+    assert words(near).departures == ()
+    table[:, 0] += 3.0 * fit.posterior.prior_sd[:, 0]
+    table[:, 4] += 4.0 * fit.posterior.prior_sd[:, 4]
+    many = words(replace(fit, estimate=BodySegmentParameters.from_table(fit.literature.segments, table))).departures
+    assert all("+4.0" in sentence for sentence in many[:12])
+    assert "12 more" in many[12]
+
+
+def test_what_the_data_told_is_counted(fit, two_level):
+    sd = fit.posterior.prior_sd.copy()
+    sd[0] *= np.sqrt(1 - 0.8)
+    sd[1] *= np.sqrt(1 - 0.5)
+    told = words(replace(fit, posterior=replace(fit.posterior, sd=sd))).knowledge
+    assert "measured 10 " in told[0]
+    assert "informed 10;" in told[0]
+    assert "100 are hardly informed" in told[0]
+    assert "from the literature" in told[0]
+    assert told[1:4] == (
+        "masses measured: pelvis",
+        "masses informed by the data: torso",
+        "masses hardly informed by the data, not to be read as this person's: thigh; shank; foot; upper arm; forearm",
+    )
+    assert told[4].startswith("17 combinations no motion ever shows")
+    (only,) = words(two_level).knowledge
+    assert "no error bars" in only
+
+
+@pytest.fixture(scope="module")
+def of_model(fit):
+    """The demo's fit as if its forearms were held and its start an OpenSim model's."""
+    rows = [fit.estimate.segments.index(name) for name in ("forearm_r", "forearm_l")]
+    prior_sd, sd = fit.posterior.prior_sd.copy(), fit.posterior.sd.copy()
+    prior_sd[rows] = sd[rows] = 0.0
+    table = fit.estimate.table().copy()
+    table[rows] = fit.literature.table()[rows]
+    estimate = BodySegmentParameters.from_table(fit.estimate.segments, table)
+    return replace(
+        fit, estimate=estimate, posterior=replace(fit.posterior, prior_sd=prior_sd, sd=sd), file=SimpleNamespace()
+    )
+
+
+def test_held_segments_are_named_and_not_counted(of_model):
+    told = words(of_model).knowledge
+    assert told[0].startswith("of 100 parameters")
+    assert "kept as the model has them, not estimated: forearm" in told
+    assert not any("forearm" in sentence for sentence in told if sentence.startswith("masses"))
+    page = render(of_model)
+    figures = figures_of(page)
+    for axis in ("yaxis", "yaxis2"):
+        assert not any("forearm" in name for name in figures["bsp-intervals"]["layout"][axis]["ticktext"])
+    assert len(figures["bsp-information"]["data"][0]["y"]) == 10
+    assert "Kept as the model has them" in Elements(page).text
+    held = [row for row in bsp_rows(of_model) if row["segment"].startswith("forearm")]
+    assert len(held) == 20
+    assert {row["evidence"] for row in held} == {"held"}
+    assert "nan" not in re.findall(r'data-sort="([^"]*)"', page)
+
+
+def test_start_is_called_what_it_is(fit, of_model):
+    for one, word in ((fit, "literature values"), (of_model, "the model's own values")):
+        assert any(word in (trace.name or "") for trace in one.plot.residuals().data)
+        assert any(word in (trace.name or "") for trace in one.plot.moments().data)
+    assert "literature" not in Elements(render(replace(of_model, warnings=(), notes=()))).text.lower()
+
+
+def test_numbers_in_the_table_have_the_digits_of_their_unit(fit):
+    for row in bsp_rows(fit):
+        texts = [row[name]["text"] for name in ("before", "estimate", "prior_sd", "sd")]
+        assert not any("e" in text or (text.startswith("-") and float(text) == 0) for text in texts)
+        digits = {len(text.partition(".")[2]) for text in texts}
+        assert len(digits) == 1
+        assert digits <= ({2} if "(kg)" in row["parameter"] else {1} if "(mm)" in row["parameter"] else {4, 5, 6})
+        assert float(row["sd"]["text"]) == pytest.approx(row["sd"]["value"], rel=0.06, abs=0.051)
+    assert fixed(-0.04, 1) == fixed(-0.04, 1, sign=True) == "0.0"
+    assert (fixed(0.06, 1, sign=True), fixed(-0.06, 1)) == ("+0.1", "-0.1")
+    assert not re.search(r"(?<![\d.])[-+]0\.0+(?!\d)", Elements(render(fit)).text)
+
+
+def test_the_change_of_motion_is_told_against_inverse_kinematics(fit):
+    trial = fit.trials[0]
+    q = trial.kinematics.ik.q[trial.kinematics.frames].copy()
+    knee = fit.skeleton.coordinates.index("knee_angle_l")
+    q[:, knee] += np.radians(12.0)
+    q[:, 2] -= 0.030
+    turned = replace(trial, motion=replace(trial.motion, q=q))
+    said = words(replace(fit, trials=(turned,))).motion[1]
+    assert "most of all knee flexion, left by 12.0" in said
+    assert f"changed by {12 / np.sqrt(24):.1f} degrees" in said
+    assert "moved by 30 mm (RMS), 30 mm at most" in said
+
+
+def test_page_has_all_parts_and_is_small_enough(page):
+    told = Elements(page)
+    sections = [attrs["id"] for attrs in told.named("section")]
+    assert sections == PARTS
+    assert len(page.encode()) <= MOST_BYTES
+    assert page.count("plotly.js v") == 1
+    ids = [attrs["id"] for _, attrs in told.tags if "id" in attrs]
+    assert len(set(ids)) == len(ids)
+    links = {attrs["href"] for attrs in told.named("a")}
+    assert links == {f"#{name}" for name in (*PARTS, "main")}
+
+
+def test_every_picture_has_words_and_data(page):
+    told = Elements(page)
+    pictures = [attrs for tag, attrs in told.tags if attrs.get("class") == "plot" or tag == "canvas"]
+    assert len(pictures) >= 7
+    for attrs in pictures:
+        assert attrs["role"] == "img"
+        assert len(attrs["aria-label"]) > 40
+    drawn = {attrs["id"] for attrs in told.named("div") if attrs.get("class") == "plot"}
+    assert drawn == set(figures_of(page))
+
+
+def test_page_asks_for_nothing_outside_itself(page):
+    told = Elements(page)
+    for _, attrs in told.tags:
+        assert not attrs.get("src")
+        assert attrs.get("href", "#").startswith("#")
+    (policy,) = [attrs["content"] for attrs in told.named("meta") if "http-equiv" in attrs]
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+    styles = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
+    assert not any("url(" in style or "@import" in style for style in styles)
+
+
+EVIL = '</script><script>alert("x")</script><img src=x onerror=alert(1)>'
+
+
+def test_names_cannot_become_markup(fit, page):
+    subject = fit.subject.model_copy(update={"name": f"<script>{EVIL}"})
+    trial = fit.trials[0]
+    kinematics = trial.kinematics
+    label = kinematics.ik.labels[0]
+    markers = kinematics.trial.markers
+    named = [EVIL if one == label else one for one in markers.labels]
+    ik = replace(kinematics.ik, labels=tuple(EVIL if one == label else one for one in kinematics.ik.labels))
+    renamed = replace(kinematics.trial, name=f"walk {EVIL}", markers=replace(markers, labels=tuple(named)))
+    skeleton = fit.skeleton.with_markers(
+        [replace(m, label=EVIL) if m.label == label else m for m in fit.skeleton.markers]
+    )
+    evil = replace(
+        fit,
+        subject=subject,
+        skeleton=skeleton,
+        trials=(replace(trial, kinematics=replace(kinematics, trial=renamed, ik=ik)),),
+        warnings=(EVIL,),
+        notes=(EVIL,),
+    )
+    made = Elements(render(evil))
+    usual = Elements(page)
+    assert len(made.named("script")) == len(usual.named("script"))
+    assert not made.named("img")
+    assert EVIL in made.text
+    assert subject.name in made.text
+    for html in (evil._repr_html_(), evil.trials[0].kinematics.trial._repr_html_()):
+        assert not Elements(html).named("script")
+        assert EVIL in Elements(html).text
+    labels = figures_of(render(evil))["trial1-markers"]["data"][0]["y"]
+    assert any("&lt;/script&gt;" in one for one in labels)
+    assert not any("<" in one for one in labels)
+
+
+def test_report_tells_warnings_assumptions_and_settings(fit):
+    told = Elements(render(replace(fit, warnings=("beware of the dog",), notes=("the dog bites",)))).text
+    for text in ("beware of the dog", "the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name):
+        assert text in told
+    for name in fit.posterior.calibration:
+        assert name in told
+
+
+def test_two_level_report_says_that_it_has_no_error_bars(two_level):
+    told = Elements(render(two_level))
+    assert "no error bars" in told.text
+    assert "evidence" not in told.text
+    assert {attrs["id"] for attrs in told.named("section")} == set(PARTS)
+
+
+def prolonged(trial, times):
+    """The same trial many times over, with every frame in the window."""
+    kinematics = trial.kinematics
+    shown = kinematics.frames
+
+    def again(array, frames=slice(None)):
+        return np.concatenate([array[frames]] * times)
+
+    markers, loads, ik = kinematics.trial.markers, kinematics.trial.loads, kinematics.ik
+    time = np.arange(times * len(shown)) / markers.rate_hz
+    inside = (loads.time >= kinematics.window_s[0]) & (loads.time < kinematics.window_s[1] + 1 / markers.rate_hz)
+    walked = replace(
+        kinematics.trial,
+        markers=replace(markers, time=time, positions=again(markers.positions, shown)),
+        loads=FootLoads(
+            np.arange(times * inside.sum()) * len(time) / markers.rate_hz / (times * inside.sum()),
+            again(loads.force, inside),
+            again(loads.moment, inside),
+        ),
+        measured=np.ones(len(time), dtype=bool),
+    )
+    solved = replace(ik, time=time, q=again(ik.q, shown), errors_m=again(ik.errors_m, shown))
+    return replace(
+        trial,
+        kinematics=replace(kinematics, trial=walked, ik=solved, window_s=(0.0, float(time[-1]))),
+        motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
+        residuals={stage: again(values) for stage, values in trial.residuals.items()},
+        moments={stage: again(values) for stage, values in trial.moments.items()},
+        moment_sd=again(trial.moment_sd),
+        marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
+    )
+
+
+def test_many_long_trials_stay_below_the_limit(fit):
+    long = prolonged(fit.trials[0], 20)
+    assert len(long.time) > 1500
+    posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 30)
+    made = render(replace(fit, trials=(long,) * 30, posterior=posterior))
+    assert len(made.encode()) <= MOST_BYTES
+    told = Elements(made)
+    assert len(told.named("canvas")) == MOST_TRIALS
+    assert f"first {MOST_TRIALS} of 30 trials" in told.text
+    assert len(render(replace(fit, trials=(long,))).encode()) <= MOST_BYTES
+
+
+def test_command_and_hashes_are_in_the_report(demo_run):
+    demo, folder = demo_run
+    text = (folder / "report.html").read_text()
+    told = Elements(text).text
+    assert f"kinertia demo -o {folder}" in told
+    for name in ("static.trc", "walk.trc", "walk_grf.mot"):
+        assert hashlib.sha256((folder / "lab" / name).read_bytes()).hexdigest() in told
+    assert "neither command nor files" not in told
+    assert "neither command nor files" in render(demo.fit)
+
+
+def test_the_command_in_a_report_repeats_the_fit(demo_run, tmp_path):
+    lab, folder = demo_run[1] / "lab", tmp_path / "my results"
+    given = ("fit", lab / "walk.trc", "--forces", lab / "walk_grf.mot", "--static", lab / "static.trc")
+    given = (*given, "--mass", 72.6, "--height", 1.803, "--sex", "male", "-o", folder)
+    assert run(*given).status in (0, 1)
+    told = Elements((folder / "report.html").read_text()).text
+    command = next(line for line in told.splitlines() if "kinertia fit" in line)
+    again = shlex.split(command[command.index("kinertia fit") :])
+    assert sorted(again[1:]) == sorted(map(str, given))
+    results = (folder / "bsp.csv").read_text()
+    assert run(*again[1:]).status in (0, 1)
+    assert (folder / "bsp.csv").read_text() == results
+
+
+def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
+    demo, _ = demo_run
+    own = tmp_path / "mine.toml"
+    own.write_text("x")
+    wanted = read_subject(demo.subject_file)
+    wanted = wanted.model_copy(update={"model": wanted.model.model_copy(update={"markers": own})})
+    files = provenance_of(wanted, "kinertia fit subject.toml").files
+    above = Path(os.path.commonpath([tmp_path, demo.subject_file.parent]))
+    assert files[str(own.relative_to(above))] == hashlib.sha256(b"x").hexdigest()
+    assert len(files) == 4
+    assert set(provenance_of(read_subject(demo.subject_file), "").files) == {"static.trc", "walk.trc", "walk_grf.mot"}
+
+
+def test_fit_trial_and_parameters_show_themselves(fit, two_level):
+    for one in (fit, two_level):
+        told = Elements(one._repr_html_())
+        assert one.subject.name in told.text
+        assert words(one).headline in told.text
+        assert len(told.named("tr")) == 1 + 2 + 1 + 120
+    trial = fit.trials[0].kinematics.trial
+    told = Elements(trial._repr_html_()).text
+    assert f"{len(trial.markers.time)} frames at 100 Hz" in told
+    start, end = trial.windows()[0]
+    assert f"{start:.3f} to {end:.3f} s" in told
+    assert f"right foot {trial.loads.force[:, 0, 1].max():.0f} N" in told
+    fitted = fit.trials[0]
+    told = Elements(fitted._repr_html_())
+    assert fitted.name in told.text
+    assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in told.text
+    assert len(told.named("tr")) == 3
+    table = Elements(fit.estimate._repr_html_())
+    assert len(table.named("tr")) == 2 + 12
+    assert f"{fit.estimate.mass_kg[1]:.4g}" in table.text
+
+
+def test_recording_shows_itself():
+    time = np.arange(4) / 100
+    positions = np.zeros((4, 2, 3))
+    positions[1, 1] = np.nan
+    markers = Markers(time, ("A", "<B>"), positions)
+    force = np.zeros((4, 1, 3))
+    force[2, 0, 1] = 812.0
+    plates = PlateLoads(time, ("FP1",), force, np.zeros((4, 1, 3)), (None,))
+    told = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
+    for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", "beware"):
+        assert text in told
+    still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
+    assert "1 frames" not in still
+    assert "no force plates" in still
+
+
+def test_pictures_are_those_of_the_report(fit, page):
+    written = figures_of(page)
+    plot = fit.plot
+    for name, figure in (
+        ("trial1-residuals", plot.residuals()),
+        ("trial1-coordinates", plot.coordinates()),
+        ("trial1-moments", plot.moments()),
+        ("trial1-markers", plot.markers()),
+        ("bsp-intervals", plot.bsp()),
+        ("bsp-information", plot.information()),
+    ):
+        assert json.loads(figure.to_json()) == written[name], name
+    assert isinstance(plot.skeleton(fit.trials[0].name), go.Figure)
+    assert len(plot.skeleton().frames) > 30
+    assert plot.gaps() is None or isinstance(plot.gaps(), go.Figure)
+    with pytest.raises(KeyError, match=fit.trials[0].name):
+        plot.residuals("nowhere")

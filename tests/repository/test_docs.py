@@ -1,0 +1,180 @@
+"""The pages against the program: every example runs, every table says what is there, every link leads somewhere."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import typer
+
+import reference
+from command_line import run
+from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
+from kinertia.cli.app import app
+from kinertia.model.marker_set import read_marker_set
+from kinertia.settings import read_subject
+
+
+def _examples():
+    """Blocks that run, by page and folder: they run in order in a folder of their own."""
+    groups = {}
+    for page in PAGES:
+        for block in blocks(page.read_text(encoding="utf-8")):
+            if block.language in ("console", "python"):
+                groups.setdefault((page, block.folder), []).append(block)
+    return [
+        pytest.param(found, folder, id=f"{page.stem}-{folder}", marks=[pytest.mark.slow] * found[0].slow)
+        for (page, folder), found in groups.items()
+    ]
+
+
+@pytest.fixture
+def workshop(tmp_path, monkeypatch, request):
+    """Makes an example's folder, with links to the measured files that it names."""
+
+    def make(name):
+        if name in MEASURED:
+            request.getfixturevalue("shared_data")
+            link_measured(name, tmp_path)
+        monkeypatch.chdir(tmp_path)
+        return tmp_path
+
+    return make
+
+
+@pytest.mark.parametrize(("found", "folder"), _examples())
+def test_examples_run(found, folder, workshop):
+    workshop(folder)
+    namespace = {}
+    for block in found:
+        if block.language == "python":
+            exec(compile(block.text, f"example in {folder}", "exec"), namespace)
+            continue
+        for command, shown in block.commands():
+            program, *arguments = shlex.split(command)
+            assert program == "kinertia"
+            outcome = run(*arguments)
+            assert outcome.status == 0, f"{command}\n{outcome.out}\n{outcome.err}"
+            missing = difference(shown, outcome.out)
+            assert missing is None, f"{command}\nshown on the page:\n{missing}\nreally:\n{outcome.out}"
+
+
+def test_differences_of_outputs_are_seen():
+    assert difference("a 1.0\n...\nb (2.5)", "x\na 1.1 ── c\nb (2.5)\ny") is None
+    assert difference("a 1.0", "a 1.5") == "a 1.0"
+    assert difference("b\n...\na", "a\nb") == "a"
+    assert difference("mass 10.3*", "mass 10.3") == "mass 10.3*"
+
+
+def test_numbers_on_pages_can_be_renewed():
+    assert renewed("a 1.0\n...\nb (2.5)\n", "x\n a  7.0 \nc\nb (-3)\n") == " a  7.0\n...\nb (-3)\n"
+    with pytest.raises(ValueError, match="b"):
+        renewed("b 1", "a 1")
+
+
+def test_subject_file_examples_are_valid(workshop):
+    folder = workshop("gait2354")
+    known = {}
+    for block in blocks((ROOT / "docs" / "subject-file.md").read_text(encoding="utf-8")):
+        assert block.language == "toml"
+        path = folder / f"example{len(known)}.toml"
+        path.write_text(block.text)
+        known[path] = read_subject(path) if "[subject]" in block.text else read_marker_set(path)
+    assert len(known) == 2
+
+
+@pytest.mark.parametrize("page", reference.PAGES, ids=lambda page: page.stem)
+def test_generated_parts_are_up_to_date(page):
+    text = page.read_text(encoding="utf-8")
+    assert "<!-- generated: " in text
+    assert reference.filled(text) == text, "run: python docs/tools/reference.py"
+
+
+def _command_lines(text):
+    """What stands as a command line of Kinertia in code marks or code blocks."""
+    spans = re.findall(r"(?<!`)`(kinertia [^`\n]+)`(?!`)", text)
+    lines = re.findall(
+        r"^(?:    |\$ )?(kinertia (?:[^\n]*\\\n)*[^\n]*)$", re.sub(r"^[^`\n]*[.;:]$", "", text), re.MULTILINE
+    )
+    return [line.replace("\\\n", " ") for line in (*spans, *lines)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_and_options_named_exist(page):
+    commands = dict(reference.commands())
+    general = {name for one in typer.main.get_command(app).params for name in one.opts} | {"--help"}
+    for line in _command_lines(page.read_text(encoding="utf-8")):
+        words = shlex.split(line, comments=True)
+        name = max((name for name in commands if words[: name.count(" ") + 1] == name.split()), key=len, default=None)
+        assert name or words[1].startswith("-"), f"no such command: {line}"
+        known = {option for one in commands[name].params for option in one.opts} | {"--help"} if name else general
+        assert {word for word in words if word.startswith("-")} <= known, line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_and_files_named_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text):
+        assert (page.parent / target).exists(), target
+    for path in re.findall(r"`((?:src|docs|tests|examples|benchmarks)/[\w./-]+)`", text):
+        assert (ROOT / path).exists(), path
+
+
+def _column(page, heading):
+    """Words in code marks in the first column of the table that follows a text of the page."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    table = re.search(r"(?:^\|.*\n)+", text[text.index(heading) :], re.MULTILINE)
+    return [name for row in table[0].splitlines()[2:] for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
+
+
+def test_results_page_names_every_file_and_column(fit_of):
+    fitted = fit_of("gait2354")
+    written = {path.name for path in fitted.folder.iterdir()}
+    assert set(_column("results.md", "<!-- files of kinertia fit -->")) == written
+    assert _column("results.md", "## bsp.csv") == list(pd.read_csv(fitted.folder / "bsp.csv", nrows=1).columns)
+    assert set(_column("results.md", "<!-- keys of fit.json -->")) == set(fitted.summary)
+    assert set(_column("results.md", "<!-- keys of a trial -->")) == set(fitted.trial)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The built site."""
+    for module in ("material", "mkdocstrings_handlers.python", "latex2mathml"):
+        pytest.importorskip(module, reason='needs the documentation tools: pip install -e ".[docs]"')
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    done = subprocess.run(
+        command, cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_site_has_every_page_and_no_equation_left_over(site):
+    for page in PAGES[:-1]:
+        built = (site / f"{page.stem}.html").read_text(encoding="utf-8")
+        assert "arithmatex" not in built
+    method = (site / "method.html").read_text(encoding="utf-8")
+    assert method.count('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block">') >= 5
+
+
+def test_site_fetches_nothing_from_the_network(site):
+    for page in site.glob("*.html"):
+        built = page.read_text(encoding="utf-8")
+        for tag in re.findall(r"<(?:script|link|img|iframe)[^>]*>", built):
+            assert not re.search(r'(?:src|href)="(?:https?:)?//', tag), f"{page.name}: {tag}"
+    for style in site.rglob("*.css"):
+        assert not re.search(r"url\([\"']?https?:", style.read_text(encoding="utf-8")), style.name
+
+
+def test_site_tells_of_every_exported_name(site):
+    import kinertia
+
+    told = (site / "api.html").read_text(encoding="utf-8")
+    for name in kinertia.__all__:
+        assert re.search(rf'id="kinertia\.[\w.]*{name}"', told), name
+    assert Path(site / "search" / "search_index.js").is_file()

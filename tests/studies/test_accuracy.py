@@ -1,0 +1,168 @@
+import json
+
+import numpy as np
+import pytest
+
+from command_line import run
+from kinertia.estimation.prior import literature_prior
+from kinertia.studies.accuracy import (
+    CLASSES,
+    JOINTS,
+    PROOF,
+    SCENARIOS,
+    Draw,
+    MomentAccuracy,
+    attainable,
+    run_accuracy,
+    run_draw,
+    summarised,
+)
+from kinertia.synthetic.faults import CAMERA_SD_M, Faults, measured, tilted
+from kinertia.synthetic.walk import walk, walking_subject
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return walk(walking_subject(), 1.3, trapezoid=False)
+
+
+def made_up(scale: float, seed: int = 0) -> Draw:
+    """Errors that are normal with `scale` times the deviation told."""
+    rng = np.random.default_rng(seed)
+    prior = np.full((12, 10), 2.0)
+    sd = np.tile([0.5, 1.2, 1.9, 1.0, 1.0, 1.0, 1.0, 1.9, 1.9, 1.9], (12, 1))
+    shares = dict.fromkeys(CLASSES, 0.8)
+    angles, moments = (0.1, 0.2), dict.fromkeys(JOINTS, (4.0, 9.0, 0.9))
+    return Draw(
+        scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, shares, angles, angles, moments, True
+    )
+
+
+def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
+    good, small = (summarised("made up", [made_up(scale, seed) for seed in range(200)]) for scale in (1.0, 2.0))
+    for name in (*CLASSES, "measured", "informed", "assumed"):
+        assert good.classes[name].cover == pytest.approx(0.95, abs=0.015)
+        assert good.classes[name].ratio == pytest.approx(1.0, abs=0.04)
+        assert small.classes[name].cover == pytest.approx(0.673, abs=0.03)
+        assert small.classes[name].ratio == pytest.approx(2.0, abs=0.08)
+    assert good.classes["measured"].rms == pytest.approx(0.25, rel=0.1)
+    assert good.classes["measured"].rms_literature == pytest.approx(1.0, rel=0.1)
+    assert good.classes["mass"].better > 0.99
+    assert good.moments["hips"] == MomentAccuracy(2.0, 3.0, pytest.approx(0.9))
+
+
+def test_what_an_estimate_at_the_bound_can_attain():
+    """Known parts: an exact estimate is always better, none at all never, half the variance in between."""
+    prior = literature_prior(walking_subject().literature)
+    root = np.linalg.cholesky(prior.given_scale()[1])
+    exact, half, nothing = (attainable(prior, share * root, np.random.default_rng(0)) for share in (1e-6, 0.7, 1.0))
+    assert set(exact.values()) == {1.0}
+    assert all(nothing[name] + 0.1 < share < 1.0 for name, share in half.items())
+    assert max(nothing.values()) < 0.6
+
+
+def test_draws_do_not_depend_on_the_number_of_processes():
+    one, two = (run_accuracy({"artefact": PROOF["artefact"]}, 2, seed=4, workers=workers) for workers in (1, 2))
+    assert one == two
+
+
+@pytest.mark.slow
+def test_people_are_the_same_in_every_scenario():
+    draws = [run_draw(1, (SCENARIOS[key], 3)) for key in ("study", "gain")]
+    np.testing.assert_array_equal(draws[0].literature_errors, draws[1].literature_errors)
+    assert not np.allclose(draws[0].errors, draws[1].errors)
+
+
+def test_bars_hold_short_form():
+    """Eight people: cover cannot be told better than to some percent."""
+    found = run_accuracy({"artefact": PROOF["artefact"]}, 8)["artefact"]
+    assert found.converged == 1.0
+    for name in CLASSES:
+        accuracy = found.classes[name]
+        assert accuracy.cover > 0.90
+        assert 0.75 < accuracy.ratio < 1.25
+        assert accuracy.rms < 1.3 * accuracy.bound
+    assert found.classes["mass"].rms < found.classes["mass"].rms_literature
+    assert found.classes["CoM"].rms < found.classes["CoM"].rms_literature
+    for joint in JOINTS:
+        assert found.moments[joint].cover > 0.92
+        assert found.moments[joint].sd_nm < 2.0 * found.moments[joint].rms_nm
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", PROOF)
+def test_bars_hold(key):
+    found = run_accuracy({key: PROOF[key]}, 60)[key]
+    for name in CLASSES:
+        assert 0.92 < found.classes[name].cover < 0.98
+        assert 0.85 < found.classes[name].ratio < 1.15
+        assert found.classes[name].rms < 1.3 * found.classes[name].bound
+    for joint in JOINTS:
+        assert found.moments[joint].cover > 0.93
+
+
+def test_faults_are_what_they_say(trial):
+    rng = np.random.default_rng
+    plain_skeleton, (plain,) = measured([trial], Faults("artefact"), rng(1))
+    assert plain_skeleton is trial.skeleton
+    _, (gained,) = measured([trial], Faults("artefact", gain=0.02), rng(1))
+    right, left = 0, 1
+    np.testing.assert_allclose(gained.trial.loads.force[:, right], 1.02 * plain.trial.loads.force[:, right])
+    np.testing.assert_allclose(gained.trial.loads.force[:, left], plain.trial.loads.force[:, left])
+    hips, _ = measured([trial], Faults("artefact", hips_m=0.015), rng(1))
+    assert hips.locked["hip_x_r"] == hips.locked["hip_x_l"] == 0.015
+    tilt = tilted(trial.skeleton, np.radians(5.0), rng(1))
+    pairs = [
+        (one, other)
+        for a, b in zip(trial.skeleton.joints, tilt.joints, strict=True)
+        for one, other in zip(a.axes, b.axes, strict=True)
+        if one != other
+    ]
+    assert {one.coordinate.rsplit("_", 1)[0] for one, _ in pairs} == {
+        "knee_angle",
+        "ankle_angle",
+        "subtalar_angle",
+        "elbow_flex",
+    }
+    angles = [np.degrees(np.arccos(np.dot(one.direction, other.direction))) for one, other in pairs]
+    assert angles == pytest.approx([5.0] * 8)
+
+
+def test_all_trials_of_a_person_have_the_same_skin_skeleton_and_instruments(trial):
+    twice = [trial, trial]
+    skeleton, (one, other) = measured(twice, Faults("artefact", calibration=True), np.random.default_rng(1))
+    assert skeleton is not trial.skeleton
+    apart = one.trial.markers.positions - other.trial.markers.positions
+    assert np.std(apart) == pytest.approx(np.sqrt(2.0) * CAMERA_SD_M, rel=0.02)
+    np.testing.assert_array_equal(one.trial.loads.force, other.trial.loads.force)
+    np.testing.assert_array_equal(one.trial.loads.moment, other.trial.loads.moment)
+
+
+def test_wobbling_mass_keeps_impulse_and_weight(trial):
+    """Soft tissue on springs neither adds weight nor pushes the person off: its mean force is small beside its peak."""
+    _, (plain,) = measured([trial], Faults("artefact"), np.random.default_rng(1))
+    _, (wobbled,) = measured([trial], Faults("artefact", wobbling=0.4), np.random.default_rng(1))
+    added = (wobbled.trial.loads.force - plain.trial.loads.force).sum(axis=1)
+    assert 1.0 < np.abs(added).max() < 200.0
+    assert np.abs(added.mean(axis=0)).max() < 0.1 * np.abs(added).max()
+
+
+def test_calibration_errors_move_everything(trial):
+    skeleton, (kinematics,) = measured([trial], Faults("study", calibration=True), np.random.default_rng(2))
+    assert np.std(skeleton.marker_locals - trial.skeleton.marker_locals) == pytest.approx(0.005, rel=0.2)
+    assert skeleton.locked["hip_z_l"] != trial.skeleton.locked["hip_z_l"]
+    share = kinematics.trial.loads.force[:, :, 1].sum() / trial.foot_loads[:, :, 1].sum()
+    assert 0.0 < abs(share - 1.0) < 0.08
+
+
+def test_command(tmp_path, monkeypatch):
+    chosen = {key: SCENARIOS[key] for key in ("study_calibration", "gain")}
+    monkeypatch.setattr("kinertia.cli.study.SCENARIOS", chosen)
+    outcome = run("study", "accuracy", "--draws", 2, "--workers", 2, "-o", tmp_path / "out")
+    assert outcome.status == 0, outcome.err
+    told = json.loads((tmp_path / "out" / "accuracy.json").read_text())
+    assert set(told["scenarios"]) == set(chosen)
+    assert told["scenarios"]["gain"]["classes"]["mass"]["rms"] > 0
+    for scenario in chosen.values():
+        assert scenario.title in outcome.out
+    assert (tmp_path / "out" / "accuracy.md").read_text().count("| mass (kg) |") == len(chosen)

@@ -1,0 +1,61 @@
+import json
+
+import numpy as np
+import pytest
+
+import kinertia.studies.sensitivity as sensitivity_study
+from command_line import run
+from kinertia.studies.sensitivity import AMPLITUDES, CONDITIONS, SHOWN, WITH_SQUATS, Sensitivity, run_sensitivity
+
+
+def made_up() -> Sensitivity:
+    """Three parameters: one always seen, one lost in noise, one never seen."""
+    errors = {key: np.array([0.2, 0.3, 0.99]) for key in CONDITIONS}
+    errors["study x 2"] = np.array([0.3, 0.7, 1.0])
+    return Sensitivity(("torso.com_z", "thigh.mass", "pelvis.iyy"), errors, 2, 1)
+
+
+def test_answers():
+    found = made_up()
+    assert found.insensitive("study") == ["torso.com_z"]
+    assert found.insensitive("artefact") == ["torso.com_z", "thigh.mass"]
+    assert found.never() == ["pelvis.iyy"]
+
+
+def test_conditions_change_one_thing_at_a_time():
+    assert {f"{kind} x {a:g}" for kind in ("study", "artefact") for a in AMPLITUDES} < set(CONDITIONS)
+    assert CONDITIONS[WITH_SQUATS].others == ("squat",)
+    assert not CONDITIONS["artefact x 1"].others
+    assert CONDITIONS["strides 8"].walk_s == 8 * 1.25
+    assert CONDITIONS["study x 0.25"].faults.amplitude == 0.25
+
+
+@pytest.fixture
+def few_conditions(monkeypatch):
+    kept = {key: CONDITIONS[key] for key in ("study x 0.25", "study x 2")}
+    monkeypatch.setattr(sensitivity_study, "CONDITIONS", kept)
+
+
+def test_noise_makes_errors_larger(few_conditions):
+    found = run_sensitivity(4)
+    small, large = found.errors["study x 0.25"], found.errors["study x 2"]
+    assert small.shape == (7 * len(SHOWN),)
+    assert np.mean(small.reshape(-1, 7)[:, :4]) < np.mean(large.reshape(-1, 7)[:, :4])
+    masses = [i for i, name in enumerate(found.parameters) if name.endswith(".mass")]
+    assert len(masses) == 7
+
+
+def test_command(tmp_path, monkeypatch):
+    monkeypatch.setattr("kinertia.cli.study.run_sensitivity", lambda *arguments: made_up())
+    outcome = run("study", "sensitivity", "-o", tmp_path / "out")
+    assert outcome.status == 0, outcome.err
+    assert "torso.com_z, thigh.mass" in outcome.out
+    told = json.loads((tmp_path / "out" / "sensitivity.json").read_text())
+    assert told["shown_by_no_condition"] == ["pelvis.iyy"]
+    assert (tmp_path / "out" / "sensitivity.png").stat().st_size > 10_000
+    page = (tmp_path / "out" / "sensitivity.md").read_text()
+    assert "noise (8.2 mm RMS at twice): torso.com_z\n" in page
+    assert "not at twice): thigh.mass\n" in page
+    assert "1 of 3 parameters (moments of inertia: 1)" in page
+    assert "| pelvis.iyy | 0.99 | 0.99 | 1.00 |" in page
+    assert (tmp_path / "out" / "sensitivity.csv").read_text().startswith("parameter,study x 0.25")

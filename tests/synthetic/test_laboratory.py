@@ -1,0 +1,122 @@
+import multiprocessing
+
+import numpy as np
+import pytest
+
+from kinertia.errors import TrialError
+from kinertia.estimation.from_files import read_inputs
+from kinertia.io.c3d_write import write_c3d
+from kinertia.model.marker_set import read_marker_set
+from kinertia.settings import read_subject
+from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
+from kinertia.synthetic.walk import centre_of_pressure, walk, walking_subject
+from kinertia.trial.data import LOAD_THRESHOLD_N, Recording
+from kinertia.trial.plate_assignment import build_trial
+
+RATE_HZ, RATIO = 500.0, 5
+
+
+@pytest.fixture(scope="module")
+def subject():
+    return walking_subject()
+
+
+@pytest.fixture(scope="module")
+def trial(subject):
+    return walk(subject, 2.7, RATE_HZ, 0.75)
+
+
+@pytest.fixture(scope="module", params=["noisy", "perfect"])
+def measured(request, subject, trial):
+    noise = LabNoise() if request.param == "noisy" else PERFECT
+    return record(subject, trial, noise, np.random.default_rng(7), RATIO)
+
+
+def read_back(folder, measured, kind):
+    # in a process of its own: once opensim has been at work in this one, ezc3d cannot write (both are SWIG modules)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        wanted = read_subject(pool.apply(write_lab, (folder / "lab", measured, kind)))
+    static, (walked,), _ = read_inputs(wanted)
+    return wanted, static, walked.recording
+
+
+@pytest.mark.parametrize(
+    ("kind", "place_m", "force_n", "moment_nm"), [("trc", 1e-9, 1e-9, 1e-9), ("c3d", 1e-6, 1e-4, 1e-3)]
+)
+def test_files_give_back_what_was_written(tmp_path, measured, kind, place_m, force_n, moment_nm):
+    """TRC rounds to 1e-6 mm, C3D to single precision."""
+    wanted, static, walked = read_back(tmp_path, measured, kind)
+    assert wanted.subject.mass_kg == measured.walk.mass_kg
+    for found, written in ((static, measured.static), (walked, measured.walk)):
+        assert found.markers.labels == written.markers.labels
+        np.testing.assert_allclose(found.markers.time, written.markers.time, atol=1e-9)
+        np.testing.assert_allclose(found.markers.positions, written.markers.positions, rtol=0, atol=place_m)
+    np.testing.assert_allclose(walked.plates.time, measured.walk.plates.time, atol=1e-9)
+    np.testing.assert_allclose(walked.plates.force, measured.walk.plates.force, rtol=0, atol=force_n)
+    np.testing.assert_allclose(walked.plates.moment, measured.walk.plates.moment, rtol=0, atol=moment_nm)
+    if kind == "c3d":
+        assert walked.mass_kg == pytest.approx(72.6, abs=1e-4)
+        assert walked.height_m == pytest.approx(1.803, abs=1e-6)
+        for found, written in zip(walked.plates.corners, measured.walk.plates.corners, strict=True):
+            gaps = np.linalg.norm(found[:, None] - written, axis=-1)
+            assert gaps.min(axis=0).max() < 1e-6
+        assert not [note for note in walked.notes if "plate" in note]
+
+
+def test_plates_catch_one_whole_contact_of_each_foot(measured, trial):
+    plates = measured.walk.plates
+    loaded = plates.force[:, :, 1] > 0
+    assert loaded.any(axis=0).all()
+    assert not loaded[[0, -1]].any()
+    for p in range(2):
+        pressure = centre_of_pressure(np.hstack([plates.force[:, p], plates.moment[:, p]]))[loaded[:, p]]
+        low, high = plates.corners[p].min(axis=0), plates.corners[p].max(axis=0)
+        assert (pressure[:, [0, 2]] > low[[0, 2]]).all()
+        assert (pressure[:, [0, 2]] < high[[0, 2]]).all()
+    walked_on = (trial.foot_loads[: len(plates.time), :, 1] >= LOAD_THRESHOLD_N).sum()
+    assert loaded.sum() < 0.7 * walked_on
+
+
+def test_pipeline_finds_the_measured_frames(subject, trial):
+    """The steps off the plates are seen by the feet's markers alone."""
+    recording = record(subject, trial, PERFECT, np.random.default_rng(7), RATIO).walk
+    found = build_trial(recording, read_marker_set("cleveland-clinic").foot_labels())
+    on_plates = np.abs(
+        recording.plates.force.sum(axis=1) - trial.foot_loads[: len(recording.plates.time), :, :3].sum(axis=1)
+    )
+    truly = on_plates.max(axis=1)[::RATIO] < 2 * LOAD_THRESHOLD_N
+    assert not (found.measured & ~truly).any()
+    assert (truly & ~found.measured).sum() <= 8
+    assert found.measured.sum() > 90
+
+
+def test_perfect_laboratory_measures_the_truth(subject, trial):
+    walked = record(subject, trial, PERFECT, np.random.default_rng(7), RATIO).walk
+    np.testing.assert_array_equal(walked.markers.positions, trial.markers.positions[: len(walked.plates.time) : RATIO])
+
+
+def test_noise_is_of_the_announced_size(subject, trial):
+    exact = record(subject, trial, PERFECT, np.random.default_rng(7), RATIO)
+    cameras = record(subject, trial, LabNoise(skin="none"), np.random.default_rng(7), RATIO)
+    error = cameras.walk.markers.positions - exact.walk.markers.positions
+    assert error.std() == pytest.approx(0.0005, rel=0.05)
+    study = record(subject, trial, LabNoise(skin="study"), np.random.default_rng(7), RATIO)
+    assert 0.003 < (study.walk.markers.positions - exact.walk.markers.positions).std() < 0.005
+
+
+def test_a_trial_without_whole_contacts_is_refused(subject):
+    with pytest.raises(TrialError, match="two strides"):
+        record(subject, walk(subject, 0.5), PERFECT, np.random.default_rng(0))
+
+
+def test_c3d_needs_corners_and_a_matching_time_base(tmp_path, measured):
+    walked = measured.walk
+    plates = walked.plates
+    without = type(plates)(plates.time, plates.names, plates.force, plates.moment, plates.declared_feet)
+    with pytest.raises(ValueError, match="corners"):
+        write_c3d(tmp_path / "a.c3d", Recording("a", walked.markers, without))
+    late = type(plates)(
+        plates.time + 0.5, plates.names, plates.force, plates.moment, plates.declared_feet, plates.corners
+    )
+    with pytest.raises(ValueError, match="start with the markers"):
+        write_c3d(tmp_path / "a.c3d", Recording("a", walked.markers, late))

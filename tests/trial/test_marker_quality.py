@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kinertia.trial.data import Markers
+from kinertia.trial.marker_quality import axes_trouble, extent_m, travel, visibility
+
+RATE_HZ, FRAMES = 50.0, 100
+BODY_M = np.array([[0.1, 0.05, 0.1], [0.0, 0.9, -0.1], [0.0, 1.6, 0.0]])
+
+
+def markers(path_m=(0.0, 0.0, 0.0), sway_m=0.0):
+    """Three markers that are carried along a path, linear in time, and sway sideways."""
+    share = np.linspace(0, 1, FRAMES)[:, None, None]
+    sway = sway_m * np.sin(40 * share) * np.array([0.0, 0.0, 1.0])
+    return Markers(np.arange(FRAMES) / RATE_HZ, ("HEEL", "ASIS", "HEAD"), BODY_M + share * np.array(path_m) + sway)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=40))
+def test_visibility_counts_frames(seen):
+    positions = np.where(np.array(seen)[:, None, None], 1.0, np.nan) * np.ones((len(seen), 1, 3))
+    (found,) = visibility(Markers(np.arange(len(seen)) / RATE_HZ, ("A",), positions))
+    gaps = "".join("x" if one else "." for one in seen).split("x")
+    assert found.share == pytest.approx(sum(seen) / len(seen))
+    if len(seen) > 1:
+        assert found.longest_gap_s == pytest.approx(max(map(len, gaps)) / RATE_HZ)
+
+
+@pytest.mark.parametrize(
+    ("path", "axis", "off"),
+    [((2, 0, 0), "+X", 0), ((-2, 0, 0), "-X", 0), ((0, 0, 2), "+Z", 0), ((0, 0, -2), "-Z", 0), ((2, 0, -0.5), "+X", 14),
+     ((-2, 0, 0.2), "-X", 6)],
+)  # fmt: skip
+def test_direction_of_the_walk(path, axis, off):
+    found = travel(markers(path))
+    assert found.kind == "walks"
+    aside = f" ({off} degrees off)" if off else ""
+    assert found.sentence().startswith(f"walks along {axis}{aside}, ")
+    assert found.speed_m_s == pytest.approx(np.hypot(path[0], path[2]) / ((FRAMES - 1) / RATE_HZ), rel=1e-6)
+
+
+def test_standing_and_moving_on_the_spot():
+    assert travel(markers(sway_m=0.005)).kind == "stands still"
+    assert travel(markers(sway_m=0.2)).kind == "moves on the spot"
+    nobody = Markers(np.arange(3.0), ("A",), np.full((3, 1, 3), np.nan))
+    assert travel(nobody).kind == "stands still"
+    assert np.isnan(extent_m(nobody)).all()
+    assert axes_trouble(extent_m(nobody)) == ""
+
+
+def test_walk_is_seen_through_gaps():
+    walk = markers((2, 0, 0))
+    positions = walk.positions.copy()
+    positions[10:40, 0] = positions[60:, 1] = positions[:5] = np.nan
+    found = travel(Markers(walk.time, walk.labels, positions))
+    assert found.kind == "walks"
+    assert found.direction_deg == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("turned", "words"),
+    [
+        (np.eye(3), ""),
+        (np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]), "along Z"),
+        (np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]), "along X"),
+        (1000 * np.eye(3), "reach 1.55e+03 m"),
+        (0.001 * np.eye(3), "reach 0.00155 m"),
+    ],
+)
+def test_axes_and_unit(turned, words):
+    walk = markers((2, 0, 0))
+    trouble = axes_trouble(extent_m(Markers(walk.time, walk.labels, walk.positions @ np.transpose(turned))))
+    assert words in trouble
+    assert bool(trouble) == bool(words)

@@ -1,0 +1,297 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.errors import MarkerSetError, TrialError
+from kinertia.io.recording import read_recording
+from kinertia.trial.data import FootLoads, Markers, PlateLoads, runs
+from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
+from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
+from walk_on_plates import ALL_STEPS, FEET, walk
+
+
+def expect_window(trial, start_s, end_s):
+    assert len(trial.windows()) == 1
+    start, end = trial.windows()[0]
+    assert start == pytest.approx(start_s, abs=0.02)
+    assert end == pytest.approx(end_s, abs=0.02)
+
+
+def test_which_plate_a_foot_stands_on():
+    """Between two steps it is the plate nearest in time; a step of the right foot is on plates 1, 3, 5, 7."""
+    loads = build_trial(walk(ALL_STEPS), FEET).loads
+    assert loads.plates[2] == "plate 3"
+    for plate, (side, number) in enumerate(ALL_STEPS[2:6], start=2):
+        begin = (0.2 if side == "r" else 0.7) + number
+        near = (loads.time > begin - 0.15) & (loads.time < begin + 0.75)
+        assert (loads.carrier[near, "rl".index(side)] == plate).all()
+
+
+def test_a_foot_on_two_plates_counts_for_the_one_that_carries_more():
+    recording = walk([("r", 0), ("l", 0)])
+    share = np.array([0.7, 0.3])[:, None]
+    double = replace(
+        recording.plates,
+        names=("a", "b", "c"),
+        force=np.concatenate([recording.plates.force[:, :1] * share, recording.plates.force[:, 1:]], axis=1),
+        moment=np.concatenate([recording.plates.moment[:, :1] * share, recording.plates.moment[:, 1:]], axis=1),
+        declared_feet=(None,) * 3,
+    )
+    loads, _ = assign_plates(replace(recording, plates=double), FEET)
+    assert (loads.carrier[:, 0] == 0).all()
+    assert (loads.carrier[:, 1] == 2).all()
+    np.testing.assert_allclose(loads.force[:, 0], recording.plates.force[:, 0])
+
+
+def test_every_step_on_a_plate():
+    trial = build_trial(walk(ALL_STEPS), FEET)
+    assert trial.measured.all()
+    assert trial.notes == ()
+    sides = trial.loads.force[:, :, 1] > 0
+    assert sides[:, 0].mean() == pytest.approx(0.6, abs=0.05)
+    assert sides[:, 1].mean() == pytest.approx(0.6, abs=0.05)
+
+
+def test_each_load_goes_to_the_foot_above_it():
+    trial = build_trial(walk([("r", 0), ("l", 0), ("r", 1)]), FEET)
+    right, left = (trial.loads.force[:, foot, 1] > 0 for foot in range(2))
+    assert runs(right) == [(200, 799), (1200, 1799)]
+    assert runs(left) == [(700, 1299)]
+    recording = walk([("r", 0), ("l", 0), ("r", 1)])
+    np.testing.assert_allclose(trial.loads.moment.sum(axis=1), recording.plates.moment.sum(axis=1))
+
+
+def test_window_ends_where_a_foot_is_off_the_plates():
+    trial = build_trial(walk([("r", 0), ("l", 0), ("r", 1)]), FEET)
+    expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.7 - CONTACT_MARGIN_S)
+
+
+def test_two_plates_measure_one_step_and_no_more():
+    trial = build_trial(walk([("r", 0), ("l", 0)]), FEET)
+    expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.2 - CONTACT_MARGIN_S)
+
+
+def test_missed_plate_splits_the_window():
+    trial = build_trial(walk([step for step in ALL_STEPS if step != ("l", 0)]), FEET)
+    first, second = sorted(trial.windows())
+    assert first == pytest.approx((0.0, 0.7 - CONTACT_MARGIN_S), abs=0.021)
+    assert second == pytest.approx((1.3 + CONTACT_MARGIN_S, 2.99), abs=0.021)
+
+
+@pytest.mark.parametrize("belt_m_s", [0.6, 1.2])
+def test_treadmill(belt_m_s):
+    trial = build_trial(walk(ALL_STEPS, belt_m_s=belt_m_s), FEET)
+    assert trial.measured.all()
+    trial = build_trial(walk([("r", 0), ("l", 0), ("r", 1)], belt_m_s=belt_m_s), FEET)
+    expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.7 - CONTACT_MARGIN_S)
+
+
+def test_flight_between_measured_contacts_is_measured():
+    running = walk(ALL_STEPS, stance_s=0.3, stride_m=3.0)
+    trial = build_trial(running, FEET)
+    flight = (trial.loads.force[:, :, 1] == 0).all(axis=1)
+    assert flight.mean() > 0.3
+    expect_window(trial, 0.2, 2.99)
+    trial = build_trial(walk([("r", 0), ("l", 0), ("r", 1)], stance_s=0.3, stride_m=3.0), FEET)
+    expect_window(trial, 0.2, 1.5)
+
+
+def test_frames_without_forces_are_not_measured():
+    recording = walk(ALL_STEPS)
+    plates = recording.plates
+    kept = (plates.time >= 0.5) & (plates.time < 2.0)
+    cut = PlateLoads(plates.time[kept], plates.names, plates.force[kept], plates.moment[kept], plates.declared_feet)
+    expect_window(build_trial(replace(recording, plates=cut), FEET), 0.5, 2.0)
+
+
+def test_wrong_declared_foot_is_noted():
+    recording = walk([("r", 0), ("l", 0)])
+    declared = replace(recording, plates=replace(recording.plates, declared_feet=("r", "r")))
+    loads, notes = assign_plates(declared, FEET)
+    assert (loads.force[800:1200, 1, 1] > 0).all()
+    assert notes == (
+        "walk: plate 2 is declared for the right foot, but from 0.700 to 1.299 s its load is under the left "
+        "foot and was "
+        "given to it",
+    )
+    right = replace(recording, plates=replace(recording.plates, declared_feet=("r", "l")))
+    assert assign_plates(right, FEET)[1] == ()
+
+
+def merged(recording, columns):
+    """The recording with these plates as one."""
+    plates = recording.plates
+    force, moment = (array[:, columns].sum(axis=1, keepdims=True) for array in (plates.force, plates.moment))
+    return replace(recording, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+
+
+def test_plate_that_carries_both_feet_is_divided():
+    recording = walk([("r", 0), ("l", 0)])
+    loads, notes = assign_plates(merged(recording, [0, 1]), FEET)
+    assert (loads.force[200:650, 0, 1] > 0).all()
+    assert (loads.force[850:1300, 1, 1] > 0).all()
+    np.testing.assert_allclose(loads.force.sum(axis=1), recording.plates.force.sum(axis=1))
+    assert notes == (
+        "walk: belt carries both feet in turn from 0.200 to 1.299 s; each sample was given to the nearer foot",
+    )
+
+
+def test_load_far_from_both_feet_is_noted():
+    recording = walk([("r", 0)])
+    plates = recording.plates
+    shift = np.cross((0.0, 0.0, 1.0), plates.force)
+    far = replace(recording, plates=replace(plates, moment=plates.moment + shift))
+    assert assign_plates(far, FEET)[1] == (
+        "walk: plate 1 is loaded from 0.200 to 0.799 s at 1.00 m from the nearest foot; check that it is the person's",
+    )
+
+
+def test_noise_is_no_contact_and_short_gaps_are_none():
+    recording = walk([("r", 0), ("l", 0)])
+    force, moment = recording.plates.force.copy(), recording.plates.moment.copy()
+    force[1500:1510, 0, 1] = 25.0
+    force[400:410, 0] = moment[400:410, 0] = 0.0
+    noisy = replace(recording, plates=replace(recording.plates, force=force, moment=moment))
+    loads, notes = assign_plates(noisy, FEET)
+    assert notes == ("walk: plate 1 has 1 loads shorter than 50 ms, taken as noise",)
+    assert not loads.force[1400:].any()
+    trial = build_trial(noisy, FEET)
+    expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.2 - CONTACT_MARGIN_S)
+
+
+def without(recording, label, start_s, end_s):
+    markers = recording.markers
+    positions = markers.positions.copy()
+    gap = (markers.time >= start_s) & (markers.time <= end_s)
+    positions[gap, markers.labels.index(label)] = np.nan
+    return replace(recording, markers=Markers(markers.time, markers.labels, positions))
+
+
+def test_lost_foot_markers():
+    recording = walk([("r", 0), ("l", 0), ("r", 1)])
+    expect_window(build_trial(without(recording, "L.Toe", 0.9, 1.0), FEET), 0.32, 1.68)
+    expect_window(build_trial(without(recording, "R.Heel", 0.85, 0.95), FEET), 0.32, 1.68)
+    lost = build_trial(without(without(recording, "R.Heel", 0.85, 1.15), "R.Toe", 0.85, 1.15), FEET)
+    assert not lost.measured[88:112].any()
+    with pytest.raises(MarkerSetError, match=r"R.Heel, R.Toe are each seen in less than half"):
+        build_trial(without(without(recording, "R.Heel", 0, 2), "R.Toe", 0, 2), FEET)
+
+
+def test_users_window():
+    recording = walk([("r", 0), ("l", 0)])
+    trial = build_trial(recording, FEET, window_s=(0.1, 1.6))
+    expect_window(trial, 0.1, 1.6)
+    assert "the window 0.100 to 1.600 s was given by the user" in trial.notes[0]
+    assert "measured in 0.3" in trial.notes[0]
+    with pytest.raises(TrialError, match=r"window 7.000 to 8.000 s holds no frame with forces \(they cover 0.000 to"):
+        build_trial(recording, FEET, window_s=(7.0, 8.0))
+
+
+def test_nothing_measured_tells_when_feet_were_where():
+    slow = walk([("r", 0)], stance_s=0.95)
+    with pytest.raises(
+        TrialError, match=r"right foot on the ground .*on a plate 0.250 to 0.600 s; left foot on the ground"
+    ):
+        build_trial(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)
+    idle = walk([("r", 0)])
+    idle = replace(idle, plates=replace(idle.plates, force=0 * idle.plates.force, moment=0 * idle.plates.moment))
+    with pytest.raises(TrialError, match="in no frame"):
+        build_trial(idle, FEET)
+
+
+def test_measured_frames_of_loads_that_are_sorted_already():
+    recording = walk([("r", 0), ("l", 0)])
+    loads, _ = assign_plates(recording, FEET)
+    trial = build_trial(recording, FEET)
+    np.testing.assert_array_equal(measured_frames(recording.markers, loads, FEET), trial.measured)
+
+
+def test_what_is_missing_is_named():
+    recording = walk([("r", 0)])
+    with pytest.raises(TrialError, match="no force plates"):
+        build_trial(replace(recording, plates=None), FEET)
+    with pytest.raises(TrialError, match="only one frame"):
+        build_trial(replace(recording, markers=recording.markers.cut(0.5, 0.5)), FEET)
+    with pytest.raises(MarkerSetError, match=r"'R.Hel' \(nearest: R.Heel"):
+        build_trial(recording, {**FEET, "r": ["R.Hel"]})
+
+
+def clinic(side):
+    return [f"{side}.Heel", f"{side}.Toe.Tip", f"{side}.Midfoot.Lat"]
+
+
+PLUG_IN_GAIT = {"r": ["RHEE", "RTOE", "RANK"], "l": ["LHEE", "LTOE", "LANK"]}
+
+REAL = {
+    "gait2354": (
+        ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot", "gait2354/subject01_walk1_grf.xml"),
+        {"r": clinic("R"), "l": clinic("L")},
+        (0.0, 2.5),
+    ),
+    "rajagopal": (
+        ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot", "rajagopal_walk/grf_walk.xml"),
+        {"r": ["R.Heel", "R.MT5", "R.Toe"], "l": ["L.Heel", "L.MT5", "L.Toe"]},
+        (0.47, 1.96),
+    ),
+    "pig a": (("pig_c3d/subject_a_walk.c3d",), PLUG_IN_GAIT, (2.75, 3.59)),
+    "pig b": (("pig_c3d/subject_b_walk.c3d",), PLUG_IN_GAIT, (2.63, 3.53)),
+    **{
+        name: (
+            (f"subject4/{name}.trc", f"subject4/{name}_grf.mot", f"subject4/{name}_external_forces.xml"),
+            {"r": ["r_calc", "r_5meta", "r_toe"], "l": ["L_calc", "L_5meta", "L_toe"]},
+            window,
+        )
+        for name, window in {"walking1": (0.12, 1.3), "walking2": (0.12, 1.31), "squats1": (0.0, 13.45)}.items()
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def real(shared_data):
+    def read(name):
+        files, feet, window = REAL[name]
+        return read_recording(*(shared_data / file for file in files)), feet, window
+
+    return read
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_measured_window_of_real_trials(real, name):
+    recording, feet, window = real(name)
+    trial = build_trial(recording, feet)
+    assert len(trial.windows()) == 1
+    assert trial.windows()[0] == pytest.approx(window, abs=0.025)
+    wrong = [note for note in trial.notes if "is declared for the right foot" in note]
+    assert len(wrong) == (1 if name in ("walking1", "walking2", "squats1") else 0)
+
+
+MASSES = {"gait2354": (0.62, 1.85, 72.6), "rajagopal": (0.6, 1.75, 85.0), "walking1": (0.13, 1.08, 60.0)}
+
+
+@pytest.mark.parametrize("name", MASSES)
+def test_measured_stride_carries_the_body(real, name):
+    recording, feet, _ = real(name)
+    start, end, mass_kg = MASSES[name]
+    loads = build_trial(recording, feet).loads
+    stride = (loads.time >= start) & (loads.time <= end)
+    mean = loads.force[stride, :, 1].sum(axis=1).mean() / 9.80665
+    assert mean == pytest.approx(mass_kg, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["gait2354", "rajagopal", "pig a", "pig b", "walking1", "walking2"])
+def test_markers_find_contacts_whose_force_is_hidden(real, name):
+    """Take the load away from one contact at a time and find it again from what the others taught."""
+    recording, feet, _ = real(name)
+    loads, _ = assign_plates(recording, feet)
+    time = recording.markers.time
+    loaded = ground_contact(recording.markers, loads, feet).loaded
+    for foot in range(2):
+        for first, last in runs(loaded[:, foot]):
+            force = loads.force.copy()
+            force[(loads.time >= time[first] - 0.02) & (loads.time <= time[last] + 0.02), foot] = 0.0
+            ground = ground_contact(recording.markers, FootLoads(loads.time, force, loads.moment), feet).ground
+            (found,) = [run for run in runs(ground[:, foot]) if run[0] <= (first + last) // 2 <= run[1]]
+            limit = CONTACT_SLACK_S + CONTACT_MARGIN_S + 1e-6
+            assert abs(time[found[0]] - time[first]) <= limit
+            assert abs(time[found[1]] - time[last]) <= limit
