@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.model.bsp import BodySegmentParameters
 
 
 def errors(found: BodySegmentParameters, truth: BodySegmentParameters) -> tuple[float, float, float]:

@@ -23,12 +23,12 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prepare import calibrate
+from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from kinertia.model.anthropometry import literature_bsp
-from kinertia.model.bsp import ParameterVector
 from kinertia.model.marker_set import MarkerSet, choose_marker_set
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.inverse_kinematics import solve_ik

@@ -12,8 +12,9 @@ from kinertia.estimation.prior import BspPrior, with_symmetry
 from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, estimate_two_level
-from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import smooth

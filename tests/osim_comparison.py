@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.io.osim.reader import OsimModel
+from kinertia.model.imported import OsimModel
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 
 MODELS = (

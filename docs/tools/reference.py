@@ -15,8 +15,9 @@ from typing import Any
 import typer
 
 from kinertia.cli.app import app
+from kinertia.io.subject_file import Model, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
-from kinertia.settings import Model, Settings, Subject, Table, TrialFiles
+from kinertia.settings import Settings, Subject, Table
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))

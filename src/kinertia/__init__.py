@@ -1,33 +1,134 @@
 """Body segment parameters from gait: motion-capture markers and ground reaction forces in, BSPs out.
 
-What a notebook needs first; every step of `estimate_bsp` is a function of its own module.
+Everything public is here: `import kinertia` and take it from there. A name is loaded when it is first used (PEP 562),
+so that the import itself costs next to nothing.
+
+    import kinertia
+
+    fit = kinertia.fit_subject("subject.toml")
+    fit.bsp                # a pandas table
+    fit.save("results")
 """
 
-from importlib.metadata import version
+from __future__ import annotations
 
-__version__ = version("kinertia")
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-# `kinertia.report.files` writes the version, so it must be there before the imports
-from kinertia.errors import KinertiaError
-from kinertia.estimation.estimate import Fit, TrialFit, estimate_bsp
-from kinertia.estimation.prepare import TrialInput
-from kinertia.io.recording import read_recording
-from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.marker_set import read_marker_set
-from kinertia.report.files import save_fit
-from kinertia.settings import Settings, Subject, read_subject
+from kinertia.trial import display
 
-__all__ = [
-    "BodySegmentParameters",
-    "Fit",
-    "KinertiaError",
-    "Settings",
-    "Subject",
-    "TrialFit",
-    "TrialInput",
-    "estimate_bsp",
-    "read_marker_set",
-    "read_recording",
-    "read_subject",
-    "save_fit",
-]
+if TYPE_CHECKING:
+    from kinertia.checks.model import ModelCheck as ModelCheck
+    from kinertia.checks.model import check_model as check_model
+    from kinertia.checks.recording import RecordingCheck as RecordingCheck
+    from kinertia.checks.recording import check_recording as check_recording
+    from kinertia.checks.verdict import Verdict as Verdict
+    from kinertia.checks.verdict import verdicts as verdicts
+    from kinertia.errors import FileError as FileError
+    from kinertia.errors import KinertiaError as KinertiaError
+    from kinertia.errors import MarkerSetError as MarkerSetError
+    from kinertia.errors import OsimError as OsimError
+    from kinertia.errors import SettingsError as SettingsError
+    from kinertia.errors import SubjectError as SubjectError
+    from kinertia.errors import TrialError as TrialError
+    from kinertia.estimation.estimate import estimate as estimate
+    from kinertia.estimation.estimate import estimate_bsp as estimate_bsp
+    from kinertia.estimation.estimate import estimate_bsp_of_model as estimate_bsp_of_model
+    from kinertia.estimation.from_files import fit_subject as fit_subject
+    from kinertia.estimation.from_files import prepare_subject as prepare_subject
+    from kinertia.estimation.prepare import Prepared as Prepared
+    from kinertia.estimation.prepare import TrialInput as TrialInput
+    from kinertia.estimation.prepare import prepare as prepare
+    from kinertia.estimation.prepare_osim import prepare_osim as prepare_osim
+    from kinertia.estimation.prior import BspPrior as BspPrior
+    from kinertia.estimation.prior import literature_prior as literature_prior
+    from kinertia.estimation.result import Fit as Fit
+    from kinertia.estimation.result import TrialFit as TrialFit
+    from kinertia.estimation.simultaneous.fit import Posterior as Posterior
+    from kinertia.io.osim.reader import read_osim as read_osim
+    from kinertia.io.recording import read_recording as read_recording
+    from kinertia.io.subject_file import SubjectFile as SubjectFile
+    from kinertia.io.subject_file import read_subject as read_subject
+    from kinertia.model.anthropometry import BodyGeometry as BodyGeometry
+    from kinertia.model.anthropometry import literature_bsp as literature_bsp
+    from kinertia.model.bsp import BodySegmentParameters as BodySegmentParameters
+    from kinertia.model.imported import OsimModel as OsimModel
+    from kinertia.model.marker_set import MarkerSet as MarkerSet
+    from kinertia.model.marker_set import choose_marker_set as choose_marker_set
+    from kinertia.model.marker_set import read_marker_set as read_marker_set
+    from kinertia.model.skeleton import Skeleton as Skeleton
+    from kinertia.motion.dynamics import Motion as Motion
+    from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
+    from kinertia.motion.dynamics import residual as residual
+    from kinertia.report.files import save_fit as save_fit
+    from kinertia.settings import Settings as Settings
+    from kinertia.settings import Subject as Subject
+    from kinertia.studies.cross_validation import HeldOut as HeldOut
+    from kinertia.studies.cross_validation import cross_validate as cross_validate
+    from kinertia.studies.plan import Plan as Plan
+    from kinertia.studies.plan import plan as plan
+    from kinertia.synthetic.walk import SyntheticSubject as SyntheticSubject
+    from kinertia.synthetic.walk import SyntheticTrial as SyntheticTrial
+    from kinertia.synthetic.walk import walk as walk
+    from kinertia.synthetic.walk import walking_subject as walking_subject
+    from kinertia.trial.data import FootLoads as FootLoads
+    from kinertia.trial.data import Markers as Markers
+    from kinertia.trial.data import PlateLoads as PlateLoads
+    from kinertia.trial.data import Recording as Recording
+    from kinertia.trial.data import Trial as Trial
+    from kinertia.trial.plate_assignment import build_trial as build_trial
+
+_ROOMS = {
+    "errors": "FileError KinertiaError MarkerSetError OsimError SettingsError SubjectError TrialError",
+    "settings": "Settings Subject",
+    "trial.data": "FootLoads Markers PlateLoads Recording Trial",
+    "trial.plate_assignment": "build_trial",
+    "model.anthropometry": "BodyGeometry literature_bsp",
+    "model.bsp": "BodySegmentParameters",
+    "model.imported": "OsimModel",
+    "model.marker_set": "MarkerSet choose_marker_set read_marker_set",
+    "model.skeleton": "Skeleton",
+    "motion.dynamics": "Motion inverse_dynamics residual",
+    "io.osim.reader": "read_osim",
+    "io.recording": "read_recording",
+    "io.subject_file": "SubjectFile read_subject",
+    "estimation.estimate": "estimate estimate_bsp estimate_bsp_of_model",
+    "estimation.from_files": "fit_subject prepare_subject",
+    "estimation.prepare": "Prepared TrialInput prepare",
+    "estimation.prepare_osim": "prepare_osim",
+    "estimation.prior": "BspPrior literature_prior",
+    "estimation.result": "Fit TrialFit",
+    "estimation.simultaneous.fit": "Posterior",
+    "checks.model": "ModelCheck check_model",
+    "checks.recording": "RecordingCheck check_recording",
+    "checks.verdict": "Verdict verdicts",
+    "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
+    "studies.cross_validation": "HeldOut cross_validate",
+    "studies.plan": "Plan plan",
+    "report.files": "save_fit",
+}
+"""Where the public names are, from the lowest room up."""
+_HOMES = {name: module for module, names in _ROOMS.items() for name in names.split()}
+
+__all__ = sorted(_HOMES)
+
+# data know nothing of reports: what shows and saves them is loaded when it is first asked for
+display.shown_by("kinertia.report.registration")
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name when it is first used."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: object = version("kinertia")
+    elif name in _HOMES:
+        value = getattr(import_module(f"kinertia.{_HOMES[name]}"), name)
+    else:
+        raise AttributeError(f"module 'kinertia' has no attribute '{name}'")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,80 +1,16 @@
-"""The subject file: one TOML text that says who walked, which files hold the trials, and how to estimate.
-
-    [subject]
-    sex = "female"                 # "male" or "female"
-    mass_kg = 61.5                 # may be left out where a C3D file carries it; so may height_m
-    height_m = 1.68
-
-    [model]
-    static = "static.c3d"          # paths are relative to this file
-    markers = "plug-in-gait"       # a preset or a TOML file of your own; left out: found from the labels
-    # or, in place of both: osim = "scaled.osim"; with calibrate = true its markers and joint centres may move
-
-    [[trial]]                      # as many as there are
-    markers = "walk1.trc"          # a C3D file needs no `forces`
-    forces = "walk1_grf.mot"
-    loads = "walk1_grf.xml"        # ExternalLoads: which column of `forces` is what
-    window_s = [0.4, 1.9]          # left out: where every foot on the ground is measured
-
-    [settings]                     # every one has a default, see `Settings`
-    cutoff_hz = 6.0
-
-`read_subject` checks it whole and names the line of what is wrong; `kinertia.io.subject_draft` drafts one.
-"""
+"""Who walked, and how to estimate: `Subject` and `Settings`, tables of the subject file and arguments of functions."""
 
 from __future__ import annotations
 
-import difflib
-import json
-import re
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
-)
-
-from kinertia.errors import FileError, SettingsError, SubjectError
-from kinertia.model.anthropometry import check_subject
-from kinertia.model.marker_set import preset_names
-
-Location = tuple[str | int, ...]
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 
-def _folder(info: ValidationInfo) -> Path:
+def folder_of(info: ValidationInfo) -> Path:
+    """Folder that paths and names in a subject file count from; the current one without a file."""
     return (info.context or {}).get("folder", Path.cwd())
-
-
-def _file(value: object, info: ValidationInfo) -> Path:
-    """An existing file, absolute; a relative one counts from the subject file's folder (the context)."""
-    if not isinstance(value, str | Path):
-        raise ValueError("must be a path in quotes")
-    path = (_folder(info) / Path(value).expanduser()).resolve()
-    if path.is_file():
-        return path
-    if path.is_dir():
-        raise ValueError(f"{path} is a folder; give a file")
-    names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
-    near = difflib.get_close_matches(path.name, names, n=1)
-    raise ValueError(f"no such file in {path.parent}" + (f"; did you mean '{near[0]}'?" if near else ""))
-
-
-def _marker_set(value: object, info: ValidationInfo) -> str | Path:
-    if value in preset_names():
-        return str(value)
-    try:
-        return _file(value, info)
-    except ValueError as error:
-        presets = ", ".join(f"'{name}'" for name in preset_names())
-        raise ValueError(f"{error}; give a marker set's TOML file or one of the presets {presets}") from None
 
 
 def _cutoff(value: object) -> object:
@@ -83,25 +19,7 @@ def _cutoff(value: object) -> object:
     raise ValueError('must be "gcv" or a positive frequency in Hz')
 
 
-def _trial_name(value: object) -> str:
-    """A name that can be a folder's: the results of several trials go to one folder each."""
-    if isinstance(value, str) and value.strip(" .") and not set(value) & set("/\\\0"):
-        return value
-    raise ValueError("must be a name that a folder can have: not empty, and without / and \\")
-
-
-def _window(value: object) -> tuple[float, float]:
-    match value:
-        case [int() | float() as start, int() | float() as end] if start < end:
-            return float(start), float(end)
-    raise ValueError("must be [start, end] in seconds, the start before the end")
-
-
-File = Annotated[Path, BeforeValidator(_file)]
-MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
-TrialName = Annotated[str, BeforeValidator(_trial_name)]
-Window = Annotated[tuple[float, float], BeforeValidator(_window)]
 
 
 class Table(BaseModel):
@@ -126,37 +44,7 @@ class Subject(Table):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, data: Any, info: ValidationInfo) -> Any:
-        return {"name": _folder(info).name or "subject", **data} if isinstance(data, dict) else data
-
-
-class Model(Table):
-    """What the skeleton is built from: a static trial, or an OpenSim model.
-
-    `markers` is a preset's name, an absolute path, or None: detect it.
-    """
-
-    static: File | None = Field(default=None, description="static trial, .c3d or .trc")
-    markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
-    osim: File | None = Field(default=None, description="scaled OpenSim model, .osim, in place of a static trial")
-    calibrate: bool = Field(default=False, description="OpenSim model only; true: markers and joint centres may move")
-
-
-class TrialFiles(Table):
-    """Files of one dynamic trial; `window_s` (start, end) overrides the measured window, s."""
-
-    name: TrialName = Field(description="name in files and report; left out: the marker file's")
-    markers: File = Field(description="markers, .c3d or .trc")
-    forces: File | None = Field(default=None, description="plate forces, .mot or .sto; C3D has its own")
-    loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
-    window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _named(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
-            return data
-        markers = data.get("markers")
-        return {"name": Path(markers).stem if isinstance(markers, str | Path) else "trial", **data}
+        return {"name": folder_of(info).name or "subject", **data} if isinstance(data, dict) else data
 
 
 class Settings(Table):
@@ -177,176 +65,3 @@ class Settings(Table):
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
     )
-
-
-class SubjectFile(Table):
-    """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist."""
-
-    subject: Subject
-    model: Model
-    trials: tuple[TrialFiles, ...] = Field(alias="trial", strict=False, min_length=1)
-    settings: Settings = Settings()
-
-
-def read_subject(path: str | Path) -> SubjectFile:
-    """Read and check a subject file.
-
-    Raises:
-        FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or
-            wrong value, no such trial file, two trials of one name, implausible mass); with the line.
-    """
-    path = Path(path).resolve()
-    text, content = _parsed(path)
-    lines = _lines(text)
-    try:
-        result = SubjectFile.model_validate(content, context={"folder": path.parent})
-    except ValidationError as error:
-        end = text.count("\n") + 1
-        # a trial with an error in it does not count, so that pydantic also finds too few trials
-        errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
-        line, sentence = min((_line(lines, one["loc"]) or end, _sentence(one)) for one in errors)
-        raise FileError(path, sentence, line) from None
-    if lack := _incomplete(result):
-        place, sentence = lack
-        raise FileError(path, sentence, _line(lines, place) or text.count("\n") + 1)
-    subject, names = result.subject, [trial.name for trial in result.trials]
-    mass_kg = 70.0 if subject.mass_kg is None else subject.mass_kg  # left open: any plausible value
-    height_m = 1.7 if subject.height_m is None else subject.height_m
-    try:
-        check_subject(mass_kg, height_m, subject.sex or "male")
-    except SubjectError as error:
-        raise FileError(path, str(error), _line(lines, ("subject", error.field))) from error
-    for index, name in enumerate(names):
-        if name in names[:index]:
-            problem = f"trial '{name}' is there already; give this one a name = \"...\" of its own"
-            raise FileError(path, problem, _line(lines, ("trial", index, "name")))
-    return result
-
-
-def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
-    """The same from a dictionary of the subject file's form, as the command line makes it; paths from here.
-
-    Raises:
-        SettingsError: something is missing, wrong or not there; the message names the entry.
-    """
-    try:
-        result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
-    except ValidationError as error:
-        raise SettingsError(_sentence(error.errors()[0])) from None
-    if problem := _incomplete(result):
-        raise SettingsError(problem[1])
-    return result
-
-
-def _incomplete(wanted: SubjectFile) -> tuple[Location, str] | None:
-    """Where and what the entries lack, or have too much of, for the kind of model."""
-    model = wanted.model
-    for table, key, value in (("model", "static", model.static), ("subject", "sex", wanted.subject.sex)):
-        if value is None and model.osim is None:
-            return (table, key), _sentence({"loc": (table, key), "type": "missing"})
-    if model.osim is not None:
-        for key, given in (("static", model.static), ("markers", model.markers)):
-            if given is not None:
-                return ("model", key), f"[model] has both osim and {key}; the OpenSim model says it all, remove {key}"
-        if wanted.settings.method == "two-level":
-            problem = 'method = "two-level" works on the built-in model only; remove it, or give a static trial'
-            return ("settings", "method"), problem
-    elif model.calibrate:
-        return ("model", "calibrate"), "[model] calibrate goes with osim; the built-in model is always calibrated"
-    return None
-
-
-def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
-    """The same with other settings.
-
-    Raises:
-        SettingsError: a value cannot be.
-    """
-    try:
-        settings = Settings.model_validate({**wanted.settings.model_dump(), **values})
-    except ValidationError as error:
-        detail = error.errors()[0]
-        raise SettingsError(_sentence({**detail, "loc": ("settings", *detail["loc"])})) from None
-    changed = wanted.model_copy(update={"settings": settings})
-    if problem := _incomplete(changed):
-        raise SettingsError(problem[1])
-    return changed
-
-
-def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
-    """The text and what TOML makes of it."""
-    if not path.is_file():
-        raise FileError(path, "no such file; expected a subject file (subject.toml)")
-    raw = path.read_bytes()
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise FileError(path, "not UTF-8 text; save the file in the UTF-8 encoding", line) from error
-    try:
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, _, where = str(error).rpartition(" (at ")
-        number = re.match(r"line (\d+)", where)
-        line = int(number[1]) if number else text.count("\n") + 1
-        hints = {"Invalid value": "; put text in quotes", "Unescaped": "; write paths with / instead of \\"}
-        hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
-        raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
-
-
-def _lines(text: str) -> dict[Location, int]:
-    """Line number (from 1) of every table heading and key, by its place: ("trial", 1, "markers").
-
-    Reads one `[table]`, `[[table]]` or `key =` per line, which is how subject files are written; what stands
-    inside an inline table is found at the key that holds it.
-    """
-    places: dict[Location, int] = {}
-    table: Location = ()
-    counts: dict[Location, int] = {}
-    for number, line in enumerate(text.split("\n"), start=1):
-        if heading := re.match(r"\s*(\[\[?)\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$", line):
-            place = table = _keys(heading[2])
-            if heading[1] == "[[":
-                counts[place] = counts.get(place, -1) + 1
-                place = table = (*place, counts[place])
-        elif key := re.match(r"\s*([\w.\"' -]+?)\s*=", line):
-            place = (*table, *_keys(key[1]))
-        else:
-            continue
-        for size in range(1, len(place) + 1):
-            places.setdefault(place[:size], number)
-    return places
-
-
-def _keys(dotted: str) -> Location:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
-
-
-def _line(lines: dict[Location, int], place: Location) -> int | None:
-    """Line of a place; of the nearest that holds it where the file does not have it."""
-    return next((lines[place[:size]] for size in range(len(place), 0, -1) if place[:size] in lines), None)
-
-
-_TABLES: dict[str, type[Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)
-
-
-def _sentence(detail: Any) -> str:
-    """One sentence for the user from one of pydantic's errors."""
-    *holder, key = detail["loc"]
-    table, kind = str(holder[0] if holder else key), detail["type"]
-    if kind == "extra_forbidden":
-        known = list(_TABLES[table].model_fields) if holder else list(_TABLES)
-        near = difflib.get_close_matches(str(key), known, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-        return f"unknown key '{key}'{f' in [{table}]' if holder else ''}; {hint}"
-    if table == "trial" and (not holder or isinstance(key, int)) and kind != "missing":
-        return "every trial is a table of its own under the heading [[trial]], in double brackets"
-    if not holder:
-        heading = "[[trial]]" if table == "trial" else f"[{table}]"
-        return f"there is no heading {heading} with its entries below; add it"
-    if kind == "missing":
-        return f"[{table}] lacks '{key}' ({_TABLES[table].model_fields[key].description}); add it"
-    problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
-    if kind == "value_error":
-        problem = str(detail["ctx"]["error"])
-    return f"{key} = {json.dumps(detail['input'], default=str, ensure_ascii=False)}: {problem}"

@@ -9,7 +9,7 @@ from kinertia.cli import demo as demo_module
 from kinertia.cli.study import _two_level_verdict
 from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import prepare
-from kinertia.settings import read_subject
+from kinertia.io.subject_file import read_subject
 from kinertia.synthetic.walk import unlike_literature, walking_subject
 from quick_two_level import given_back
 

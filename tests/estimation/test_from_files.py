@@ -2,7 +2,7 @@ import pytest
 
 from kinertia.errors import SettingsError
 from kinertia.estimation.from_files import read_inputs, read_trials
-from kinertia.settings import read_subject
+from kinertia.io.subject_file import read_subject
 from osim_models import PEOPLE, subject_file
 
 

@@ -5,14 +5,8 @@ import numpy as np
 import pytest
 
 from kinertia.errors import SubjectError, TrialError
-from kinertia.estimation.input_checks import (
-    check_masses,
-    check_same_person,
-    complete_subject,
-    fit_warnings,
-    mass_from_force_kg,
-    two_level_warnings,
-)
+from kinertia.estimation.input_checks import check_masses, check_same_person, complete_subject
+from kinertia.estimation.warnings import fit_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.settings import Subject
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Markers, Recording, Trial

@@ -7,9 +7,10 @@ from kinertia.errors import OsimError, SubjectError, TrialError
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.prepare_osim import at_mass, centre_offsets, kind_of, parted, prepare_osim, with_centre_offsets
 from kinertia.estimation.prior import MASS_SD, OTHER_MASS_SD
-from kinertia.io.osim.reader import OsimModel, read_osim
+from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.trc import read_trc
+from kinertia.model.imported import OsimModel
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.settings import Settings, Subject
 

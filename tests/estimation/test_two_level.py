@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from generic_static import balancing_wrench, generic_model, smooth_motion
+from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import (
     MAX_STRETCH_S,
     Integration,
@@ -12,7 +13,7 @@ from kinertia.estimation.two_level import (
     stretches,
 )
 from kinertia.model.anthropometry import literature_bsp
-from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual, root_regressor
 
 

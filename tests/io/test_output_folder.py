@@ -79,7 +79,7 @@ def test_interruption_while_moving_waits_for_the_last_file(tmp_path):
     code = """
         import os, signal, sys
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        from kinertia.io import folder
+        from kinertia.io import output_folder as folder
         move, moved = os.replace, []
         def replace(source, target):
             move(source, target)

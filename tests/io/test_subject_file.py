@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from kinertia.errors import FileError
 from kinertia.io.subject_draft import init_subject
-from kinertia.settings import Settings, _line, _lines, read_subject
+from kinertia.io.subject_file import _line, _lines, read_subject
+from kinertia.settings import Settings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured data are not at {DATA}")

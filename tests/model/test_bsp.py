@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, ParameterVector, combine
+from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, combine
 
 STUDY_SEGMENTS = (
     *("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "thigh_l", "shank_l", "foot_l"),

@@ -16,12 +16,12 @@ import pytest
 from command_line import run
 from kinertia.checks.verdict import verdicts
 from kinertia.io.provenance import provenance_of
+from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
 from kinertia.report.headline import words
 from kinertia.report.page import MOST_TRIALS, bsp_rows, render
 from kinertia.report.wording import fixed
-from kinertia.settings import read_subject
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from report_page import Elements, figures_of
 

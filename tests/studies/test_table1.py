@@ -5,7 +5,7 @@ from dataclasses import asdict, astuple
 import numpy as np
 import pytest
 
-from kinertia.model.bsp import ParameterVector
+from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.studies.table1 import (
     CONDITIONS,
     PUBLISHED,

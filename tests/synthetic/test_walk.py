@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 from kinertia.errors import KinertiaError
+from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import correct_pelvis
-from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.io.subject_file import read_subject
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual, root_regressor
-from kinertia.settings import read_subject
 from kinertia.studies.table1 import measured_trial, symmetric_truth
 from kinertia.synthetic.walk import (
     STATIC_ONLY,

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.checks.verdict import Verdict, impossible_segments
-from kinertia.estimation.input_checks import CONTRADICTING_MASS, FORCE_MASS_TOLERANCE
+from kinertia.checks.verdict import Verdict
+from kinertia.estimation.input_checks import CONTRADICTING_MASS
 from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.anatomy import ModelSegments, model_segments
 from kinertia.model.anthropometry import BodyGeometry, check_subject, literature_bsp
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
 from kinertia.model.skeleton import Skeleton
 
 ARMS_IN_TORSO = 0.42

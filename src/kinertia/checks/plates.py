@@ -6,14 +6,14 @@ The mean vertical force over whole strides is body weight: the body's vertical v
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
 
 import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Recording, Trial, runs
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, Recording, Trial, runs
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates
+from kinertia.trial.strides import periods
 
 _FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
 """Below this a centre of pressure is too noisy to be judged."""
@@ -161,15 +161,3 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     inside = (trial.loads.time >= first - 1e-9) & (trial.loads.time <= last + 1e-9)
     mean = float(trial.loads.force[inside, :, 1].sum(axis=1).mean())
     return ForceMass(mean / GRAVITY_M_S2, first, last, over)
-
-
-def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
-    """Times (s) between landings, and between leavings, of one foot; and from each to the other foot's next."""
-    strides, steps = [], []
-    contacts = [runs(bridged(loads.time, loads.force[:, foot, 1] > 0)) for foot in range(len(FEET))]
-    for edge, recorded in ((0, lambda i: i > 0), (1, lambda i: i < len(loads.time) - 1)):
-        events = [[float(loads.time[run[edge]]) for run in spans if recorded(run[edge])] for spans in contacts]
-        strides += [b - a for times in events for a, b in combinations(times, 2)]
-        both = sorted((time, foot) for foot, times in enumerate(events) for time in times)
-        steps += [b - a for (a, one), (b, other) in pairwise(both) if one != other]
-    return strides, steps

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.input_checks import CONTRADICTING_COM_M
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, second_moments
+from kinertia.estimation.warnings import CONTRADICTING_COM_M
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
 
 if TYPE_CHECKING:
-    from kinertia.estimation.estimate import Fit, TrialFit
+    from kinertia.estimation.result import Fit, TrialFit
 
 Level = Literal["good", "okay", "against"]
 
@@ -31,7 +31,6 @@ PEAK_FORCE_SHARE = 0.05
 GOOD_MARKERS_M, OKAY_MARKERS_M = 0.012, 0.020
 """RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 
-_ROUNDING = 1e-6
 _NAMED = 4
 
 
@@ -61,18 +60,6 @@ def _convergence(fit: Fit) -> Verdict:
     if fit.converged:
         return Verdict("good", "the estimate converged")
     return Verdict("against", "the estimate did not converge: the best step is reported")
-
-
-def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
-    """Segments that no distribution of mass can have.
-
-    Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
-    the triangle inequality, as rounded inertias have it) is let pass.
-    """
-    table, second = bsp.table(), np.linalg.eigvalsh(second_moments(bsp.inertia_kgm2))
-    there = table[:, [0, *range(4, 10)]].any(axis=1)
-    wrong = (bsp.mass_kg <= 0) | (second[:, 0] < -_ROUNDING * np.abs(second).max(axis=1))
-    return [bsp.segments[i] for i in np.flatnonzero(there & wrong)]
 
 
 def _physics(bsp: BodySegmentParameters) -> Verdict:

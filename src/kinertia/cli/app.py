@@ -11,7 +11,6 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from kinertia import __version__
 from kinertia.checks.verdict import Verdict, stands_against, verdicts
 from kinertia.cli.check import check
 from kinertia.cli.options import Force, Output, Quiet, Verbose, results_folder
@@ -19,15 +18,14 @@ from kinertia.cli.plan import crossval, plan
 from kinertia.cli.study import demo, study
 from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.estimate import Fit, estimate_bsp, estimate_bsp_of_model
-from kinertia.estimation.from_files import read_inputs, read_trials
+from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.identifiability import evidence
-from kinertia.io.osim.reader import read_osim
-from kinertia.io.provenance import provenance_of
-from kinertia.io.sto import write_then_rename
+from kinertia.estimation.result import Fit
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.provenance import VERSION, provenance_of
 from kinertia.io.subject_draft import init_subject
+from kinertia.io.subject_file import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.report.files import save_fit, summary
-from kinertia.settings import SubjectFile, read_subject, subject_from_options, with_settings
 
 # typer keeps these line ends: at most 78 columns
 _MANUAL = """Body segment parameters from gait.
@@ -91,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        out.print(__version__)
+        out.print(VERSION)
         raise typer.Exit
 
 
@@ -236,12 +234,7 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
 
 def _run(wanted: SubjectFile) -> Fit:
     with shown_progress() as progress:
-        if wanted.model.osim is not None:
-            own = read_osim(wanted.model.osim)
-            trials, calibrate = read_trials(wanted, progress), wanted.model.calibrate
-            return estimate_bsp_of_model(wanted.subject, own, trials, wanted.settings, calibrate, progress)
-        static, inputs, marker_set = read_inputs(wanted, progress)
-        return estimate_bsp(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
+        return fit_subject(wanted, progress)
 
 
 def _report(fit: Fit) -> None:

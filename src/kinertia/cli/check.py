@@ -20,10 +20,10 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
+from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.model.anthropometry import check_subject
 from kinertia.model.marker_set import MarkerSet, read_marker_set
 from kinertia.report.check_page import save_check_page
-from kinertia.settings import SubjectFile, read_subject
 from kinertia.trial.data import Recording
 
 _MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")

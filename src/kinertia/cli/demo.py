@@ -14,14 +14,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from kinertia.estimation.estimate import Fit, estimate_bsp
+from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import Progress
+from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import provenance_of
+from kinertia.io.subject_file import read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.files import save_fit
-from kinertia.settings import read_subject, with_settings
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 

@@ -9,14 +9,15 @@ from typing import Annotated
 
 import typer
 
-from kinertia import __version__
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.estimation.from_files import read_prepared
+from kinertia.estimation.from_files import prepare_subject
 from kinertia.io.output_folder import complete_folder
-from kinertia.settings import read_subject
+from kinertia.io.provenance import VERSION
+from kinertia.io.subject_file import read_subject
 from kinertia.studies.cross_validation import HeldOut, cross_validate
-from kinertia.studies.plan import Plan, plan_measured, plan_synthetic
+from kinertia.studies.plan import Plan
+from kinertia.studies.plan import plan as plan_motions
 
 
 def plan(
@@ -40,16 +41,15 @@ def plan(
     with shown_progress() as progress:
         if subject is None:
             progress("predicting", 0.0)
-            found = plan_synthetic()
+            found = plan_motions()
         else:
             wanted = read_subject(subject)
-            ready, cutoff_hz = read_prepared(wanted, progress), wanted.settings.cutoff_hz
-            found = plan_measured(ready.skeleton, ready.prior, ready.kinematics, cutoff_hz, ready.freedom)
+            found = plan_motions(prepare_subject(wanted, progress), wanted.settings.cutoff_hz)
     _report_plan(found)
     with complete_folder(output) as work:
         found.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
         counts = {" + ".join(names): found.counts(names) for names in found.sd}
-        told = json.dumps({"kinertia": __version__, "recordings": counts}, indent=2)
+        told = json.dumps({"kinertia": VERSION, "recordings": counts}, indent=2)
         (work / "plan.json").write_text(told + "\n", encoding="utf-8")
     out.print(f"predicted deviation of every parameter in {output / 'plan.csv'}, counts in plan.json")
 
@@ -84,10 +84,10 @@ def crossval(
     results_folder(output, force)
     wanted = read_subject(subject)
     with shown_progress() as progress:
-        found = cross_validate(read_prepared(wanted, progress), wanted.settings.cutoff_hz, progress)
+        found = cross_validate(prepare_subject(wanted, progress), wanted.settings.cutoff_hz, progress)
     _report_crossval(found)
     with complete_folder(output) as work:
-        told = json.dumps({"kinertia": __version__, "held_out": [asdict(held) for held in found]}, indent=2)
+        told = json.dumps({"kinertia": VERSION, "held_out": [asdict(held) for held in found]}, indent=2)
         (work / "crossval.json").write_text(told + "\n", encoding="utf-8")
     out.print(f"results in {output / 'crossval.json'}")
 

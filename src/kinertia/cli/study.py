@@ -11,10 +11,10 @@ import typer
 from kinertia.cli.demo import Demo, run_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.io.subject_file import read_subject
 from kinertia.report.accuracy import HEADINGS, accuracy_rows, angles_sentence, moments_sentence, save_accuracy
 from kinertia.report.sensitivity import save_sensitivity
 from kinertia.report.table1 import save_table1, table1_rows
-from kinertia.settings import read_subject
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial

@@ -1,171 +1,33 @@
-"""The whole way from recordings to body segment parameters: `estimate_bsp` and its result, `Fit`."""
+"""The whole way from recordings to body segment parameters: `estimate_bsp` and its steps."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-from threadpoolctl import threadpool_limits
 
-from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.input_checks import (
-    check_masses,
-    fit_warnings,
-    known,
-    mass_by_force_kg,
-    turning_warnings,
-    two_level_warnings,
-)
+from kinertia.estimation.input_checks import check_masses, known, mass_by_force_kg
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.io.osim.reader import OsimModel
+from kinertia.estimation.warnings import fit_warnings, turning_warnings, two_level_warnings
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
 
-if TYPE_CHECKING:
-    from kinertia.report.plots import FitPlots
 
-
-@dataclass(frozen=True, eq=False)
-class TrialFit:
-    """One trial of a `Fit`. Arrays cover the w frames of the measured window.
-
-    Attributes:
-        kinematics: markers, coordinates and ground reactions before estimation.
-        skeleton: with the markers where they are in this trial (`displacement`).
-        motion: coordinates (rad, m) and derivatives that go with the estimate.
-        residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
-            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
-        moments: joint inverse dynamics (w, 27; N m, N) per stage: "literature", "estimate".
-        moment_sd: (w, 27) posterior deviations of those of the estimate; None after two-level.
-        marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
-        seconds: computing time per stage.
-    """
-
-    kinematics: Kinematics
-    skeleton: Skeleton
-    motion: Motion
-    residuals: Mapping[str, np.ndarray]
-    moments: Mapping[str, np.ndarray]
-    moment_sd: np.ndarray | None
-    marker_errors_m: Mapping[str, np.ndarray]
-    seconds: Mapping[str, float]
-
-    @property
-    def name(self) -> str:
-        """The trial's name."""
-        return self.kinematics.trial.name
-
-    @property
-    def time(self) -> np.ndarray:
-        """(w,) s."""
-        return self.kinematics.time
-
-    @property
-    def coordinates(self) -> pd.DataFrame:
-        """Coordinates of the estimate (rad, m) over time."""
-        names = list(self.kinematics.ik.coordinates)
-        return pd.DataFrame(self.motion.q, index=pd.Index(self.time, name="time"), columns=names)
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows: frames used, distances of the markers, residuals."""
-        from kinertia.report.notebook import trial_fit_html
-
-        return trial_fit_html(self)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Body segment parameters of a person, and what they were estimated from.
-
-    Attributes:
-        subject: with mass and height filled in.
-        settings: as used.
-        skeleton: calibrated model.
-        literature, estimate: body segment parameters before and after; before, those of an OpenSim model are its own.
-        trials: one entry per trial.
-        converged: whether the estimator met its criterion.
-        posterior: error bars and calibration; None after two-level, which has none.
-        warnings: what the user should know before using the numbers; one sentence each.
-        notes: assumptions made on the way; one sentence each.
-        file: the OpenSim model that the skeleton is from, if it is.
-    """
-
-    subject: Subject
-    settings: Settings
-    skeleton: Skeleton
-    literature: BodySegmentParameters
-    estimate: BodySegmentParameters
-    trials: tuple[TrialFit, ...]
-    converged: bool
-    posterior: Posterior | None
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
-    file: OsimModel | None = None
-
-    @cached_property
-    def bsp(self) -> pd.DataFrame:
-        """One row per segment and parameter: segment, parameter, unit, literature, estimate.
-
-        The simultaneous estimate adds prior_sd, sd (deviations before and after), information, and evidence:
-        "measured" (information above 0.75), "informed" (0.25 to 0.75) or "assumed" (the literature's, hardly changed).
-        """
-        table = self.literature.to_frame().rename(columns={"value": "literature"})
-        table = table.assign(estimate=self.estimate.to_frame()["value"])
-        if self.posterior is None:
-            return table
-        told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
-        return table.assign(**told, evidence=[evidence(value) for value in told["information"]])
-
-    def save(self, folder: str | Path) -> Path:
-        """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
-        # estimation does not depend on files, only asks for them when somebody saves
-        from kinertia.report.files import save_fit
-
-        return save_fit(self, folder)
-
-    @property
-    def covariance(self) -> pd.DataFrame | None:
-        """Posterior covariance of all body segment parameters, by "segment.parameter"; None after two-level."""
-        if self.posterior is None:
-            return None
-        names = (self.bsp["segment"] + "." + self.bsp["parameter"]).tolist()
-        return pd.DataFrame(self.posterior.covariance, index=names, columns=names)
-
-    @property
-    def calibration(self) -> pd.DataFrame | None:
-        """Value, prior and posterior deviation and unit of every calibrated quantity; None after two-level."""
-        return None if self.posterior is None else pd.DataFrame(dict(self.posterior.calibration)).T
-
-    @property
-    def plot(self) -> FitPlots:
-        """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
-        # here and in `_repr_html_`: estimation does not depend on the report, only asks for it when somebody looks
-        from kinertia.report.plots import FitPlots
-
-        return FitPlots(self)
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows: verdict, warnings, body segment parameters."""
-        from kinertia.report.notebook import fit_html
-
-        return fit_html(self)
-
-
+@one_blas_thread
 def estimate_bsp(
     subject: Subject,
     static: Recording,
@@ -189,12 +51,11 @@ def estimate_bsp(
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
-    # the matrices are small: BLAS threads cost twice what they give, and ten times on a busy machine
-    with threadpool_limits(limits=1, user_api="blas"):
-        ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress)
-        return _estimate(ready if prior is None else replace(ready, prior=prior), settings or Settings(), progress)
+    ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress)
+    return estimate(ready if prior is None else replace(ready, prior=prior), settings, progress)
 
 
+@one_blas_thread
 def estimate_bsp_of_model(
     subject: Subject,
     model: OsimModel,
@@ -217,11 +78,22 @@ def estimate_bsp_of_model(
         KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
     """
     settings = settings or Settings()
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
+    return estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
 
 
-def _estimate(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
+@one_blas_thread
+def estimate(ready: Prepared, settings: Settings | None = None, progress: Progress = lambda stage, share: None) -> Fit:
+    """Body segment parameters of a prepared person: the last step of `estimate_bsp`.
+
+    Args:
+        ready: as `prepare` or `prepare_osim` makes it.
+        settings: those it was prepared with; defaults if None.
+        progress: called as the work goes on.
+
+    Raises:
+        KinertiaError: the trials contradict each other, or the scale.
+    """
+    settings = settings or Settings()
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     warnings = (

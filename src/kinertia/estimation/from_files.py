@@ -1,4 +1,4 @@
-"""Reads the recordings that a subject file names."""
+"""From a subject file to the recordings that it names, to what an estimator needs, and to a `Fit`."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from kinertia.errors import SettingsError
+from kinertia.estimation.estimate import estimate
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
+from kinertia.estimation.result import Fit
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
+from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.model.marker_set import MarkerSet, read_marker_set
-from kinertia.settings import SubjectFile
 from kinertia.trial.data import Recording
 
 
@@ -29,17 +31,36 @@ def read_inputs(
     return static, read_trials(wanted, progress), marker_set
 
 
-def read_prepared(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> Prepared:
-    """All that an estimator needs of the person: everything read, calibrated, solved and smoothed.
+def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Prepared:
+    """All that an estimator needs of the person in a subject file: everything read, calibrated, solved and smoothed.
+
+    Args:
+        subject: the file, or what `read_subject` made of it.
+        progress: called as the work goes on.
 
     Raises:
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
+    wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
     if wanted.model.osim is not None:
         model, trials = read_osim(wanted.model.osim), read_trials(wanted, progress)
         return prepare_osim(wanted.subject, model, trials, wanted.settings, wanted.model.calibrate, progress)
     static, inputs, marker_set = read_inputs(wanted, progress)
     return prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
+
+
+def fit_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:
+    """Body segment parameters of the person in a subject file: what `kinertia fit` does, in one call.
+
+    Args:
+        subject: the file, or what `read_subject` made of it.
+        progress: called as the work goes on, with a stage's name and the share of it that is done.
+
+    Raises:
+        KinertiaError: a file is missing or broken, or something in it cannot be used.
+    """
+    wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
+    return estimate(prepare_subject(wanted, progress), wanted.settings, progress)
 
 
 def _static(wanted: SubjectFile) -> Path:

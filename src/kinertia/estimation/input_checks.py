@@ -1,41 +1,26 @@
-"""What can be wrong with a subject, a trial or a result, and how to say it.
-
-Errors come before the estimation, warnings after it.
-"""
+"""What can be wrong with a person's mass, height and trials: errors before any estimate."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from kinertia.errors import SubjectError, TrialError
-from kinertia.estimation.two_level import TwoLevelResult
 from kinertia.model.anthropometry import check_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording, Trial
-from kinertia.trial.free_moment import mean_turning
-
-if TYPE_CHECKING:
-    from kinertia.estimation.estimate import TrialFit
 
 T = TypeVar("T")
 
-FORCE_MASS_TOLERANCE = 0.02
-"""Scale and mean vertical force may differ by this share before a warning (DESIGN section 7)."""
 CONTRADICTING_MASS = 0.10
 """Scale and vertical force, or two trials, may differ by this share before the simultaneous estimate refuses."""
 _OTHER_PERSON_M, _OTHER_PERSON = 0.04, 0.15
 """Two markers of a segment may differ in distance by this much between trials of one person: length, or share."""
-ESTIMATE_TOLERANCE = 0.03
-"""Scale and estimated total mass may differ by this share before a warning."""
-CONTRADICTING_COM_M = 0.1
-"""A centre of mass this far from the literature contradicts it."""
 
 
 def known(value: T | None) -> T:
@@ -151,11 +136,6 @@ def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, 
     return literature.total_mass_kg * force / (force + float(residual[:, 1].mean()))
 
 
-def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
-    """Body mass by the vertical ground reaction of a fitted trial."""
-    return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
-
-
 def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
     """Raise TrialError when trials cannot be of one person, or not of the one on the scale.
 
@@ -177,63 +157,3 @@ def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
                 f"the vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg; correct the mass, or "
                 f"the gain and zero of the plates",
             )
-
-
-def fit_warnings(
-    mass_kg: float,
-    literature: BodySegmentParameters,
-    estimate: BodySegmentParameters,
-    trials: Sequence[TrialFit],
-    source: str = "the literature",
-) -> list[str]:
-    """What the user should know before using the numbers, whatever the estimator.
-
-    `source` says where the parameters before the estimate come from.
-    """
-    found = []
-    for trial in trials:
-        by_force = mass_from_force_kg(literature, trial)
-        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
-            found.append(
-                f"{trial.name}: the mean vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg "
-                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
-            )
-    total = estimate.total_mass_kg
-    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
-        found.append(
-            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
-            f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
-        )
-    moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
-    worst = int(np.argmax(moved))
-    if moved[worst] > CONTRADICTING_COM_M:
-        found.append(
-            f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
-            f"moved by {moved[worst] * 1e3:.0f} mm"
-        )
-    return found
-
-
-def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
-    """Trials whose ground reactions turn the person ever further to one side, and why that may be."""
-    means = {k.trial.name: mean_turning(k.trial.loads, k.time, skeleton.root.centre(k.motion.q)) for k in trials}
-    return [f"{name}: {mean.sentence()}" for name, mean in means.items() if mean is not None and mean.contradicts]
-
-
-def two_level_warnings(result: TwoLevelResult) -> list[str]:
-    """What the user should know of a two-level estimate: not converged, or physically impossible."""
-    found = []
-    if not result.converged:
-        found.append(
-            f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is "
-            f"reported"
-        )
-    consistent = result.bsp.physically_consistent()
-    if not consistent.all():
-        names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
-        found.append(
-            f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
-            f"({', '.join(names)}): it explains the forces, but skin-motion noise decides single parameters; "
-            f"do not use them as this person's"
-        )
-    return found

@@ -12,18 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.checks.verdict import impossible_segments
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, Freedom
-from kinertia.io.osim.reader import OsimModel
 from kinertia.model.anatomy import segment_of
-from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.bsp import BodySegmentParameters, impossible_segments
+from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
+from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Trial
 from kinertia.trial.plate_assignment import build_trial
@@ -33,6 +33,7 @@ LIGHT_KG = 0.5
 _MASS_TOLERANCE = 0.002
 
 
+@one_blas_thread
 def prepare_osim(
     subject: Subject,
     model: OsimModel,

@@ -21,7 +21,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import (
     Motion,
@@ -30,6 +31,7 @@ from kinertia.motion.dynamics import (
     root_derivatives,
     root_regressor,
 )
+from kinertia.motion.one_thread import one_blas_thread
 
 MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""
@@ -133,6 +135,7 @@ def correct_pelvis(skeleton: Skeleton, bsp: BodySegmentParameters, window: Windo
     return window.motion.with_root(position, velocity, acceleration)
 
 
+@one_blas_thread
 def estimate_two_level(
     skeleton: Skeleton,
     start: BodySegmentParameters,

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from kinertia.settings import SubjectFile
+from kinertia.io.subject_file import SubjectFile
 
+VERSION = version("kinertia")
 _COMPUTES = ("kinertia", "numpy", "scipy", "pin", "ezc3d")
 
 

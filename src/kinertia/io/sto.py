@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections import Counter
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import pandas as pd
 
 from kinertia.errors import FileError
 from kinertia.io.number_table import read_lines, read_rows
+from kinertia.io.output_folder import write_then_rename
 
 _ROW_KEYS = ("nrows", "datarows")
 _COLUMN_KEYS = ("ncolumns", "datacolumns")
@@ -71,19 +70,6 @@ def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str
         "",
     ]
     write_then_rename(Path(path), "\n".join(lines))
-
-
-def write_then_rename(path: Path, text: str) -> None:
-    """Write text so that `path` appears complete or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
 
 
 def _header(lines: list[str]) -> dict[str, tuple[str, int]]:

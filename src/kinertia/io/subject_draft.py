@@ -11,7 +11,8 @@ from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.recording import read_recording
-from kinertia.settings import Model, Settings, Subject, Table, TrialFiles
+from kinertia.io.subject_file import Model, TrialFiles
+from kinertia.settings import Settings, Subject, Table
 
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 """What the names of static trials contain."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.io.number_table import read_lines, read_rows
-from kinertia.io.sto import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}

@@ -1,4 +1,4 @@
-"""Body segment parameters (BSPs): one table, its views, and the vector of parameters that is estimated.
+"""Body segment parameters (BSPs): one table and its views.
 
 A rigid segment has ten inertial parameters: mass, three coordinates of the centre of mass (CoM), six elements
 of the inertia tensor. Biomechanics states the tensor about the CoM, in the segment frame; the equations of
@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -34,9 +33,9 @@ UNITS = ("kg", "m", "m", "m") + 6 * ("kg m2",)
 MIRROR_SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
 """Factor on each of `PARAMETERS` that turns a right segment into a left one."""
 
+_ROUNDING = 1e-6
 _TABLE_ROWS, _TABLE_COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # ixx iyy izz ixy ixz iyz
 _PIN_ROWS, _PIN_COLUMNS = [0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]  # Ixx Ixy Iyy Ixz Iyz Izz
-_STUDY = 7  # parameters per segment in the study: PARAMETERS[:7]
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,108 +211,7 @@ class BodySegmentParameters:
         Every segment takes the values of its partner (`_r` <-> `_l`; a segment without partner is its own),
         with com_z, ixz and iyz changed in sign.
         """
-        return self.from_table(self.segments, self.table()[_partners(self.segments)] * MIRROR_SIGNS)
-
-
-@dataclass(frozen=True, eq=False)
-class ParameterVector:
-    """The study's unknowns theta: mass, com_x, com_y, com_z, ixx, iyy, izz of every segment or every pair.
-
-    Principal axes lie along the segment axes: ixy, ixz, iyz are not in theta and keep the reference's values
-    (zero in the study). Under symmetry a pair counts once, as its right segment, and everything on the left
-    mirrors the right, the fixed ixy, ixz, iyz too. Twelve segments give 84 parameters, or 49 under symmetry.
-
-    Attributes:
-        reference: gives the segments, their order, and ixy, ixz, iyz.
-        symmetric: whether left mirrors right.
-
-    Raises:
-        ValueError: under symmetry two would share a name (`hand_r`, `hand_l` and also `hand`).
-    """
-
-    reference: BodySegmentParameters
-    symmetric: bool
-
-    def __post_init__(self) -> None:
-        if len(set(self.names)) != len(self.names):
-            raise ValueError(f"parameter names are not unique: {', '.join(self.names)}")
-
-    @cached_property
-    def _is_left(self) -> npt.NDArray[np.bool_]:
-        # (s,) segments whose values mirror their partner's
-        segments = self.reference.segments
-        paired = _partners(segments) != np.arange(len(segments))
-        return np.array([self.symmetric and p and n.endswith("_l") for n, p in zip(segments, paired, strict=True)])
-
-    @cached_property
-    def _group(self) -> npt.NDArray[np.intp]:
-        # (s,) which seven of theta a segment takes
-        own = np.cumsum(~self._is_left) - 1
-        return np.where(self._is_left, own[_partners(self.reference.segments)], own)
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """`<segment>.<parameter>` for every element of theta; a pair drops its suffix ("thigh.mass")."""
-        mirrored = set(self._group[self._is_left])
-        groups = []
-        for name, group, left in zip(self.reference.segments, self._group, self._is_left, strict=True):
-            if not left:
-                groups.append(name[:-2] if group in mirrored else name)
-        return tuple(f"{group}.{parameter}" for group in groups for parameter in PARAMETERS[:_STUDY])
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Unit of every element of theta."""
-        return UNITS[:_STUDY] * (len(self.names) // _STUDY)
-
-    @property
-    def lower_bounds(self) -> FloatArray:
-        """Lower bounds of theta: 0 for masses (kg) and moments (kg m2), -inf for CoM coordinates (m)."""
-        return np.tile([0.0, -np.inf, -np.inf, -np.inf, 0.0, 0.0, 0.0], len(self.names) // _STUDY)
-
-    def values(self, bsp: BodySegmentParameters) -> FloatArray:
-        """Theta of these body segment parameters; under symmetry the mean of the right and the mirrored left.
-
-        Raises:
-            ValueError: the segments are not those of the reference.
-        """
-        return self._symmetrised(bsp)[~self._is_left, :_STUDY].ravel()
-
-    def bsp(self, theta: npt.ArrayLike) -> BodySegmentParameters:
-        """Body segment parameters with this theta; the left mirrors the right under symmetry."""
-        table = self._symmetrised(self.reference)
-        table[:, :_STUDY] = self._grouped(theta) * self._signs
-        return BodySegmentParameters.from_table(self.reference.segments, table)
-
-    def jacobian(self, theta: npt.ArrayLike) -> FloatArray:
-        """(10 s, len(names)) derivative of `bsp(theta).dynamic_parameters()` with respect to theta."""
-        values = self._grouped(theta) * self._signs
-        blocks = dynamic_by_table(values[:, 0], values[:, 1:4])[..., :_STUDY] * self._signs[:, None, :]
-        jacobian = np.zeros((len(blocks), 10, len(self.names) // _STUDY, _STUDY))
-        jacobian[np.arange(len(blocks)), :, self._group, :] = blocks
-        return jacobian.reshape(10 * len(blocks), len(self.names))
-
-    @cached_property
-    def _signs(self) -> FloatArray:
-        # (s, 7) factors from a segment's seven of theta to its own parameters
-        return np.where(self._is_left[:, None], MIRROR_SIGNS[:_STUDY], 1.0)
-
-    def _grouped(self, theta: npt.ArrayLike) -> FloatArray:
-        # (s, 7) each segment's elements of theta
-        vector = np.asarray(theta, dtype=float)
-        if vector.shape != (len(self.names),):
-            raise ValueError(f"theta has shape {vector.shape}; ({len(self.names)},) was expected")
-        return vector.reshape(-1, _STUDY)[self._group]
-
-    def _symmetrised(self, bsp: BodySegmentParameters) -> FloatArray:
-        # (s, 10) table in which, under symmetry, pairs are the mean of either side and the mirrored other
-        if bsp.segments != self.reference.segments:
-            raise ValueError(f"segments {bsp.segments} are not those of the reference {self.reference.segments}")
-        table = bsp.table()
-        if self.symmetric:
-            paired = _partners(bsp.segments) != np.arange(len(bsp.segments))
-            table[paired] = 0.5 * (table[paired] + bsp.mirrored().table()[paired])
-        return table
+        return self.from_table(self.segments, self.table()[partners(self.segments)] * MIRROR_SIGNS)
 
 
 def combine(
@@ -338,6 +236,18 @@ def combine(
         raise ValueError(f"bodies of total mass {total} kg have no common centre of mass")
     centre = mass @ com / total
     return total, centre, (inertia + _point_mass_inertia(mass, com - centre)).sum(axis=0)
+
+
+def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
+    """Segments that no distribution of mass can have.
+
+    Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
+    the triangle inequality, as rounded inertias have it) is let pass.
+    """
+    table, second = bsp.table(), np.linalg.eigvalsh(second_moments(bsp.inertia_kgm2))
+    there = table[:, [0, *range(4, 10)]].any(axis=1)
+    wrong = (bsp.mass_kg <= 0) | (second[:, 0] < -_ROUNDING * np.abs(second).max(axis=1))
+    return [bsp.segments[i] for i in np.flatnonzero(there & wrong)]
 
 
 def second_moments(inertia: FloatArray) -> FloatArray:
@@ -368,7 +278,7 @@ def block_diagonal(blocks: FloatArray) -> FloatArray:
     return result.reshape(s * k, s * k)
 
 
-def _partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:
+def partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:
     """(s,) index of each segment's `_l`/`_r` partner, or its own."""
     index = {name: i for i, name in enumerate(segments)}
     other = {"_r": "_l", "_l": "_r"}

@@ -18,6 +18,7 @@ from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Pose, Skeleton
+from kinertia.motion.one_thread import one_blas_thread
 from kinertia.trial.data import Markers
 
 _WARM_START_EVERY_S = 0.1
@@ -72,6 +73,7 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(np.square(values))))
 
 
+@one_blas_thread
 def solve_ik(
     skeleton: Skeleton,
     markers: Markers,

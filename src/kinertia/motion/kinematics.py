@@ -17,6 +17,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
+from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial.data import Markers, Trial, runs
 
@@ -110,6 +111,7 @@ def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
     return np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]), -90.0 * quarter
 
 
+@one_blas_thread
 def solve_kinematics(
     skeleton: Skeleton, trial: Trial, turned_deg: float, smoothing: float | Literal["gcv"]
 ) -> Kinematics:

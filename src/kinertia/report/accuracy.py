@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia import __version__
 from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
 from kinertia.studies.accuracy import ClassAccuracy, ScenarioAccuracy
 
 HEADINGS = ("", "95 % cover", "error / sd", "RMS error", "bound", "literature", "better (at best)")
@@ -75,7 +75,7 @@ def _rule(headings: Sequence[str]) -> list[str]:
 def save_accuracy(found: Mapping[str, ScenarioAccuracy], seed: int, folder: str | Path) -> Path:
     """Write `accuracy.json` and `accuracy.md` into a folder; returns the folder."""
     told = {
-        "kinertia": __version__,
+        "kinertia": VERSION,
         "seed": seed,
         "scenarios": {key: asdict(scenario) for key, scenario in found.items()},
     }

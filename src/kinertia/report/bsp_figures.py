@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.estimation.estimate import Fit
+from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report import style

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from kinertia import __version__
 from kinertia.checks.model import ModelCheck
 from kinertia.checks.recording import RecordingCheck
 from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
 
 
 def save_check_page(
@@ -37,7 +37,7 @@ def save_check_page(
         lstrip_blocks=True,
     )
     page = environment.get_template("check.html.j2").render(
-        recordings=recordings, models=models, mistakes=mistakes, version=__version__
+        recordings=recordings, models=models, mistakes=mistakes, version=VERSION
     )
     with complete_folder(folder) as work:
         (work / "check.html").write_text(page, encoding="utf-8")

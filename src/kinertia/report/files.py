@@ -15,16 +15,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinertia import __version__
 from kinertia.checks.verdict import verdicts
-from kinertia.estimation.estimate import Fit, TrialFit
 from kinertia.estimation.identifiability import BaseParameters
-from kinertia.estimation.input_checks import mass_from_force_kg
 from kinertia.estimation.prepare_osim import centre_offsets
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.warnings import mass_from_force_kg
 from kinertia.io.osim.editor import write_osim
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import Provenance
+from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.sto import write_sto
 from kinertia.report.page import render
 
@@ -97,7 +96,7 @@ def _table(trial: TrialFit, columns: Sequence[str], values: np.ndarray) -> pd.Da
 def summary(fit: Fit) -> dict[str, Any]:
     """What `fit.json` says."""
     return {
-        "kinertia": __version__,
+        "kinertia": VERSION,
         "method": fit.settings.method,
         "subject": fit.subject.model_dump(),
         "settings": fit.settings.model_dump(),

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.checks.verdict import Level, Verdict, verdicts
-from kinertia.estimation.estimate import Fit, TrialFit
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.motion.inverse_kinematics import rms
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of

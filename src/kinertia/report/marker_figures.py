@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.estimation.estimate import TrialFit
+from kinertia.estimation.result import TrialFit
 from kinertia.report import style
 from kinertia.report.panels import base_layout, compact, plain
 from kinertia.trial.data import runs

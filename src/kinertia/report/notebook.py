@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.motion.inverse_kinematics import rms
 from kinertia.report.headline import words
 from kinertia.report.page import bsp_rows, rendered, residual_rows

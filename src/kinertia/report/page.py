@@ -16,11 +16,10 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from kinertia import __version__
-from kinertia.estimation.estimate import Fit, TrialFit
 from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
-from kinertia.io.provenance import Provenance, versions
+from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
 from kinertia.report.headline import held_sentence, hidden_combinations, words
@@ -95,7 +94,7 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
 
 def rendered(template: str, **content: Any) -> str:
     """A page from a template."""
-    return _environment().get_template(template).render(version=__version__, **content)
+    return _environment().get_template(template).render(version=VERSION, **content)
 
 
 def written(figure: go.Figure) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import plotly.graph_objects as go
 
-from kinertia.estimation.estimate import Fit, TrialFit
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import bsp_figure, information_figure
 from kinertia.report.marker_figures import gap_figure, marker_figure
 from kinertia.report.skeleton_view import skeleton_figure

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from kinertia import __version__
 from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
 from kinertia.studies.sensitivity import (
     AMPLITUDES,
     CONDITIONS,
@@ -113,7 +113,7 @@ def _of_strides(count: int) -> str:
 def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
     """Write the files into a folder; returns the folder."""
     told = {
-        "kinertia": __version__,
+        "kinertia": VERSION,
         "seed": found.seed,
         "draws": found.draws,
         "small_errors_up_to_twice_the_noise": {kind: found.insensitive(kind) for kind in KINDS},

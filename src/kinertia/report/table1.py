@@ -12,8 +12,8 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from kinertia import __version__
 from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
 from kinertia.report.page import rendered
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
 
@@ -112,7 +112,7 @@ def save_table1(table: Table1, folder: str | Path) -> Path:
     )
     with complete_folder(folder) as work:
         (work / "table1.json").write_text(
-            json.dumps({"kinertia": __version__, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
+            json.dumps({"kinertia": VERSION, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
         )
         table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")
         (work / "report.html").write_text(page, encoding="utf-8")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kinertia.estimation.estimate import TrialFit
+from kinertia.estimation.result import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import rms
 from kinertia.motion.kinematics import Kinematics

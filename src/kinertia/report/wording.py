@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from kinertia.estimation.estimate import Fit
+from kinertia.estimation.result import Fit
 from kinertia.model.bsp import UNITS
 
 _READ_IN = {"m": ("mm", 1e3)}

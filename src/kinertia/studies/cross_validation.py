@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.prepare import Prepared, Progress
@@ -20,6 +19,7 @@ from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.one_thread import one_blas_thread
 
 _FROZEN = 1e-3
 """Deviation that is left to frozen parameters, share of the prior's."""
@@ -51,6 +51,7 @@ class HeldOut:
     estimate: Explained
 
 
+@one_blas_thread
 def cross_validate(
     ready: Prepared, cutoff_hz: float | str, progress: Progress = lambda stage, share: None
 ) -> tuple[HeldOut, ...]:
@@ -72,14 +73,13 @@ def cross_validate(
             f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
             "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
         )
-    with threadpool_limits(limits=1, user_api="blas"):
-        found = []
-        for k, held in enumerate(trials):
-            progress("held out", k / len(trials))
-            others = [other for other in trials if other is not held]
-            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff_hz, ready.freedom).result.bsp
-            explained = (_explained(ready, bsp, held, cutoff_hz) for bsp in (ready.prior.mean, estimate))
-            found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
+    found = []
+    for k, held in enumerate(trials):
+        progress("held out", k / len(trials))
+        others = [other for other in trials if other is not held]
+        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff_hz, ready.freedom).result.bsp
+        explained = (_explained(ready, bsp, held, cutoff_hz) for bsp in (ready.prior.mean, estimate))
+        found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(found)
 
 

@@ -14,9 +14,9 @@ from itertools import combinations
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior, observed, used_skeleton
@@ -26,6 +26,7 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.one_thread import one_blas_thread
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.motions import MOTIONS
 from kinertia.synthetic.walk import walking_subject
@@ -74,6 +75,19 @@ class Plan:
         )
 
 
+def plan(ready: Prepared | None = None, cutoff_hz: float | str = "gcv") -> Plan:
+    """Error bars that every body segment parameter would have after candidate motions; estimates none.
+
+    Args:
+        ready: a person with the trials to choose from; the package's synthetic person and motions if None.
+        cutoff_hz: as in `Settings`.
+    """
+    if ready is None:
+        return plan_synthetic()
+    return plan_measured(ready.skeleton, ready.prior, ready.kinematics, cutoff_hz, ready.freedom)
+
+
+@one_blas_thread
 def plan_measured(
     skeleton: Skeleton,
     prior: BspPrior,
@@ -91,16 +105,15 @@ def plan_measured(
         return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
 
     everything = tuple(range(len(trials)))
-    with threadpool_limits(1):
-        whole = told(everything)
-        sets: list[tuple[int, ...]] = [(k,) for k in everything]
-        sets += [
-            max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
-            for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
-        ]
-        # chosen by the errors of all trials; each set's own errors are what a fit of it would have
-        of_sets = {chosen: whole if chosen == everything else told(chosen) for chosen in sets}
-        found = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
+    whole = told(everything)
+    sets: list[tuple[int, ...]] = [(k,) for k in everything]
+    sets += [
+        max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
+        for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
+    ]
+    # chosen by the errors of all trials; each set's own errors are what a fit of it would have
+    of_sets = {chosen: whole if chosen == everything else told(chosen) for chosen in sets}
+    found = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
     names = [k.trial.name for k in trials]
     return Plan(prior.mean.segments, prior.sd, {tuple(names[k] for k in chosen): sd for chosen, sd in found.items()})
 

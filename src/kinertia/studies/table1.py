@@ -12,16 +12,17 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import Progress, prepare
+from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, estimate_two_level
-from kinertia.model.bsp import BodySegmentParameters, ParameterVector
+from kinertia.io.subject_file import SubjectFile
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import smooth
-from kinertia.settings import SubjectFile
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.noise import study_noise
 from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
@@ -133,6 +134,7 @@ def study_trial() -> SyntheticTrial:
     return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S + 2 * MARGIN_S)
 
 
+@one_blas_thread
 def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> tuple[SyntheticTrial, str]:
     """The study's trial from a measured one, and what to call it.
 
@@ -145,19 +147,18 @@ def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share
             reactions.
     """
     static, inputs, marker_set = read_inputs(wanted, progress)
-    with threadpool_limits(1):
-        ready = prepare(wanted.subject, static, inputs[:1], wanted.settings, marker_set, progress)
-        measured = ready.kinematics[0]
-        worn = [m for m in ready.skeleton.markers if m.label in measured.ik.labels]
-        inside = np.abs(measured.time - measured.time.mean()) <= _STRIDE_S / 2 + 1e-9
-        frames = slice(int(np.argmax(inside)), int(len(inside) - np.argmax(inside[::-1])))
-        trial = consistent_trial(
-            ready.skeleton.with_markers(worn),
-            symmetric_truth(without_products(ready.literature)),
-            measured.time[frames],
-            measured.motion.cut(frames),
-            measured.foot_loads[frames],
-        )
+    ready = prepare(wanted.subject, static, inputs[:1], wanted.settings, marker_set, progress)
+    measured = ready.kinematics[0]
+    worn = [m for m in ready.skeleton.markers if m.label in measured.ik.labels]
+    inside = np.abs(measured.time - measured.time.mean()) <= _STRIDE_S / 2 + 1e-9
+    frames = slice(int(np.argmax(inside)), int(len(inside) - np.argmax(inside[::-1])))
+    trial = consistent_trial(
+        ready.skeleton.with_markers(worn),
+        symmetric_truth(without_products(ready.literature)),
+        measured.time[frames],
+        measured.motion.cut(frames),
+        measured.foot_loads[frames],
+    )
     first, last = trial.time[[0, -1]]
     return trial, f"{measured.trial.name}, {first:.2f} to {last:.2f} s"
 

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.errors import MarkerSetError
+from kinertia.trial import display
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -156,9 +157,7 @@ class Recording:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: frames, markers and their gaps, force plates, notes."""
-        from kinertia.report.notebook import recording_html
-
-        return recording_html(self)
+        return display.html(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +228,7 @@ class Trial:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: frames, markers and their gaps, measured windows, notes."""
-        # only when somebody looks: trials know nothing of reports
-        from kinertia.report.notebook import trial_html
-
-        return trial_html(self)
+        return display.html(self)
 
     def rotated(self, rotation: FloatArray) -> Trial:
         """The same trial in axes turned about the vertical: new = rotation @ old, for markers and loads

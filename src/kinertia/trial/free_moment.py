@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.checks.plates import periods
 from kinertia.trial.data import FloatArray, FootLoads
+from kinertia.trial.strides import periods
 
 TURNING_LEVER_M = 0.002
 """A mean vertical moment above body weight times this contradicts gait.

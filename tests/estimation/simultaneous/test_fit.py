@@ -6,9 +6,10 @@ import pandas as pd
 import pytest
 from threadpoolctl import threadpool_limits
 
-from kinertia.estimation.estimate import Fit, estimate_bsp
+from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import CLOCK_SD_S, PLATE_SD, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording

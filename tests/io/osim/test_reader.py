@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from kinertia.errors import FileError, OsimError
-from kinertia.io.osim.reader import OsimModel, read_osim
+from kinertia.io.osim.reader import read_osim
+from kinertia.model.imported import OsimModel
 from kinertia.motion.dynamics import Motion
 from osim_comparison import MODELS, N_STATES, assert_opensim_agrees, free_dynamics, mass_matrices, random_states
 from osim_text import (
@@ -159,7 +160,7 @@ def euler_rates_to_speeds(angles: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("root", "kind"), [("FreeJoint", "GimbalJoint"), ("CustomJoint", "BallJoint")])
 def test_joints_whose_speeds_are_not_the_rates_of_their_coordinates(opensim, written, root, kind):
     """OpenSim gives moments of Ball and Free joints per angular velocity; here they are per angle rate."""
-    from osim_comparison import OsimOracle
+    from osim_oracle import OsimOracle
 
     free = joint("FreeJoint", "root", "/ground", "pelvis", ("tilt", "list", "turn", "tx", "ty", "tz"))
     own = joint(kind, "between", "/bodyset/pelvis", "leg", "abc")

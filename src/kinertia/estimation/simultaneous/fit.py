@@ -18,6 +18,7 @@ from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.one_thread import one_blas_thread
 
 PLATE_SD = {"x": 0.010, "z": 0.010, "gain": 0.02, "free moment": 0.0015}
 """Names and units as in PLATE_UNKNOWNS. Gain: scale and plates of a laboratory may differ by this much before it is
@@ -84,6 +85,7 @@ class SimultaneousFit:
     warnings: tuple[str, ...]
 
 
+@one_blas_thread
 def fit_simultaneous(
     skeleton: Skeleton,
     prior: BspPrior,

@@ -25,6 +25,7 @@ from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
+from kinertia.motion.one_thread import one_blas_thread
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ _SINGULAR = 1e-13
 """Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
 
 
+@one_blas_thread
 def estimate_simultaneous(
     skeleton: Skeleton, prior: BspPrior, calibration: CalibrationPrior, trials: Sequence[Observation], spacing_s: float
 ) -> SimultaneousResult:

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from kinertia.io.osim.reader import INERTIA_TAGS, OsimModel, body_elements, marker_elements
+from kinertia.io.osim.reader import INERTIA_TAGS, body_elements, marker_elements
 from kinertia.io.osim.xml import Element, parse, replaced
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Marker
 
 CHANGE_COLUMNS = ("component", "property", "old", "new")
@@ -51,7 +52,7 @@ def write_osim(
     document = parse(model.content).child("Model")
     assert document is not None  # it was read before
     edits = [*_body_edits(document, bsp), *_marker_edits(model, document, markers or {})]
-    edits += _joint_edits(model, joint_shifts or {})
+    edits += _joint_edits(model, document, joint_shifts or {})
     spans, rows = [], []
     for edit in edits:
         old = edit.element.child(edit.tag)
@@ -104,11 +105,14 @@ def _marker_edits(model: OsimModel, document: Element, positions: Mapping[str, n
                 yield _Edit(element, "location", old + frame.T @ shift)
 
 
-def _joint_edits(model: OsimModel, shifts: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
+def _joint_edits(model: OsimModel, document: Element, shifts: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
+    """A joint moves with the frame that it hangs on (format 4) or by its own place in its parent (format 3)."""
+    elements = {element.outer: element for element in document.all()}
     for joint in model.joints:
         shift = shifts.get(joint.name)
         if shift is not None and joint.offset is not None and shift.any():
-            tag = "location_in_parent" if joint.offset is joint.element else "translation"
-            old = joint.offset.child(tag)
+            offset = elements[joint.offset]
+            tag = "translation" if offset.tag == "PhysicalOffsetFrame" else "location_in_parent"
+            old = offset.child(tag)
             place = np.array(old.text.split(), dtype=float) if old is not None else np.zeros(3)
-            yield _Edit(joint.offset, tag, place + shift)
+            yield _Edit(offset, tag, place + shift)

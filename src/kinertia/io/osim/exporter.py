@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from kinertia.io.sto import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, placed_by
 

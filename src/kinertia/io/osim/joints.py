@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.io.osim.properties import Values
 from kinertia.io.osim.xml import Element
 from kinertia.model.axis_functions import AxisFunction, Composed, constant, constant_value, unit_slope
+from kinertia.model.imported import OsimCoordinate
 from kinertia.model.skeleton import Axis
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -39,30 +40,7 @@ Place = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class OsimCoordinate:
-    """A coordinate as the file has it: rad or m.
-
-    Attributes:
-        name, joint: names.
-        default: its value before anything else is said.
-        range: smallest and largest value.
-        clamped: whether OpenSim keeps it in its range.
-        locked: whether OpenSim holds it at its default.
-        angle: whether motion files give it in degrees; False for lengths and for OpenSim's "coupled" coordinates, which
-            move axes by curves only and stay in rad or m.
-    """
-
-    name: str
-    joint: str
-    default: float
-    range: tuple[float, float]
-    clamped: bool
-    locked: bool
-    angle: bool
-
-
-@dataclass(frozen=True)
-class OsimJoint:
+class JointElement:
     """A joint as the file has it.
 
     Attributes:
@@ -141,7 +119,7 @@ def frame_place(values: Values, element: Element, orientation: str, location: st
     return Rotation.from_euler("XYZ", angles).as_matrix(), values.numbers(element, location, 3, [0.0] * 3)
 
 
-def read_joint(values: Values, element: Element, frames: Frames) -> OsimJoint:
+def read_joint(values: Values, element: Element, frames: Frames) -> JointElement:
     """A joint of format 4."""
     sockets = [values.text(element, f"socket_{side}_frame") for side in ("parent", "child")]
     (parent, parent_place), (child, child_place) = (frames.place(element, element.name, path) for path in sockets)
@@ -153,7 +131,7 @@ def read_joint(values: Values, element: Element, frames: Frames) -> OsimJoint:
     return _joint(values, element, (parent, child), (parent_place, child_place), offset, coordinates)
 
 
-def read_joint_in_body(values: Values, element: Element, child: str) -> OsimJoint:
+def read_joint_in_body(values: Values, element: Element, child: str) -> JointElement:
     """A joint of format 3, which stands in its child's element."""
     if values.flag(element, "reverse", False):
         values.fail(
@@ -174,7 +152,7 @@ def _joint(
     places: tuple[Place, Place],
     offset: Element | None,
     elements: list[Element],
-) -> OsimJoint:
+) -> JointElement:
     names = [c.name for c in elements]
     if element.tag == "CustomJoint":
         axes, constants = _custom_axes(values, element, names)
@@ -191,7 +169,7 @@ def _joint(
         )
     turning = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.function is None}
     coordinates = [_coordinate(values, c, element.name, c.name in turning) for c in elements]
-    return OsimJoint(element, *bodies, *places, offset, tuple(coordinates), tuple(axes), constants)
+    return JointElement(element, *bodies, *places, offset, tuple(coordinates), tuple(axes), constants)
 
 
 def _coordinate(values: Values, element: Element, joint: str, angle: bool) -> OsimCoordinate:

@@ -7,8 +7,6 @@ cannot be represented is an error that names it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from xml.parsers.expat import ExpatError
 
@@ -16,18 +14,11 @@ import numpy as np
 
 from kinertia.errors import OsimError
 from kinertia.io.number_table import expect_file
-from kinertia.io.osim.joints import (
-    Frames,
-    OsimCoordinate,
-    OsimJoint,
-    coupled,
-    read_joint,
-    read_joint_in_body,
-)
+from kinertia.io.osim.joints import Frames, JointElement, coupled, read_joint, read_joint_in_body
 from kinertia.io.osim.properties import Values
 from kinertia.io.osim.xml import Element, parse
-from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.imported import Coupling, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
 NEWEST_VERSION = 40600
@@ -38,55 +29,6 @@ _START = 0.2
 An elbow that starts straight may bend either way: turned by half a turn, the arm fits its markers nearly as well.
 """
 _FORMAT_3, _FORMAT_4 = range(30000, 30501), range(40000, NEWEST_VERSION + 1)
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """A coordinate that follows another by a CoordinateCouplerConstraint."""
-
-    dependent: str
-    independent: str
-    function: AxisFunction
-
-
-@dataclass(frozen=True, eq=False)
-class OsimModel:
-    """A model file as Kinertia sees it.
-
-    Attributes:
-        path, content: the file and its bytes.
-        skeleton: locked coordinates at their defaults; coupled coordinates follow their leaders.
-        bsp: of all bodies, in the file's order; a body may be massless.
-        joints: in the skeleton's order.
-        couplings: dependent coordinates, which the skeleton does not have.
-        marker_frames: per label, (3, 3) orientation of the frame that its location is given in, in its body.
-    """
-
-    path: Path
-    content: bytes = field(repr=False)
-    skeleton: Skeleton
-    bsp: BodySegmentParameters
-    joints: tuple[OsimJoint, ...]
-    couplings: tuple[Coupling, ...]
-    marker_frames: Mapping[str, np.ndarray]
-
-    @cached_property
-    def coordinates(self) -> tuple[OsimCoordinate, ...]:
-        """All coordinates of the file, joint by joint."""
-        return tuple(coordinate for joint in self.joints for coordinate in joint.coordinates)
-
-    def all_coordinates(self, skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-        """(n, k) values of all `coordinates`, locked and coupled ones included.
-
-        Args:
-            skeleton: the model's, possibly with more coordinates locked.
-            q: (n, c) its coordinates.
-        """
-        known = {name: q[:, i] for i, name in enumerate(skeleton.coordinates)}
-        known |= {name: np.full(len(q), value) for name, value in skeleton.locked.items()}
-        for coupling in self.couplings:
-            known[coupling.dependent] = coupling.function(known[coupling.independent])
-        return np.stack([known[coordinate.name] for coordinate in self.coordinates], axis=1)
 
 
 def read_osim(path: str | Path) -> OsimModel:
@@ -122,7 +64,7 @@ def read_osim(path: str | Path) -> OsimModel:
         root = next(body for body in bodies if body.name == skeleton.segments[0])
         values.fail(root, f"the root body '{root.name}' has no mass; expected a positive one (kg), as of a pelvis")
     turned = {marker.label: rotation for marker, rotation in placed}
-    return OsimModel(path, content, skeleton, bsp, tuple(joints), couplings, turned)
+    return OsimModel(path, content, skeleton, bsp, tuple(_kept(joint) for joint in joints), couplings, turned)
 
 
 def _model(path: Path, content: bytes) -> tuple[Element, int]:
@@ -184,7 +126,7 @@ def _bsp(values: Values, bodies: Sequence[Element]) -> BodySegmentParameters:
     return BodySegmentParameters.from_table(tuple(body.name for body in bodies), np.array(rows))
 
 
-def _ordered(values: Values, joints: Sequence[OsimJoint], bodies: Sequence[Element]) -> list[OsimJoint]:
+def _ordered(values: Values, joints: Sequence[JointElement], bodies: Sequence[Element]) -> list[JointElement]:
     """Parents before children, the root first."""
     names = {body.name for body in bodies}
     for joint in joints:
@@ -213,7 +155,7 @@ def _ordered(values: Values, joints: Sequence[OsimJoint], bodies: Sequence[Eleme
     return ordered
 
 
-def _couplings(values: Values, model: Element, joints: Sequence[OsimJoint]) -> tuple[Coupling, ...]:
+def _couplings(values: Values, model: Element, joints: Sequence[JointElement]) -> tuple[Coupling, ...]:
     """Couplings in an order in which leaders are known before those that follow them."""
     names = {coordinate.name for joint in joints for coordinate in joint.coordinates}
     found = []
@@ -272,7 +214,7 @@ def _marker(
 def _skeleton(
     values: Values,
     model: Element,
-    joints: Sequence[OsimJoint],
+    joints: Sequence[JointElement],
     couplings: Sequence[Coupling],
     markers: Sequence[Marker],
 ) -> Skeleton:
@@ -300,7 +242,11 @@ def _skeleton(
     )
 
 
-def _skeleton_joint(joint: OsimJoint, couplings: Sequence[Coupling]) -> Joint:
+def _kept(joint: JointElement) -> OsimJoint:
+    return OsimJoint(joint.name, joint.coordinates, None if joint.offset is None else joint.offset.outer)
+
+
+def _skeleton_joint(joint: JointElement, couplings: Sequence[Coupling]) -> Joint:
     axes = [_led(axis, couplings) for axis in joint.axes]
     return Joint(joint.parent, joint.child, *joint.parent_place, tuple(axes), *joint.child_place)
 
@@ -312,7 +258,9 @@ def _led(axis: Axis, couplings: Sequence[Coupling]) -> Axis:
     return axis
 
 
-def _check_root(values: Values, joints: Sequence[OsimJoint], locked: Mapping[str, float], following: set[str]) -> None:
+def _check_root(
+    values: Values, joints: Sequence[JointElement], locked: Mapping[str, float], following: set[str]
+) -> None:
     root, *others = joints
     for joint in others:
         if joint.parent == "ground":

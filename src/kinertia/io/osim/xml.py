@@ -45,9 +45,9 @@ class Element:
         return next((child for child in self.children if child.tag in tags), None)
 
     def all(self, *tags: str) -> Iterator[Element]:
-        """All elements inside with one of these tags, however deep, in the order of the file."""
+        """All elements inside with one of these tags, or with any, however deep, in the order of the file."""
         for child in self.children:
-            if child.tag in tags:
+            if not tags or child.tag in tags:
                 yield child
             yield from child.all(*tags)
 

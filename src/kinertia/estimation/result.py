@@ -1,0 +1,174 @@
+"""What an estimate gives back: `Fit`, with one `TrialFit` for every trial."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import pandas as pd
+
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.imported import OsimModel
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.kinematics import Kinematics
+from kinertia.settings import Settings, Subject
+from kinertia.trial import display
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+class FitPictures(Protocol):
+    """Plotly figures of a fit. Those of one trial take its name; left out, it is the first.
+
+    Raises:
+        KeyError: there is no trial of this name; names those there are.
+    """
+
+    def residuals(self, trial: str | None = None) -> Figure:
+        """Root residual force and moment over time, stage by stage."""
+
+    def coordinates(self, trial: str | None = None) -> Figure:
+        """Every coordinate by inverse kinematics and as estimated."""
+
+    def moments(self, trial: str | None = None) -> Figure:
+        """Joint moments per body mass, before against estimate."""
+
+    def markers(self, trial: str | None = None) -> Figure:
+        """Distance between every measured and modelled marker."""
+
+    def gaps(self, trial: str | None = None) -> Figure | None:
+        """When markers were not seen; None where all always were."""
+
+    def skeleton(self, trial: str | None = None) -> Figure:
+        """The skeleton in motion, with markers, centres of mass and ground reactions."""
+
+    def bsp(self) -> Figure:
+        """Body segment parameters before and after, with intervals where there are any."""
+
+    def information(self) -> Figure | None:
+        """What the data told about each parameter; None after two-level."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialFit:
+    """One trial of a `Fit`. Arrays cover the w frames of the measured window.
+
+    Attributes:
+        kinematics: markers, coordinates and ground reactions before estimation.
+        skeleton: with the markers where they are in this trial (`displacement`).
+        motion: coordinates (rad, m) and derivatives that go with the estimate.
+        residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
+            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
+        moments: joint inverse dynamics (w, 27; N m, N) per stage: "literature", "estimate".
+        moment_sd: (w, 27) posterior deviations of those of the estimate; None after two-level.
+        marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
+        seconds: computing time per stage.
+    """
+
+    kinematics: Kinematics
+    skeleton: Skeleton
+    motion: Motion
+    residuals: Mapping[str, np.ndarray]
+    moments: Mapping[str, np.ndarray]
+    moment_sd: np.ndarray | None
+    marker_errors_m: Mapping[str, np.ndarray]
+    seconds: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        """The trial's name."""
+        return self.kinematics.trial.name
+
+    @property
+    def time(self) -> np.ndarray:
+        """(w,) s."""
+        return self.kinematics.time
+
+    @property
+    def coordinates(self) -> pd.DataFrame:
+        """Coordinates of the estimate (rad, m) over time."""
+        names = list(self.kinematics.ik.coordinates)
+        return pd.DataFrame(self.motion.q, index=pd.Index(self.time, name="time"), columns=names)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: frames used, distances of the markers, residuals."""
+        return display.html(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Body segment parameters of a person, and what they were estimated from.
+
+    Attributes:
+        subject: with mass and height filled in.
+        settings: as used.
+        skeleton: calibrated model.
+        literature, estimate: body segment parameters before and after; before, those of an OpenSim model are its own.
+        trials: one entry per trial.
+        converged: whether the estimator met its criterion.
+        posterior: error bars and calibration; None after two-level, which has none.
+        warnings: what the user should know before using the numbers; one sentence each.
+        notes: assumptions made on the way; one sentence each.
+        file: the OpenSim model that the skeleton is from, if it is.
+    """
+
+    subject: Subject
+    settings: Settings
+    skeleton: Skeleton
+    literature: BodySegmentParameters
+    estimate: BodySegmentParameters
+    trials: tuple[TrialFit, ...]
+    converged: bool
+    posterior: Posterior | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    file: OsimModel | None = None
+
+    @cached_property
+    def bsp(self) -> pd.DataFrame:
+        """One row per segment and parameter: segment, parameter, unit, literature, estimate.
+
+        The simultaneous estimate adds prior_sd, sd (deviations before and after), information, and evidence:
+        "measured" (information above 0.75), "informed" (0.25 to 0.75) or "assumed" (the literature's, hardly changed).
+        """
+        table = self.literature.to_frame().rename(columns={"value": "literature"})
+        table = table.assign(estimate=self.estimate.to_frame()["value"])
+        if self.posterior is None:
+            return table
+        told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
+        return table.assign(**told, evidence=[evidence(value) for value in told["information"]])
+
+    def save(self, folder: str | Path) -> Path:
+        """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
+        return display.save(self, folder)
+
+    @property
+    def covariance(self) -> pd.DataFrame | None:
+        """Posterior covariance of all body segment parameters, by "segment.parameter"; None after two-level."""
+        if self.posterior is None:
+            return None
+        names = (self.bsp["segment"] + "." + self.bsp["parameter"]).tolist()
+        return pd.DataFrame(self.posterior.covariance, index=names, columns=names)
+
+    @property
+    def calibration(self) -> pd.DataFrame | None:
+        """Value, prior and posterior deviation and unit of every calibrated quantity; None after two-level."""
+        return None if self.posterior is None else pd.DataFrame(dict(self.posterior.calibration)).T
+
+    @property
+    def plot(self) -> FitPictures:
+        """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
+        pictures: FitPictures = display.pictures(self)
+        return pictures
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: verdict, warnings, body segment parameters."""
+        return display.html(self)

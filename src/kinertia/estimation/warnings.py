@@ -1,0 +1,87 @@
+"""What a user should know before using the numbers of a fit: one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kinertia.estimation.input_checks import mass_by_force_kg
+from kinertia.estimation.result import TrialFit
+from kinertia.estimation.two_level import TwoLevelResult
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics
+from kinertia.trial.free_moment import mean_turning
+
+FORCE_MASS_TOLERANCE = 0.02
+"""Scale and mean vertical force may differ by this share before a warning."""
+ESTIMATE_TOLERANCE = 0.03
+"""Scale and estimated total mass may differ by this share before a warning."""
+CONTRADICTING_COM_M = 0.1
+"""A centre of mass this far from the literature contradicts it."""
+
+
+def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
+    """Body mass by the vertical ground reaction of a fitted trial."""
+    return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
+
+
+def fit_warnings(
+    mass_kg: float,
+    literature: BodySegmentParameters,
+    estimate: BodySegmentParameters,
+    trials: Sequence[TrialFit],
+    source: str = "the literature",
+) -> list[str]:
+    """What the user should know before using the numbers, whatever the estimator.
+
+    `source` says where the parameters before the estimate come from.
+    """
+    found = []
+    for trial in trials:
+        by_force = mass_from_force_kg(literature, trial)
+        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
+            found.append(
+                f"{trial.name}: the mean vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg "
+                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
+            )
+    total = estimate.total_mass_kg
+    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
+        found.append(
+            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
+            f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
+        )
+    moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
+    worst = int(np.argmax(moved))
+    if moved[worst] > CONTRADICTING_COM_M:
+        found.append(
+            f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
+            f"moved by {moved[worst] * 1e3:.0f} mm"
+        )
+    return found
+
+
+def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
+    """Trials whose ground reactions turn the person ever further to one side, and why that may be."""
+    means = {k.trial.name: mean_turning(k.trial.loads, k.time, skeleton.root.centre(k.motion.q)) for k in trials}
+    return [f"{name}: {mean.sentence()}" for name, mean in means.items() if mean is not None and mean.contradicts]
+
+
+def two_level_warnings(result: TwoLevelResult) -> list[str]:
+    """What the user should know of a two-level estimate: not converged, or physically impossible."""
+    found = []
+    if not result.converged:
+        found.append(
+            f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is "
+            f"reported"
+        )
+    consistent = result.bsp.physically_consistent()
+    if not consistent.all():
+        names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
+        found.append(
+            f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
+            f"({', '.join(names)}): it explains the forces, but skin-motion noise decides single parameters; "
+            f"do not use them as this person's"
+        )
+    return found

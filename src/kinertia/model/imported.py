@@ -1,0 +1,102 @@
+"""A model that was read from a file: its skeleton and masses, and what it takes to write it back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.model.axis_functions import AxisFunction
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class OsimCoordinate:
+    """A coordinate as the file has it: rad or m.
+
+    Attributes:
+        name, joint: names.
+        default: its value before anything else is said.
+        range: smallest and largest value.
+        clamped: whether OpenSim keeps it in its range.
+        locked: whether OpenSim holds it at its default.
+        angle: whether motion files give it in degrees; False for lengths and for OpenSim's "coupled" coordinates, which
+            move axes by curves only and stay in rad or m.
+    """
+
+    name: str
+    joint: str
+    default: float
+    range: tuple[float, float]
+    clamped: bool
+    locked: bool
+    angle: bool
+
+
+@dataclass(frozen=True)
+class OsimJoint:
+    """A joint as the file has it.
+
+    Attributes:
+        name: its name.
+        coordinates: in the file's order.
+        offset: byte span, in the file, of the element whose translation moves the joint in its parent's own axes; None
+            where there is none.
+    """
+
+    name: str
+    coordinates: tuple[OsimCoordinate, ...]
+    offset: tuple[int, int] | None
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A coordinate that follows another by a CoordinateCouplerConstraint."""
+
+    dependent: str
+    independent: str
+    function: AxisFunction
+
+
+@dataclass(frozen=True, eq=False)
+class OsimModel:
+    """A model file as Kinertia sees it.
+
+    Attributes:
+        path, content: the file and its bytes.
+        skeleton: locked coordinates at their defaults; coupled coordinates follow their leaders.
+        bsp: of all bodies, in the file's order; a body may be massless.
+        joints: in the skeleton's order.
+        couplings: dependent coordinates, which the skeleton does not have.
+        marker_frames: per label, (3, 3) orientation of the frame that its location is given in, in its body.
+    """
+
+    path: Path
+    content: bytes = field(repr=False)
+    skeleton: Skeleton
+    bsp: BodySegmentParameters
+    joints: tuple[OsimJoint, ...]
+    couplings: tuple[Coupling, ...]
+    marker_frames: Mapping[str, np.ndarray]
+
+    @cached_property
+    def coordinates(self) -> tuple[OsimCoordinate, ...]:
+        """All coordinates of the file, joint by joint."""
+        return tuple(coordinate for joint in self.joints for coordinate in joint.coordinates)
+
+    def all_coordinates(self, skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
+        """(n, k) values of all `coordinates`, locked and coupled ones included.
+
+        Args:
+            skeleton: the model's, possibly with more coordinates locked.
+            q: (n, c) its coordinates.
+        """
+        known = {name: q[:, i] for i, name in enumerate(skeleton.coordinates)}
+        known |= {name: np.full(len(q), value) for name, value in skeleton.locked.items()}
+        for coupling in self.couplings:
+            known[coupling.dependent] = coupling.function(known[coupling.independent])
+        return np.stack([known[coordinate.name] for coordinate in self.coordinates], axis=1)

@@ -1,0 +1,17 @@
+"""Tells `kinertia.trial.display` how trials and fits are shown and saved; loaded when one first is."""
+
+from __future__ import annotations
+
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.report.files import save_fit
+from kinertia.report.notebook import fit_html, recording_html, trial_fit_html, trial_html
+from kinertia.report.plots import FitPlots
+from kinertia.trial import display
+from kinertia.trial.data import Recording, Trial
+
+display.html.register(Recording, recording_html)
+display.html.register(Trial, trial_html)
+display.html.register(TrialFit, trial_fit_html)
+display.html.register(Fit, fit_html)
+display.pictures.register(Fit, FitPlots)
+display.save.register(Fit, save_fit)

@@ -1,0 +1,51 @@
+"""How data are shown and saved, for whoever holds them. Data ask here and know nothing of reports.
+
+What knows how registers itself (`kinertia.report.registration`) for each type; it is loaded when something is first
+shown or saved, by the name that the package's top has given with `shown_by`.
+"""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+_modules: list[str] = []
+
+
+def shown_by(module: str) -> None:
+    """Name the module that registers how things are shown; it is loaded when this is first needed."""
+    _modules.append(module)
+
+
+@singledispatch
+def html(thing: object) -> str:
+    """What a notebook shows of `thing`.
+
+    Raises:
+        TypeError: nothing is registered for its type; so for all functions here.
+    """
+    _load(html, thing)
+    return html(thing)
+
+
+@singledispatch
+def pictures(thing: object) -> Any:
+    """Figures of `thing`, one method for each."""
+    _load(pictures, thing)
+    return pictures(thing)
+
+
+@singledispatch
+def save(thing: object, folder: str | Path) -> Path:
+    """Write `thing` into a folder, and return the folder."""
+    _load(save, thing)
+    return save(thing, folder)
+
+
+def _load(function: Any, thing: object) -> None:
+    for module in _modules:
+        import_module(module)
+    if function.dispatch(type(thing)) is function.dispatch(object):
+        raise TypeError(f"nothing is registered for a {type(thing).__name__}")
