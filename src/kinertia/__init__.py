@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING
 from kinertia.trial import display
 
 if TYPE_CHECKING:
+    __version__: str
+
     from kinertia.checks.model import ModelCheck as ModelCheck
     from kinertia.checks.model import check_model as check_model
     from kinertia.checks.recording import RecordingCheck as RecordingCheck
@@ -116,18 +118,20 @@ __all__ = sorted(_HOMES)
 display.shown_by("kinertia.report.registration")
 
 
-def __getattr__(name: str) -> object:
-    """Load a public name when it is first used."""
-    if name == "__version__":
-        from importlib.metadata import version
+if not TYPE_CHECKING:  # a type checker is to know the names above, and no others
 
-        value: object = version("kinertia")
-    elif name in _HOMES:
-        value = getattr(import_module(f"kinertia.{_HOMES[name]}"), name)
-    else:
-        raise AttributeError(f"module 'kinertia' has no attribute '{name}'")
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        """Load a public name when it is first used."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            value: object = version("kinertia")
+        elif name in _HOMES:
+            value = getattr(import_module(f"kinertia.{_HOMES[name]}"), name)
+        else:
+            raise AttributeError(f"module 'kinertia' has no attribute '{name}'")
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

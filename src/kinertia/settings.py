@@ -10,7 +10,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 
 def folder_of(info: ValidationInfo) -> Path:
     """Folder that paths and names in a subject file count from; the current one without a file."""
-    return (info.context or {}).get("folder", Path.cwd())
+    result: Path = (info.context or {}).get("folder", Path.cwd())
+    return result
 
 
 def _cutoff(value: object) -> object:

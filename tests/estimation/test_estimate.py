@@ -100,7 +100,8 @@ def test_several_trials_share_one_body(short_fit):
             ("literature", "corrected", "estimate"), (frames, 6)
         )
         assert trial.moments["estimate"].shape == trial.motion.q.shape == (frames, 27)
-        assert list(trial.coordinates) == list(short_fit.skeleton.coordinates)
+        assert list(trial.coordinates) == list(trial.moments["estimate"]) == list(short_fit.skeleton.coordinates)
+        assert trial.moments["estimate"].index.equals(trial.coordinates.index)
         assert np.isfinite(trial.motion.qdd).all()
 
 
@@ -108,7 +109,7 @@ def test_root_rows_of_inverse_dynamics_are_the_residual(short_fit):
     """Pelvis translations are along the ground axes, so their loads are the residual force."""
     for trial in short_fit.trials:
         for stage in ("literature", "estimate"):
-            np.testing.assert_allclose(trial.moments[stage][:, :3], trial.residuals[stage][:, :3], atol=1e-6)
+            np.testing.assert_allclose(trial.moments[stage].iloc[:, :3], trial.residuals[stage][:, :3], atol=1e-6)
 
 
 def test_left_mirrors_right_unless_told_otherwise(short_fit):

@@ -93,6 +93,23 @@ def test_a_broken_set_says_what_and_where(tmp_path, change, message, line):
     assert caught.value.line == line
 
 
+def test_an_error_names_the_line_of_the_key_itself_not_of_one_that_begins_like_it(tmp_path):
+    """`heel_r` stands in a landmark's line, and a segment called `heel` further down."""
+    path = tmp_path / "mine.toml"
+    path.write_text(SMALL.replace("[segments]", 'heel_r = "HR"\n[segments]') + 'heel = ["HR"]\n')
+    with pytest.raises(FileError, match=r"unknown \[segments\] entry 'heel'") as caught:
+        read_marker_set(path)
+    assert caught.value.line == 9
+
+
+def test_the_same_key_in_two_tables_is_told_apart(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(SMALL + 'torso = []\n[widths]\ntorso = "T"\n')
+    with pytest.raises(FileError, match=r"\[segments\] torso must be a label") as caught:
+        read_marker_set(path)
+    assert caught.value.line == 8
+
+
 def test_an_unknown_preset_lists_those_that_exist():
     with pytest.raises(FileError, match=r"no such marker set.*cleveland-clinic, plug-in-gait, rajagopal"):
         read_marker_set("helen-hayes")

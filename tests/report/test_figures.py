@@ -49,17 +49,16 @@ def test_curves_are_thinned_but_not_moved(fit):
 def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit):
     trial = fit.trials[0]
     mass = fit.literature.total_mass_kg
-    hip = fit.skeleton.coordinates.index("hip_flexion_r")
     assert trial.moment_sd is not None
     plain = moment_figure(replace(trial, moment_sd=None), fit.skeleton, mass)
     trace = next(t for t in plain.data if t.name == "right, estimate")
-    np.testing.assert_allclose(trace.y, trial.moments["estimate"][:, hip] / mass, rtol=1e-5)
+    np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
     assert not any("band" in (t.name or "") for t in plain.data)
     banded = moment_figure(trial, fit.skeleton, mass)
     upper = next(k for k, t in enumerate(banded.data) if t.name == "right 95 % band")
     width = banded.data[upper].y - banded.data[upper - 1].y
     assert banded.data[upper].xaxis == banded.data[upper - 1].xaxis
-    np.testing.assert_allclose(width, 2 * 1.96 * trial.moment_sd[:, hip] / mass, rtol=1e-3)
+    np.testing.assert_allclose(width, 2 * 1.96 * trial.moment_sd["hip_flexion_r"] / mass, rtol=1e-3)
 
 
 def test_frames_outside_the_window_are_shaded(fit):

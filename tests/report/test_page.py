@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import plotly.graph_objects as go
 import pytest
 
@@ -262,8 +263,11 @@ def prolonged(trial, times):
         kinematics=replace(kinematics, trial=walked, ik=solved, window_s=(0.0, float(time[-1]))),
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
-        moments={stage: again(values) for stage, values in trial.moments.items()},
-        moment_sd=again(trial.moment_sd),
+        moments={
+            stage: pd.DataFrame(again(values.to_numpy()), columns=values.columns)
+            for stage, values in trial.moments.items()
+        },
+        moment_sd=pd.DataFrame(again(trial.moment_sd.to_numpy()), columns=trial.moment_sd.columns),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
     )
 

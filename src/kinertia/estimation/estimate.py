@@ -12,7 +12,7 @@ from kinertia.estimation.input_checks import check_masses, known, mass_by_force_
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit, TrialFit, by_coordinate
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
 from kinertia.estimation.warnings import fit_warnings, turning_warnings, two_level_warnings
@@ -189,13 +189,14 @@ def _trial_fits(
             "estimate": residual(skeleton, bsp, motion, loads.sum(axis=1)),
         }
         moments = {
-            "literature": inverse_dynamics(before, literature, window.motion, k.foot_loads),
-            "estimate": inverse_dynamics(skeleton, bsp, motion, loads),
+            "literature": by_coordinate(k, inverse_dynamics(before, literature, window.motion, k.foot_loads)),
+            "estimate": by_coordinate(k, inverse_dynamics(skeleton, bsp, motion, loads)),
         }
         errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
         timing = {**seconds, "estimate": spent * len(k.time)}
         timing["total"] = sum(timing.values())
-        trials.append(TrialFit(k, skeleton, motion, residuals, moments, moment_sd, errors, timing))
+        sd = None if moment_sd is None else by_coordinate(k, moment_sd)
+        trials.append(TrialFit(k, skeleton, motion, residuals, moments, sd, errors, timing))
     return tuple(trials)
 
 
@@ -208,4 +209,5 @@ def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -
     used = skeleton.with_markers([m for m in skeleton.markers if m.label in labels])
     modelled = used.marker_positions(used.pose(motion.q))
     measured = kinematics.trial.markers.select(used.labels).positions[kinematics.frames]
-    return np.linalg.norm(measured - modelled, axis=-1)
+    result: np.ndarray = np.linalg.norm(measured - modelled, axis=-1)
+    return result

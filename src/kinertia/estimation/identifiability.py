@@ -121,7 +121,8 @@ def _scaled_regressor(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, root_sd: np.ndarray
 ) -> np.ndarray:
     rows = root_regressor(skeleton, bsp.segments, motion) / root_sd[:, None]
-    return rows.reshape(-1, rows.shape[-1])
+    result: np.ndarray = rows.reshape(-1, rows.shape[-1])
+    return result
 
 
 def _random_motion(count: int) -> Motion:
@@ -133,7 +134,8 @@ def _random_motion(count: int) -> Motion:
 def _signed(vectors: np.ndarray) -> np.ndarray:
     """The vectors (k, p) with their largest element positive."""
     largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=1)[:, None], axis=1)
-    return vectors * np.sign(largest)
+    result: np.ndarray = vectors * np.sign(largest)
+    return result
 
 
 def _words(segments: Sequence[str], vector: np.ndarray) -> str:

@@ -171,7 +171,8 @@ def _inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
         inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
         columns.append(inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     factor = np.stack(columns, axis=-1)
-    return factor @ factor.transpose(0, 2, 1)
+    result: np.ndarray = factor @ factor.transpose(0, 2, 1)
+    return result
 
 
 def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation: float) -> np.ndarray:

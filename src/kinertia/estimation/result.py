@@ -67,8 +67,9 @@ class TrialFit:
         motion: coordinates (rad, m) and derivatives that go with the estimate.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
             "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
-        moments: joint inverse dynamics (w, 27; N m, N) per stage: "literature", "estimate".
-        moment_sd: (w, 27) posterior deviations of those of the estimate; None after two-level.
+        moments: joint inverse dynamics per stage, "literature" and "estimate": N m (N of translations) over time, one
+            column per coordinate.
+        moment_sd: posterior deviations of those of the estimate, in the same form; None after two-level.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
     """
@@ -77,8 +78,8 @@ class TrialFit:
     skeleton: Skeleton
     motion: Motion
     residuals: Mapping[str, np.ndarray]
-    moments: Mapping[str, np.ndarray]
-    moment_sd: np.ndarray | None
+    moments: Mapping[str, pd.DataFrame]
+    moment_sd: pd.DataFrame | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
 
@@ -95,12 +96,17 @@ class TrialFit:
     @property
     def coordinates(self) -> pd.DataFrame:
         """Coordinates of the estimate (rad, m) over time."""
-        names = list(self.kinematics.ik.coordinates)
-        return pd.DataFrame(self.motion.q, index=pd.Index(self.time, name="time"), columns=names)
+        return by_coordinate(self.kinematics, self.motion.q)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: frames used, distances of the markers, residuals."""
         return display.html(self)
+
+
+def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:
+    """Values (w, c) of all coordinates over the measured window's time (s), a column per coordinate."""
+    index = pd.Index(kinematics.time, name="time")
+    return pd.DataFrame(values, index=index, columns=list(kinematics.ik.coordinates))
 
 
 @dataclass(frozen=True, eq=False)

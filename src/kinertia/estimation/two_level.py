@@ -277,7 +277,8 @@ class TwoLevelProblem:
     def _jacobian(self, bsp: BodySegmentParameters, change: np.ndarray, window: Window) -> np.ndarray:
         """(n, 6, k) dP / dtheta: Y dphi, and with correction also what the moved pelvis adds."""
         if not self.correct:
-            return root_regressor(self.skeleton, bsp.segments, window.motion) @ change
+            uncorrected: np.ndarray = root_regressor(self.skeleton, bsp.segments, window.motion) @ change
+            return uncorrected
         acceleration, _ = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
         measured = window.motion
         balanced = measured.with_root(measured.q[:, :6], measured.qd[:, :6], acceleration)
@@ -289,4 +290,5 @@ class TwoLevelProblem:
         moved = measured.with_root(position, velocity, acceleration)
         by = root_derivatives(self.skeleton, bsp, moved, window.wrench)
         direct = root_regressor(self.skeleton, bsp.segments, moved) @ change
-        return direct + by.q @ d_position + by.qd @ d_velocity + by.qdd @ d_acceleration
+        result: np.ndarray = direct + by.q @ d_position + by.qd @ d_velocity + by.qdd @ d_acceleration
+        return result

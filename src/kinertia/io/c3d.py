@@ -126,11 +126,9 @@ def _length_unit(path: Path, parameters: Any) -> tuple[str, float]:
 
 def _times(file: Any, kind: str) -> FloatArray:
     """Times (s) of the marker frames ("points") or of the analog samples ("analogs")."""
-    header = file["header"]["points"]
-    start = header["first_frame"] / header["frame_rate"]
-    if kind == "points":
-        return start + np.arange(file["data"]["points"].shape[2]) / header["frame_rate"]
-    return start + np.arange(file["data"]["analogs"].shape[2]) / (file["header"]["analogs"]["frame_rate"] or 1.0)
+    header, count = file["header"], file["data"][kind].shape[2]
+    start: float = header["points"]["first_frame"] / header["points"]["frame_rate"]
+    return start + np.arange(count) / (header[kind]["frame_rate"] or 1.0)
 
 
 def _continued(parameters: Any, name: str) -> list[str]:

@@ -47,7 +47,8 @@ class LabPlates:
             return np.zeros(3)
         axis = int(np.argmax(np.abs(loaded).sum(axis=0)))
         mean = (loaded * np.sign(loaded[:, axis, None])).mean(axis=0)
-        return mean / np.linalg.norm(mean)
+        result: FloatArray = mean / np.linalg.norm(mean)
+        return result
 
 
 def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, list[str]]:

@@ -86,4 +86,5 @@ def _ordered(corners: FloatArray) -> FloatArray:
     lab = _MM * corners @ _TO_LAB.T
     x, y, _ = _TO_PLATE @ (lab - lab.mean(axis=0)).T
     quadrant = np.select([(x > 0) & (y > 0), (x < 0) & (y > 0), (x < 0) & (y < 0)], [0, 1, 2], 3)
-    return lab[np.argsort(quadrant)]
+    result: FloatArray = lab[np.argsort(quadrant)]
+    return result

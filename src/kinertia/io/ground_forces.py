@@ -114,7 +114,8 @@ def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArra
 
 
 def _triple(table: pd.DataFrame, identifier: str) -> FloatArray:
-    return table[[identifier + axis for axis in "xyz"]].to_numpy(float)
+    result: FloatArray = table[[identifier + axis for axis in "xyz"]].to_numpy(float)
+    return result
 
 
 def _expect_numbers(path: Path, table: pd.DataFrame, identifier: str, where: np.ndarray) -> None:

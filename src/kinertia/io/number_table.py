@@ -102,7 +102,8 @@ def _all_at_once(rows: Sequence[str], columns: int) -> FloatArray | None:
         )
     except ValueError:
         return None
-    return table.to_numpy(copy=True)
+    result: FloatArray | None = table.to_numpy(copy=True)
+    return result
 
 
 def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -> list[float]:

@@ -43,7 +43,8 @@ class PiecewisePolynomial:
 
     def __call__(self, q: np.ndarray, order: int = 0) -> np.ndarray:
         """Values of the derivative of this order at q (n,)."""
-        return self._derivatives[order](q)
+        result: np.ndarray = self._derivatives[order](q)
+        return result
 
     def scaled(self, factor: float) -> PiecewisePolynomial:
         """This function times a factor."""
@@ -64,11 +65,14 @@ class Composed:
         g = [self.inner(q, k) for k in range(order + 1)]
         if order == 0:
             return f[0]
+        result: np.ndarray
         if order == 1:
-            return f[1] * g[1]
-        if order == 2:
-            return f[2] * g[1] ** 2 + f[1] * g[2]
-        return f[3] * g[1] ** 3 + 3.0 * f[2] * g[1] * g[2] + f[1] * g[3]
+            result = f[1] * g[1]
+        elif order == 2:
+            result = f[2] * g[1] ** 2 + f[1] * g[2]
+        else:
+            result = f[3] * g[1] ** 3 + 3.0 * f[2] * g[1] * g[2] + f[1] * g[3]
+        return result
 
 
 def polynomial(coefficients: ArrayLike) -> PiecewisePolynomial:

@@ -252,7 +252,8 @@ def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
 
 def second_moments(inertia: FloatArray) -> FloatArray:
     """(..., 3, 3) integrals of x x^T dm from inertia tensors about the same point."""
-    return 0.5 * np.trace(inertia, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - inertia
+    result: FloatArray = 0.5 * np.trace(inertia, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - inertia
+    return result
 
 
 def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
@@ -301,4 +302,7 @@ def _tensors(moments: FloatArray, rows: list[int], columns: list[int]) -> FloatA
 def _point_mass_inertia(mass: FloatArray, position: FloatArray) -> FloatArray:
     """(n, 3, 3) inertia about the origin of point masses (n,) at positions (n, 3)."""
     squares = np.einsum("ni,ni->n", position, position)
-    return mass[:, None, None] * (squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :])
+    result: FloatArray = mass[:, None, None] * (
+        squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :]
+    )
+    return result

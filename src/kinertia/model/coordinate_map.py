@@ -47,7 +47,8 @@ class CoordinateMap:
     @cached_property
     def _sum(self) -> np.ndarray:
         """(a, c) adds up the axes of every coordinate."""
-        return (self.owner[:, None] == np.arange(self.count)).astype(float)
+        result: np.ndarray = (self.owner[:, None] == np.arange(self.count)).astype(float)
+        return result
 
     def _evaluated(self, q: np.ndarray, order: int) -> np.ndarray:
         """(n, a) derivative of this order of every axis by its coordinate."""
@@ -82,7 +83,10 @@ class CoordinateMap:
         """
         if slopes is None:
             return columns
-        return (columns * slopes.reshape(len(slopes), *(1,) * (columns.ndim - 2), slopes.shape[1])) @ self._sum
+        result: np.ndarray = (
+            columns * slopes.reshape(len(slopes), *(1,) * (columns.ndim - 2), slopes.shape[1])
+        ) @ self._sum
+        return result
 
     def turned_forces(self, forces: np.ndarray, q: np.ndarray) -> np.ndarray | float:
         """(n, c) derivative of the generalised forces by their own coordinates that is due to the map alone.

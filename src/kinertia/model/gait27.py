@@ -37,6 +37,10 @@ ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
+Frame = tuple[np.ndarray, np.ndarray]
+"""Axes (3, 3) and origin (3,) m of a segment."""
+
+
 @dataclass(frozen=True)
 class Gait27:
     """The model of one person.
@@ -121,7 +125,8 @@ def _offsets(names: tuple[str, ...], side: str = "") -> tuple[Axis, ...]:
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
-    return Rotation.from_rotvec(np.asarray(axis) * angle).as_matrix()
+    result: np.ndarray = Rotation.from_rotvec(np.asarray(axis) * angle).as_matrix()
+    return result
 
 
 def _pin(parent: str, child: str, at: np.ndarray, relative: np.ndarray, axis: Axis, angle: float) -> Joint:
@@ -152,7 +157,9 @@ def _triple(vector: ArrayLike) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side: str) -> list[Joint]:
+def _leg(
+    marks: jc.Landmarks, frames: dict[str, Frame], lengths: dict[str, float], hip: np.ndarray, side: str
+) -> list[Joint]:
     pelvis, origin = frames["pelvis"]
     hip_at = origin + pelvis @ hip
     knee_at, knee_axis = jc.knee(marks, hip_at, side)
@@ -198,9 +205,9 @@ def _leg(marks: jc.Landmarks, frames: dict, lengths: dict, hip: np.ndarray, side
 
 def _arm(
     marks: jc.Landmarks,
-    frames: dict,
-    lengths: dict,
-    locked: dict,
+    frames: dict[str, Frame],
+    lengths: dict[str, float],
+    locked: dict[str, float],
     shoulder: np.ndarray,
     height_m: float,
     sex: str,
@@ -243,7 +250,7 @@ def _arm(
     ]
 
 
-def _markers(marks: jc.Landmarks, frames: dict) -> tuple[Marker, ...]:
+def _markers(marks: jc.Landmarks, frames: dict[str, Frame]) -> tuple[Marker, ...]:
     placed = []
     for segment, labels in marks.marker_set.segments.items():
         rotation, origin = frames[segment]

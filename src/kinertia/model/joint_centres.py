@@ -191,7 +191,8 @@ def _chord(proximal: np.ndarray, lateral: np.ndarray, wand: np.ndarray, half: fl
     out = out - (out @ up) * up
     out = out / np.linalg.norm(out)
     cosine = half / distance
-    return lateral + half * (cosine * up - np.sqrt(1 - cosine**2) * out)
+    result: np.ndarray = lateral + half * (cosine * up - np.sqrt(1 - cosine**2) * out)
+    return result
 
 
 def foot_frame(marks: Landmarks, side: str) -> tuple[np.ndarray, float]:
@@ -267,6 +268,8 @@ def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, tors
     lower = (wrist - elbow) / np.linalg.norm(wrist - elbow)
     normal = np.cross(upper, lower)
     if np.linalg.norm(normal) > np.sin(np.radians(15.0)):
-        return normal / np.linalg.norm(normal)
-    swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
-    return swing.apply(torso[:, 2])
+        axis: np.ndarray = normal / np.linalg.norm(normal)
+    else:
+        swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
+        axis = swing.apply(torso[:, 2])
+    return axis

@@ -56,7 +56,8 @@ def table_jacobian(theta: np.ndarray) -> np.ndarray:
 def dynamic_jacobian(theta: np.ndarray) -> np.ndarray:
     """(s, 10, 10): derivative of each segment's dynamic parameters (Pinocchio's order) by its own ten."""
     rows = theta.reshape(-1, 10)
-    return dynamic_by_table(np.exp(rows[:, 0]), rows[:, 1:4]) @ table_jacobian(theta)
+    result: np.ndarray = dynamic_by_table(np.exp(rows[:, 0]), rows[:, 1:4]) @ table_jacobian(theta)
+    return result
 
 
 def nearest_consistent(bsp: BodySegmentParameters, floor: float = 0.05) -> BodySegmentParameters:
@@ -78,4 +79,5 @@ def _lower(rows: np.ndarray) -> np.ndarray:
 
 
 def _inertia(second: np.ndarray) -> np.ndarray:
-    return np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    result: np.ndarray = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    return result

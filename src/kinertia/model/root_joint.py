@@ -35,11 +35,13 @@ class Root:
 
     def centre(self, q: np.ndarray) -> np.ndarray:
         """(n, 3) m, centre of the rotations in ground, at the root coordinates q (n, 6 or more)."""
-        return self.translation + q[:, :3] @ self._slides.T
+        result: np.ndarray = self.translation + q[:, :3] @ self._slides.T
+        return result
 
     @property
     def _slides(self) -> np.ndarray:
-        return self.rotation @ self.slides
+        result: np.ndarray = self.rotation @ self.slides
+        return result
 
     def axes(self, q: np.ndarray) -> np.ndarray:
         """(n, 3, 3): columns are the axes of the three rotations in ground; omega = A * angle rates."""

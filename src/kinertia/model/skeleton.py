@@ -136,7 +136,8 @@ class Skeleton:
     def periodic(self) -> np.ndarray:
         """(c,) True where the coordinate is an angle and a full turn changes nothing."""
         shaped = {axis.coordinate for axis in self._axes if axis.kind == "translation" or axis.function is not None}
-        return self.rotational & np.array([name not in shaped for name in self.coordinates])
+        result: np.ndarray = self.rotational & np.array([name not in shaped for name in self.coordinates])
+        return result
 
     @property
     def _axes(self) -> list[Axis]:
@@ -264,7 +265,8 @@ class Skeleton:
     def marker_positions(self, pose: Pose) -> np.ndarray:
         """(n, m, 3) m, model markers in ground at this pose."""
         turned = pose.rotation[:, self.marker_segments] @ self.marker_locals[:, :, None]
-        return turned[..., 0] + pose.translation[:, self.marker_segments]
+        result: np.ndarray = turned[..., 0] + pose.translation[:, self.marker_segments]
+        return result
 
     def model_with(self, bsp: BodySegmentParameters) -> pin.Model:
         """A Pinocchio model that carries these body segment parameters, and those of `carried`."""

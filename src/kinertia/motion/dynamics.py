@@ -64,7 +64,8 @@ def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wre
     model = skeleton.model_with(bsp)
     data = model.createData()
     tau = np.array([pin.rnea(model, data, x, v, a)[:6] for x, v, a in _axes(skeleton, motion)])
-    return skeleton.root.load(motion.q, tau) - skeleton.root.ground_load(motion.q, wrench)
+    result: np.ndarray = skeleton.root.load(motion.q, tau) - skeleton.root.ground_load(motion.q, wrench)
+    return result
 
 
 def consistent_root_acceleration(

@@ -129,7 +129,8 @@ def solve_ik(
 
 def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
     """(n, m) m, distances between measured and model markers."""
-    return np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
+    result: np.ndarray = np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
+    return result
 
 
 def _best_fit(
@@ -313,7 +314,8 @@ def twist_blocks(model: Skeleton, first: np.ndarray, second: np.ndarray, weight:
 
 def _per_segment(model: Skeleton) -> np.ndarray:
     """(s, m) 1 where the marker is on the segment."""
-    return (np.arange(len(model.segments))[:, None] == model.marker_segments).astype(float)
+    result: np.ndarray = (np.arange(len(model.segments))[:, None] == model.marker_segments).astype(float)
+    return result
 
 
 def ancestor_of(model: Skeleton) -> np.ndarray:
@@ -335,4 +337,5 @@ def _uninformed(normal: np.ndarray) -> np.ndarray:
     """(n, c) True where the visible markers do not determine the coordinate, from J^T J (n, c, c)."""
     c = normal.shape[-1]
     deviation = np.sqrt(np.einsum("ncc->nc", np.linalg.inv(normal + 1e-9 * np.eye(c))))
-    return deviation > _UNINFORMED_RAD_PER_M
+    result: np.ndarray = deviation > _UNINFORMED_RAD_PER_M
+    return result

@@ -66,7 +66,8 @@ class Kinematics:
     @cached_property
     def time(self) -> np.ndarray:
         """(w,) s, the frames inside the window."""
-        return self.trial.markers.time[self.frames]
+        result: np.ndarray = self.trial.markers.time[self.frames]
+        return result
 
     @cached_property
     def motion(self) -> Motion:

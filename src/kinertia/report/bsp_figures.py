@@ -45,7 +45,8 @@ def departures(fit: Fit) -> np.ndarray | None:
     """(s, 10) estimate minus start in prior deviations, 0 where held; None after two-level, which has none."""
     if fit.posterior is None:
         return None
-    return (fit.estimate.table() - fit.literature.table()) / _scale(fit.posterior)
+    result: np.ndarray | None = (fit.estimate.table() - fit.literature.table()) / _scale(fit.posterior)
+    return result
 
 
 def _scale(posterior: Posterior) -> np.ndarray:

@@ -68,10 +68,13 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics")
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
     for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
-        write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage]), False, file)
+        write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage].to_numpy()), False, file)
     if trial.moment_sd is not None:
         write_sto(
-            folder / "inverse_dynamics_sd.sto", _table(trial, loads, trial.moment_sd), False, "inverse_dynamics_sd"
+            folder / "inverse_dynamics_sd.sto",
+            _table(trial, loads, trial.moment_sd.to_numpy()),
+            False,
+            "inverse_dynamics_sd",
         )
     columns = [f"{stage}_{name}" for stage in trial.residuals for name in _RESIDUALS]
     residuals = np.hstack(list(trial.residuals.values()))

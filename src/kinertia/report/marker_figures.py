@@ -58,7 +58,8 @@ def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
     seen = np.isfinite(errors_m)
     total = np.square(np.where(seen, errors_m, 0.0)).sum(axis=0)
     with np.errstate(invalid="ignore"):
-        return np.sqrt(total / seen.sum(axis=0))
+        result: np.ndarray = np.sqrt(total / seen.sum(axis=0))
+        return result
 
 
 def gap_figure(trial: TrialFit) -> go.Figure | None:

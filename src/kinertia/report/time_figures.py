@@ -95,7 +95,8 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
 
 def motion_change(trial: TrialFit) -> np.ndarray:
     """(w, c) rad and m: estimated coordinates minus those of inverse kinematics; NaN where the markers told none."""
-    return trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
+    result: np.ndarray = trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
+    return result
 
 
 def moment_figure(
@@ -108,14 +109,14 @@ def moment_figure(
     for one in panels_of(skeleton):
         if min(one.columns.values()) < 6:
             continue
-        traces = [] if sd is None else _bands(one, trial, sd / mass_kg, mass_kg, thin)
+        traces = [] if sd is None else _bands(one, trial, sd.to_numpy() / mass_kg, mass_kg, thin)
         for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
             name = stage_name(stage, start)
-            traces += _sides(one, name, trial.time, trial.moments[stage] / mass_kg, thin, line)
+            traces += _sides(one, name, trial.time, trial.moments[stage].to_numpy() / mass_kg, thin, line)
         unit = "N m/kg" if one.rotational else "N/kg"
         title = f"{one.title.split(',')[0].removesuffix(' +')} moment ({unit})"
         panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))
-    peak = np.abs(trial.moments["estimate"][:, 6:]).max() / mass_kg
+    peak = np.abs(trial.moments["estimate"].to_numpy()[:, 6:]).max() / mass_kg
     alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
     return small_multiples(panels, alt, axis)
 
@@ -125,7 +126,7 @@ def _bands(one: Coordinate, trial: TrialFit, sd: np.ndarray, mass_kg: float, thi
     traces = []
     for side, column in one.columns.items():
         word, colour = style.SIDES[side]
-        middle, half = trial.moments["estimate"][:, column] / mass_kg, _BAND_SD * sd[:, column]
+        middle, half = trial.moments["estimate"].to_numpy()[:, column] / mass_kg, _BAND_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
         fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
         traces.append({**_curve(trial.time, middle - half, thin), **edge, "showlegend": False})

@@ -52,7 +52,8 @@ class Plan:
 
     def information(self, candidates: tuple[str, ...]) -> np.ndarray:
         """(s, 10): 1 - predicted variance / prior variance."""
-        return 1.0 - np.square(self.sd[candidates] / self.prior_sd)
+        result: np.ndarray = 1.0 - np.square(self.sd[candidates] / self.prior_sd)
+        return result
 
     def counts(self, candidates: tuple[str, ...]) -> dict[str, int]:
         """How many parameters these candidates would leave measured, informed, assumed."""

@@ -171,7 +171,8 @@ def _wobbled(trial: SyntheticTrial, share: float) -> np.ndarray:
         change[:, :3] += mass * rate
         change[:, 3:] += mass * (np.cross(centre + moved, pull + rate) - np.cross(centre, pull))
     upward = np.maximum(trial.foot_loads[:, :, 1], 0.0)
-    return (upward / upward.sum(axis=1, keepdims=True))[..., None] * change[:, None]
+    result: np.ndarray = (upward / upward.sum(axis=1, keepdims=True))[..., None] * change[:, None]
+    return result
 
 
 def _oscillator(base: np.ndarray, step: float) -> np.ndarray:
@@ -183,4 +184,5 @@ def _oscillator(base: np.ndarray, step: float) -> np.ndarray:
     )
     b = -np.array([1.0, 2.0, 1.0])
     swing = base - base[0]
-    return lfilter(b / a[0], a / a[0], swing, axis=0) - base[0] / w**2
+    result: np.ndarray = lfilter(b / a[0], a / a[0], swing, axis=0) - base[0] / w**2
+    return result

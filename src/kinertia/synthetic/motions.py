@@ -91,4 +91,5 @@ def _feet_stay(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
     middle = pose.translation[:, feet].mean(axis=1)
     soles = np.isin(skeleton.marker_segments, feet)
     lowest = skeleton.marker_positions(pose)[0, soles, 1].min()
-    return middle[0] - middle - np.array([0.0, lowest, 0.0])
+    result: np.ndarray = middle[0] - middle - np.array([0.0, lowest, 0.0])
+    return result

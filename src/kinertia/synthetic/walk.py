@@ -308,7 +308,8 @@ def _foot_points(skeleton: Skeleton, motion: Motion, landmark: str) -> np.ndarra
         )
         for side in "rl"
     ]
-    return np.stack(points, axis=1) * np.array([1.0, 0.0, 1.0])
+    result: np.ndarray = np.stack(points, axis=1) * np.array([1.0, 0.0, 1.0])
+    return result
 
 
 def _data(name: str) -> pd.DataFrame:

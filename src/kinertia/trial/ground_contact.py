@@ -105,7 +105,8 @@ class _FootMotion:
     def slowest(self, clearance: float) -> FloatArray:
         """(n,) m/s speed of the slowest marker not higher than this clearance; infinite where none is."""
         speed = np.linalg.norm(self.velocity, axis=2)
-        return np.where(self.height <= clearance, speed, np.inf).min(axis=1)
+        result: FloatArray = np.where(self.height <= clearance, speed, np.inf).min(axis=1)
+        return result
 
 
 def _foot_motion(markers: Markers) -> _FootMotion:

@@ -56,8 +56,10 @@ class Information:
             information = information + as_displaced(self.of_trials[k] / count, layout.locals, sd)
         theta = layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
-        return chain @ root_of_covariance(information)[theta]
+        result: np.ndarray = chain @ root_of_covariance(information)[theta]
+        return result
 
     def sd(self, trials: Iterable[int]) -> np.ndarray:
         """(s, 10) deviations of the body segment parameters that these trials together would leave."""
-        return np.linalg.norm(self.root(trials), axis=1).reshape(-1, 10)
+        result: np.ndarray = np.linalg.norm(self.root(trials), axis=1).reshape(-1, 10)
+        return result

@@ -54,7 +54,8 @@ class Displaced:
 
     def step(self, step: np.ndarray) -> np.ndarray:
         """(k,) step of the displacements that goes with a step (S,) of the static unknowns."""
-        return self.rest + self.gain @ step
+        result: np.ndarray = self.rest + self.gain @ step
+        return result
 
 
 def as_displaced(information: np.ndarray, places: slice, sd_m: np.ndarray) -> np.ndarray:

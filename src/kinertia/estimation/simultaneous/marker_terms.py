@@ -71,7 +71,7 @@ class ErrorInformation:
     def __matmul__(self, values: np.ndarray) -> np.ndarray:
         """(n, m, ...) the information times values (n, m, ...), along time."""
         own, following = (part.reshape(*part.shape, *(1,) * (values.ndim - 2)) for part in (self.own, self.next))
-        result = own * values
+        result: np.ndarray = own * values
         result[:-1] += following * values[1:]
         result[1:] += following * values[:-1]
         return result

@@ -91,7 +91,7 @@ def assemble(
 
 def by_splines(values: np.ndarray, parts: tuple[np.ndarray, ...]) -> np.ndarray:
     """(d, r, 6, c) derivatives by the coefficients of the six active splines, from those by q, qd, qdd (d, r, c)."""
-    result = values[0][:, None, :, None] * parts[0][:, :, None]
+    result: np.ndarray = values[0][:, None, :, None] * parts[0][:, :, None]
     for value, part in zip(values[1:], parts[1:], strict=True):
         result += value[:, None, :, None] * part[:, :, None]
     return result
@@ -102,7 +102,8 @@ def _neighbours(basis: MotionBasis) -> np.ndarray:
     values, first = basis.values[0], basis.first
     later = np.zeros((len(first) - 1, SPLINES_PER_BLOCK + 1))
     np.put_along_axis(later, np.diff(first)[:, None] + np.arange(6), values[1:], axis=1)
-    return (values[:-1, :, None] * later[:, None]).reshape(len(later), -1)
+    result: np.ndarray = (values[:-1, :, None] * later[:, None]).reshape(len(later), -1)
+    return result
 
 
 @dataclass(frozen=True)

@@ -229,7 +229,8 @@ def _noise(
 
 def _columns(errors: np.ndarray, sd_m: np.ndarray) -> np.ndarray:
     """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
-    return np.nan_to_num(errors / sd_m[:, None]).reshape(len(errors), -1)
+    result: np.ndarray = np.nan_to_num(errors / sd_m[:, None]).reshape(len(errors), -1)
+    return result
 
 
 def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:

@@ -45,7 +45,8 @@ class FootPlates:
 
     def columns(self, plates: Sequence[str]) -> np.ndarray:
         """(n, 2) index into these plates (a session's) of the plate that each foot stands on."""
-        return np.array([plates.index(name) for name in self.plates])[self.carrier]
+        result: np.ndarray = np.array([plates.index(name) for name in self.plates])[self.carrier]
+        return result
 
     def corrected(self, time: np.ndarray, carrier: np.ndarray, plates: np.ndarray, derivative: int = 0) -> np.ndarray:
         """(n, 2, 6) loads on the feet at these times, of plates put right, or their time derivatives.
@@ -59,7 +60,8 @@ class FootPlates:
         here = plates[carrier]
         loads[..., 3:] += np.cross(self._ground_offset(here), loads[..., :3])
         loads[..., 4] += here[..., 3] * loads[..., 1]
-        return (1.0 + here[..., 2:3]) * loads
+        result: np.ndarray = (1.0 + here[..., 2:3]) * loads
+        return result
 
     def by_plate(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
         """(n, 6, 4 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 4)."""
@@ -76,4 +78,5 @@ class FootPlates:
 
     def _ground_offset(self, plates: np.ndarray) -> np.ndarray:
         """(..., 3) m: offsets of plates (..., 4) in the trial's axes."""
-        return plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]
+        result: np.ndarray = plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]
+        return result

@@ -123,7 +123,8 @@ class Layout:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.locals.stop
+        result: int = self.locals.stop
+        return result
 
 
 @dataclass(frozen=True)
@@ -340,4 +341,5 @@ def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
     """
     d, r, wide = regressor.shape
     by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain
-    return by_segment.transpose(1, 0, 2).reshape(d, r, wide)
+    result: np.ndarray = by_segment.transpose(1, 0, 2).reshape(d, r, wide)
+    return result

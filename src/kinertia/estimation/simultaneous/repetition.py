@@ -115,7 +115,8 @@ def _resampled(errors: np.ndarray, step: float) -> np.ndarray:
     before = np.minimum(at.astype(int), len(errors) - 1)
     after = np.minimum(before + 1, len(errors) - 1)
     share = (at - before)[:, None]
-    return (1.0 - share) * errors[before] + share * errors[after]
+    result: np.ndarray = (1.0 - share) * errors[before] + share * errors[after]
+    return result
 
 
 def _refined(alike: np.ndarray, period: int) -> float:

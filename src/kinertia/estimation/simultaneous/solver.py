@@ -137,7 +137,8 @@ def root_of_covariance(information: np.ndarray) -> np.ndarray:
     """
     scale = 1.0 / np.sqrt(np.diag(information))
     values, vectors = np.linalg.eigh(scale[:, None] * information * scale)
-    return scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+    result: np.ndarray = scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+    return result
 
 
 def _step(problem: MapProblem, here: Linearised, damping: float, scale: np.ndarray) -> tuple[Linearised, float, float]:
