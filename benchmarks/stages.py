@@ -25,11 +25,12 @@ from threadpoolctl import threadpool_limits
 from kinertia.estimation.prepare import calibrate
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from kinertia.model.anthropometry import literature_bsp
-from kinertia.model.marker_set import MarkerSet, choose_marker_set
+from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import smooth

@@ -19,8 +19,8 @@ import pandas as pd
 from scipy.optimize import minimize_scalar
 
 from kinertia.estimation.prepare import calibrate
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
-from kinertia.model.marker_set import read_marker_set
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, residual, root_derivatives
 from kinertia.motion.kinematics import Kinematics, solve_kinematics

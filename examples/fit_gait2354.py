@@ -18,9 +18,9 @@ import numpy as np
 from kinertia import Subject, read_recording
 from kinertia.estimation.prepare import calibrate
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.marker_set import choose_marker_set
 from kinertia.motion.dynamics import joined, residual
 from kinertia.motion.inverse_kinematics import rms
 from kinertia.motion.kinematics import facing, solve_kinematics

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.gait27 import Gait27, build_gait27
-from kinertia.model.marker_set import read_marker_set
 from kinertia.motion.dynamics import Motion, residual
 from kinertia.trial.data import Markers, Recording
 

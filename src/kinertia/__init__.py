@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from kinertia.estimation.result import Fit as Fit
     from kinertia.estimation.result import TrialFit as TrialFit
     from kinertia.estimation.simultaneous.fit import Posterior as Posterior
+    from kinertia.io.marker_set_file import choose_marker_set as choose_marker_set
+    from kinertia.io.marker_set_file import read_marker_set as read_marker_set
     from kinertia.io.osim.reader import read_osim as read_osim
     from kinertia.io.recording import read_recording as read_recording
     from kinertia.io.subject_file import SubjectFile as SubjectFile
@@ -56,8 +58,6 @@ if TYPE_CHECKING:
     from kinertia.model.bsp import BodySegmentParameters as BodySegmentParameters
     from kinertia.model.imported import OsimModel as OsimModel
     from kinertia.model.marker_set import MarkerSet as MarkerSet
-    from kinertia.model.marker_set import choose_marker_set as choose_marker_set
-    from kinertia.model.marker_set import read_marker_set as read_marker_set
     from kinertia.model.skeleton import Skeleton as Skeleton
     from kinertia.motion.dynamics import Motion as Motion
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
@@ -88,9 +88,10 @@ _ROOMS = {
     "model.anthropometry": "BodyGeometry literature_bsp",
     "model.bsp": "BodySegmentParameters",
     "model.imported": "OsimModel",
-    "model.marker_set": "MarkerSet choose_marker_set read_marker_set",
+    "model.marker_set": "MarkerSet",
     "model.skeleton": "Skeleton",
     "motion.dynamics": "Motion inverse_dynamics residual",
+    "io.marker_set_file": "choose_marker_set read_marker_set",
     "io.osim.reader": "read_osim",
     "io.recording": "read_recording",
     "io.subject_file": "SubjectFile read_subject",

@@ -7,13 +7,13 @@ import upright_model as upright
 from kinertia.checks.model import check_model
 from kinertia.checks.verdict import stands_against
 from kinertia.errors import SubjectError
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.model.anatomy import model_segments
 from kinertia.model.anthropometry import SEGMENTS, literature_bsp
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.marker_set import choose_marker_set
 
 PERSON = (upright.MASS_KG, upright.HEIGHT_M, upright.SEX)
 

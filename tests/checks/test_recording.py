@@ -9,8 +9,8 @@ import pytest
 
 from kinertia.checks.recording import check_recording, common_marker_set
 from kinertia.checks.verdict import stands_against
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
-from kinertia.model.marker_set import read_marker_set
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Markers

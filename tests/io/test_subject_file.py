@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from kinertia.errors import FileError
 from kinertia.io.subject_draft import init_subject
-from kinertia.io.subject_file import _line, _lines, read_subject
+from kinertia.io.subject_file import read_subject
+from kinertia.io.toml_lines import TomlFile
 from kinertia.settings import Settings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -232,10 +233,10 @@ def test_locator_finds_every_key(tables):
         for key in keys:
             text += [f"  {key} = [1,", "   2]"]
             expected[(*place, key)] = len(text) - 1
-    lines = _lines("\n".join(text))
+    document = TomlFile("\n".join(text), {})
     for place, line in expected.items():
-        assert _line(lines, place) == line
-    assert _line(lines, ("nowhere", 1)) is None
+        assert document.line(place) == line
+    assert document.line(("nowhere", 1)) is None
 
 
 def completed(text):

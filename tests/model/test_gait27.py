@@ -4,6 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import generic_model, generic_static, recording, standing_positions
 from kinertia.errors import MarkerSetError
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.gait27 import (
     ARM_COORDINATES,
     ARM_ROTATIONS,
@@ -13,7 +14,6 @@ from kinertia.model.gait27 import (
     SHOULDER_OFFSETS,
     build_gait27,
 )
-from kinertia.model.marker_set import read_marker_set
 from kinertia.motion.inverse_kinematics import solve_ik
 
 CLEVELAND = read_marker_set("cleveland-clinic")

@@ -4,10 +4,10 @@ import pytest
 
 from generic_static import recording, standing_positions
 from kinertia.errors import MarkerSetError
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model import joint_centres as jc
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.marker_set import read_marker_set
 from kinertia.motion.inverse_kinematics import solve_ik
 
 PLUG_IN = read_marker_set("plug-in-gait")

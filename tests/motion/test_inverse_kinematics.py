@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import marker_jacobian, sampled
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.marker_set import choose_marker_set
 from kinertia.motion.inverse_kinematics import _STEP_TOLERANCE, ancestor_of, normal_equations, solve_ik
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.model.marker_set import read_marker_set
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.motion.kinematics import _bridged, facing, solve_kinematics
 from kinertia.trial.data import FootLoads, Markers, Trial
 

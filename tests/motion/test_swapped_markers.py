@@ -7,9 +7,9 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import TrialError
 from kinertia.estimation.calibration import sampled
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.gait27 import ARM_ROTATIONS, build_gait27
-from kinertia.model.marker_set import choose_marker_set, read_marker_set
 from kinertia.motion.swapped_markers import check_labels
 from kinertia.trial.data import Markers
 

@@ -15,8 +15,8 @@ import reference
 from command_line import run
 from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
 from kinertia.cli.app import app
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.subject_file import read_subject
-from kinertia.model.marker_set import read_marker_set
 
 
 def _examples():

@@ -13,10 +13,11 @@ from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
 from kinertia.estimation.input_checks import CONTRADICTING_MASS
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
+from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
 from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.imported import OsimModel
-from kinertia.model.marker_set import MarkerSet, check_marker_set, choose_marker_set, nearest_labels, nearest_preset
+from kinertia.model.marker_set import MarkerSet, check_marker_set, nearest_labels
 from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.free_moment import mean_turning

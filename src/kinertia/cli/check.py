@@ -17,12 +17,13 @@ from kinertia.checks.verdict import stands_against
 from kinertia.cli.options import Force, Quiet, Verbose, results_folder
 from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.model.anthropometry import check_subject
-from kinertia.model.marker_set import MarkerSet, read_marker_set
+from kinertia.model.marker_set import MarkerSet
 from kinertia.report.check_page import save_check_page
 from kinertia.trial.data import Recording
 

@@ -11,10 +11,11 @@ from kinertia.estimation.estimate import estimate
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.result import Fit
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.subject_file import SubjectFile, read_subject
-from kinertia.model.marker_set import MarkerSet, read_marker_set
+from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 
 

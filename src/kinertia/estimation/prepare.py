@@ -11,11 +11,12 @@ from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed,
 from kinertia.estimation.input_checks import check_same_person, check_visible, complete_subject, known
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
 from kinertia.model.imported import OsimModel
-from kinertia.model.marker_set import MarkerSet, check_marker_set, choose_marker_set
+from kinertia.model.marker_set import MarkerSet, check_marker_set
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread

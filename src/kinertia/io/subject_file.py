@@ -27,7 +27,6 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -41,11 +40,10 @@ from pydantic import (
 )
 
 from kinertia.errors import FileError, SettingsError, SubjectError
+from kinertia.io.marker_set_file import preset_names
+from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.model.marker_set import preset_names
 from kinertia.settings import Settings, Subject, Table, folder_of
-
-Location = tuple[str | int, ...]
 
 
 def _file(value: object, info: ValidationInfo) -> Path:
@@ -139,30 +137,28 @@ def read_subject(path: str | Path) -> SubjectFile:
             wrong value, no such trial file, two trials of one name, implausible mass); with the line.
     """
     path = Path(path).resolve()
-    text, content = _parsed(path)
-    lines = _lines(text)
+    document = read_toml(path, "a subject file (subject.toml)")
     try:
-        result = SubjectFile.model_validate(content, context={"folder": path.parent})
+        result = SubjectFile.model_validate(document.content, context={"folder": path.parent})
     except ValidationError as error:
-        end = text.count("\n") + 1
         # a trial with an error in it does not count, so that pydantic also finds too few trials
         errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
-        line, sentence = min((_line(lines, one["loc"]) or end, _sentence(one)) for one in errors)
+        line, sentence = min((document.line(one["loc"]) or document.last_line, _sentence(one)) for one in errors)
         raise FileError(path, sentence, line) from None
     if lack := _incomplete(result):
         place, sentence = lack
-        raise FileError(path, sentence, _line(lines, place) or text.count("\n") + 1)
+        raise FileError(path, sentence, document.line(place) or document.last_line)
     subject, names = result.subject, [trial.name for trial in result.trials]
     mass_kg = 70.0 if subject.mass_kg is None else subject.mass_kg  # left open: any plausible value
     height_m = 1.7 if subject.height_m is None else subject.height_m
     try:
         check_subject(mass_kg, height_m, subject.sex or "male")
     except SubjectError as error:
-        raise FileError(path, str(error), _line(lines, ("subject", error.field))) from error
+        raise FileError(path, str(error), document.line(("subject", error.field))) from error
     for index, name in enumerate(names):
         if name in names[:index]:
             problem = f"trial '{name}' is there already; give this one a name = \"...\" of its own"
-            raise FileError(path, problem, _line(lines, ("trial", index, "name")))
+            raise FileError(path, problem, document.line(("trial", index, "name")))
     return result
 
 
@@ -214,60 +210,6 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
     if problem := _incomplete(changed):
         raise SettingsError(problem[1])
     return changed
-
-
-def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
-    """The text and what TOML makes of it."""
-    if not path.is_file():
-        raise FileError(path, "no such file; expected a subject file (subject.toml)")
-    raw = path.read_bytes()
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise FileError(path, "not UTF-8 text; save the file in the UTF-8 encoding", line) from error
-    try:
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, _, where = str(error).rpartition(" (at ")
-        number = re.match(r"line (\d+)", where)
-        line = int(number[1]) if number else text.count("\n") + 1
-        hints = {"Invalid value": "; put text in quotes", "Unescaped": "; write paths with / instead of \\"}
-        hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
-        raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
-
-
-def _lines(text: str) -> dict[Location, int]:
-    """Line number (from 1) of every table heading and key, by its place: ("trial", 1, "markers").
-
-    Reads one `[table]`, `[[table]]` or `key =` per line, which is how subject files are written; what stands
-    inside an inline table is found at the key that holds it.
-    """
-    places: dict[Location, int] = {}
-    table: Location = ()
-    counts: dict[Location, int] = {}
-    for number, line in enumerate(text.split("\n"), start=1):
-        if heading := re.match(r"\s*(\[\[?)\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$", line):
-            place = table = _keys(heading[2])
-            if heading[1] == "[[":
-                counts[place] = counts.get(place, -1) + 1
-                place = table = (*place, counts[place])
-        elif key := re.match(r"\s*([\w.\"' -]+?)\s*=", line):
-            place = (*table, *_keys(key[1]))
-        else:
-            continue
-        for size in range(1, len(place) + 1):
-            places.setdefault(place[:size], number)
-    return places
-
-
-def _keys(dotted: str) -> Location:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
-
-
-def _line(lines: dict[Location, int], place: Location) -> int | None:
-    """Line of a place; of the nearest that holds it where the file does not have it."""
-    return next((lines[place[:size]] for size in range(len(place), 0, -1) if place[:size] in lines), None)
 
 
 _TABLES: dict[str, type[Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)

@@ -21,10 +21,11 @@ import pandas as pd
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.two_level import Integration, Window
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.marker_set import MarkerSet, read_marker_set
+from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual
 from kinertia.trial.data import Markers, Recording

@@ -1,0 +1,100 @@
+"""Marker sets from TOML files: three come with the package, and a user's own has the same form.
+
+Copy one from `src/kinertia/io/marker_sets/` and change it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+from kinertia.errors import FileError
+from kinertia.io.toml_lines import TomlFile, parse_toml, read_toml
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, mismatch, share_worn
+
+
+def preset_names() -> list[str]:
+    """Names of the marker sets that come with the package."""
+    folder = resources.files("kinertia.io") / "marker_sets"
+    return sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def read_marker_set(name: str | Path) -> MarkerSet:
+    """A preset by its name, or a user's own from a TOML file.
+
+    Raises:
+        FileError: no such preset or file, or the file is not a marker set.
+    """
+    if str(name) in preset_names():
+        text = (resources.files("kinertia.io") / "marker_sets" / f"{name}.toml").read_text(encoding="utf-8")
+        path = Path(f"{name}.toml")
+        return _marker_set(parse_toml(text, path), path)
+    path = Path(name)
+    if not path.is_file():
+        raise FileError(path, f"no such marker set; give a TOML file or one of the presets {', '.join(preset_names())}")
+    return _marker_set(read_toml(path, "a marker set"), path)
+
+
+def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
+    """The preset that fits the labels of a static trial.
+
+    Raises:
+        MarkerSetError: no preset fits; says for the best one what is missing and the nearest labels.
+    """
+    best = nearest_preset(labels)
+    if share_worn(best, labels) < 0.8:
+        raise mismatch(best, labels, "no marker-set preset fits the static trial; the nearest is")
+    return best
+
+
+def nearest_preset(labels: Sequence[str]) -> MarkerSet:
+    """The preset that shares most of its labels with these, be it many or few."""
+    return max(map(read_marker_set, preset_names()), key=lambda preset: share_worn(preset, labels))
+
+
+def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
+    content = document.content
+    known = {"name": None, "landmarks": LANDMARKS, "segments": SEGMENTS, "widths": WIDTHS}
+    for table, entries in content.items():
+        if table not in known:
+            raise FileError(
+                path, f"unknown entry '{table}'; a marker set has {', '.join(known)}", document.line((table,))
+            )
+        names = known[table]
+        if names is None:
+            continue
+        if not isinstance(entries, dict):
+            raise FileError(path, f"'{table}' must be a table, [{table}]", document.line((table,)))
+        for entry, value in entries.items():
+            _check_entry(path, document, table, entry, value, names)
+    segments = {segment: _labels(content.get("segments", {}).get(segment, ())) for segment in SEGMENTS}
+    if len(segments["pelvis"]) < 3:
+        raise FileError(path, "[segments] pelvis must list at least three markers")
+    for side in ("asis_r", "asis_l"):
+        if side not in content.get("landmarks", {}):
+            raise FileError(
+                path, f"[landmarks] must name {side}: it makes the pelvis frame, and tells which way one faces"
+            )
+    return MarkerSet(
+        name=str(content.get("name", path.stem)),
+        landmarks={key: _labels(value) for key, value in content.get("landmarks", {}).items()},
+        segments=segments,
+        widths=dict(content.get("widths", {})),
+    )
+
+
+def _check_entry(path: Path, document: TomlFile, table: str, entry: str, value: object, names: Sequence[str]) -> None:
+    line = document.line((table, entry))
+    if entry not in names:
+        near = difflib.get_close_matches(entry, names, n=1)
+        hint = f"; did you mean {near[0]}?" if near else f"; known: {', '.join(names)}"
+        raise FileError(path, f"unknown [{table}] entry '{entry}'{hint}", line)
+    items = value if isinstance(value, list) else [value]
+    if not items or not all(isinstance(item, str) and item for item in items):
+        raise FileError(path, f"[{table}] {entry} must be a label or a list of labels, not {value!r}", line)
+
+
+def _labels(value: str | Sequence[str]) -> tuple[str, ...]:
+    return (value,) if isinstance(value, str) else tuple(value)

@@ -1,0 +1,99 @@
+"""TOML files that a person writes, with the line of every table and key: errors in them name the line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from kinertia.errors import FileError
+
+Location = tuple[str | int, ...]
+"""Place of a table or key from the top: ("trial", 1, "markers")."""
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """A TOML text and what it says."""
+
+    text: str
+    content: dict[str, Any]
+
+    @cached_property
+    def lines(self) -> dict[Location, int]:
+        """Line number (from 1) of every table heading and key, by its place."""
+        return find_lines(self.text)
+
+    @property
+    def last_line(self) -> int:
+        """Where something that is missing would go."""
+        return self.text.count("\n") + 1
+
+    def line(self, place: Location) -> int | None:
+        """Line of a place; of the nearest that holds it where the file does not have it."""
+        return next((self.lines[place[:size]] for size in range(len(place), 0, -1) if place[:size] in self.lines), None)
+
+
+def read_toml(path: Path, expected: str) -> TomlFile:
+    """Read a file; `expected` says in messages what should be there ("a marker set").
+
+    Raises:
+        FileError: no such file, not UTF-8, not TOML; with the line.
+    """
+    if not path.is_file():
+        raise FileError(path, f"no such file; expected {expected}")
+    raw = path.read_bytes()
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise FileError(path, "not UTF-8 text; save the file in the UTF-8 encoding", line) from error
+    return parse_toml(text, path)
+
+
+def parse_toml(text: str, path: Path) -> TomlFile:
+    """The same from the text of a file.
+
+    Raises:
+        FileError: not TOML; with the line.
+    """
+    try:
+        return TomlFile(text, tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        what, _, where = str(error).rpartition(" (at ")
+        number = re.match(r"line (\d+)", where)
+        line = int(number[1]) if number else text.count("\n") + 1
+        hints = {"Invalid value": "; put text in quotes", "Unescaped": "; write paths with / instead of \\"}
+        hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
+        raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
+
+
+def find_lines(text: str) -> dict[Location, int]:
+    """Line number (from 1) of every table heading and key, by its place: ("trial", 1, "markers").
+
+    Reads one `[table]`, `[[table]]` or `key =` per line, which is how such files are written; what stands
+    inside an inline table is found at the key that holds it.
+    """
+    places: dict[Location, int] = {}
+    table: Location = ()
+    counts: dict[Location, int] = {}
+    for number, line in enumerate(text.split("\n"), start=1):
+        if heading := re.match(r"\s*(\[\[?)\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$", line):
+            place = table = _keys(heading[2])
+            if heading[1] == "[[":
+                counts[place] = counts.get(place, -1) + 1
+                place = table = (*place, counts[place])
+        elif key := re.match(r"\s*([\w.\"' -]+?)\s*=", line):
+            place = (*table, *_keys(key[1]))
+        else:
+            continue
+        for size in range(1, len(place) + 1):
+            places.setdefault(place[:size], number)
+    return places
+
+
+def _keys(dotted: str) -> Location:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
