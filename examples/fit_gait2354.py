@@ -15,75 +15,59 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia import Subject, read_recording
-from kinertia.estimation.prepare import calibrate
-from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.model.anthropometry import literature_bsp
-from kinertia.model.bsp import BodySegmentParameters
-from kinertia.motion.dynamics import joined, residual
-from kinertia.motion.inverse_kinematics import rms
-from kinertia.motion.kinematics import facing, solve_kinematics
-from kinertia.trial.plate_assignment import build_trial
+import kinertia
 
 
 def show(title: str, load: np.ndarray) -> None:
     """Print the RMS length of a residual's force and moment."""
-    force, moment = (rms(np.linalg.norm(load[:, part], axis=1)) for part in (slice(0, 3), slice(3, 6)))
+    force, moment = (np.sqrt(np.mean(np.sum(part**2, axis=1))) for part in (load[:, :3], load[:, 3:]))
     print(f"{title:<48}{force:6.1f} N {moment:6.1f} N m")
 
 
-def main(folder: Path, window_s: tuple[float, float] | None = None) -> BodySegmentParameters:
+def main(folder: Path, window_s: tuple[float, float] | None = None) -> kinertia.Fit:
     """Run all steps; `window_s` (s) uses only a part of the walk."""
     # 1. Read. Everything is in metres, newtons and seconds from here on, X forward, Y up, Z right.
-    static = read_recording(folder / "subject01_static.trc")
-    walk = read_recording(
+    static = kinertia.read_recording(folder / "subject01_static.trc")
+    walk = kinertia.read_recording(
         folder / "subject01_walk1.trc", folder / "subject01_walk1_grf.mot", folder / "subject01_walk1_grf.xml"
     )
     print(f"{len(walk.markers.labels)} markers at {walk.markers.rate_hz:g} Hz, {len(walk.markers.time)} frames")
 
-    # 2. Which marker is what, which plate carries which foot, and which frames have all ground contact measured.
-    marker_set = choose_marker_set(static.markers.labels)
-    worn = set(walk.markers.labels)
-    feet = {side: [label for label in labels if label in worn] for side, labels in marker_set.foot_labels().items()}
-    trial = build_trial(walk, feet, window_s)
-    rotation, turned_deg = facing(trial.markers, marker_set)
-    trial = trial.rotated(rotation)
-    print(f"{marker_set.name} markers; ground contact measured in {trial.measured.sum()} frames")
+    # 2. Look at it before estimating from it: which marker is what, which foot is on which plate, are the loads sound?
+    marker_set = kinertia.choose_marker_set(static.markers.labels)
+    check = kinertia.check_recording(walk, marker_set, mass_kg=72.6)
+    print(*(f"{verdict.level}: {verdict.sentence}" for verdict in check.verdicts), sep="\n")
 
-    # 3. Calibrate: joint centres, joint axes and marker positions from the static trial, adapted to the walk.
-    subject = Subject(name="subject01", sex="male", mass_kg=72.6, height_m=1.803)
-    model, skeleton, notes = calibrate(static, [trial], marker_set, subject, hip_centre="bell")
-    print(f"{len(skeleton.coordinates)} coordinates, {len(skeleton.segments)} segments", *notes, sep="\n")
-
-    # 4. Inverse kinematics frame by frame, then quintic splines whose smoothness cross-validation chooses.
-    kinematics = solve_kinematics(skeleton, trial, turned_deg, "gcv")
+    # 3. Prepare: joint centres and axes from the static trial, inverse kinematics, smoothing, the literature's BSPs.
+    subject = kinertia.Subject(name="subject01", sex="male", mass_kg=72.6, height_m=1.803)
+    ready = kinertia.prepare(subject, static, [kinertia.TrialInput(walk, window_s)], marker_set=marker_set)
+    (kinematics,) = ready.kinematics
+    print(
+        f"{len(ready.skeleton.coordinates)} coordinates, {len(ready.skeleton.segments)} segments",
+        *ready.notes,
+        sep="\n",
+    )
     print(f"markers are {1e3 * kinematics.ik.marker_rms_m:.1f} mm from the model's, RMS")
-    knee = np.degrees(kinematics.motion.q[:, skeleton.coordinates.index("knee_angle_r")])
+    knee = np.degrees(kinematics.motion.q[:, ready.skeleton.coordinates.index("knee_angle_r")])
     print(f"right knee angle from {knee.min():.0f} to {knee.max():.0f} degrees")
 
-    # 5. The residual: the load at the pelvis that the ground reactions do not explain.
-    literature = literature_bsp(72.6, 1.803, "male", model.geometry, "dumas")
-    window = Window(kinematics.time, kinematics.motion, kinematics.foot_loads.sum(axis=1))
-    show("residual of the literature's BSPs", residual(skeleton, literature, window.motion, window.wrench))
-
-    # 6. Pelvis correction: let the pelvis accelerate as the forces say, and stay as near as possible to the markers.
-    parts = stretches(window)
-    corrected = joined([correct_pelvis(skeleton, literature, part) for part in parts])
-    show("... with the pelvis corrected", residual(skeleton, literature, corrected, window.wrench))
-
-    # 7. The two-level estimate: the BSPs that leave the least residual after pelvis correction.
-    result = estimate_two_level(skeleton, literature, parts)
-    show("... with the estimated BSPs", np.concatenate(result.residuals))
-
-    # 8. Look at it before believing it.
-    print(f"total mass {result.bsp.total_mass_kg:.1f} kg")
-    for segment, before, after in zip(literature.segments, literature.mass_kg, result.bsp.mass_kg, strict=True):
-        print(f"  {segment:<12}{before:6.2f} -> {after:6.2f} kg")
-    print(
-        f"segments that no body can have: {(~result.bsp.physically_consistent()).sum()} of {len(literature.segments)}"
+    # 4. The residual: the load at the pelvis that the ground reactions do not explain.
+    wrench = kinematics.foot_loads.sum(axis=1)
+    show(
+        "residual of the literature's BSPs",
+        kinertia.residual(ready.skeleton, ready.literature, kinematics.motion, wrench),
     )
-    return result.bsp
+
+    # 5. Estimate motion, BSPs and calibration together.
+    fit = kinertia.estimate(ready)
+    show("... with the estimated motion and BSPs", fit.trials[0].residuals["estimate"])
+
+    # 6. Look at it before believing it.
+    print(*(f"{verdict.level}: {verdict.sentence}" for verdict in kinertia.verdicts(fit)), sep="\n")
+    print(fit.bsp[fit.bsp.parameter == "mass"][["segment", "literature", "estimate", "sd", "evidence"]].to_string())
+    knee_moment = fit.trials[0].moments["estimate"]["knee_angle_r"]
+    print(f"right knee moment from {knee_moment.min():.0f} to {knee_moment.max():.0f} N m")
+    return fit
 
 
 if __name__ == "__main__":

@@ -7,14 +7,13 @@ import fit_gait2354
 import kinertia
 
 
-@pytest.mark.usefixtures("few_evaluations")
 def test_step_by_step_example_runs(shared_data, capsys):
-    bsp = fit_gait2354.main(shared_data / "gait2354", (0.5, 0.9))
+    fit = fit_gait2354.main(shared_data / "gait2354", (0.7, 1.1))
     shown = capsys.readouterr().out
     forces = [float(force) for force in re.findall(r"([\d.]+) N +[\d.]+ N m", shown)]
-    assert len(forces) == 3
-    assert forces == sorted(forces, reverse=True)
-    assert bsp.total_mass_kg == pytest.approx(72.6, rel=0.1)
+    before, after = forces[:2]
+    assert after < before
+    assert fit.estimate.total_mass_kg == pytest.approx(72.6, rel=0.1)
 
 
 def test_every_exported_name_is_there():

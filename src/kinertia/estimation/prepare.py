@@ -113,7 +113,7 @@ def prepare(
     subject: Subject,
     static: Recording,
     inputs: Sequence[TrialInput],
-    settings: Settings,
+    settings: Settings | None = None,
     marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> Prepared:
@@ -122,6 +122,7 @@ def prepare(
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used.
     """
+    settings = settings or Settings()
     recordings = [item.recording for item in inputs]
     subject, warnings = complete_subject(subject, [static, *recordings])
     if marker_set is None:

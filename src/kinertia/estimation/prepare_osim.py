@@ -38,8 +38,8 @@ def prepare_osim(
     subject: Subject,
     model: OsimModel,
     inputs: Sequence[TrialInput],
-    settings: Settings,
-    calibrate: bool,
+    settings: Settings | None = None,
+    calibrate: bool = False,
     progress: Progress = lambda stage, share: None,
 ) -> Prepared:
     """The model fitted to all trials; the arguments are `estimate_bsp_of_model`'s.
@@ -47,6 +47,7 @@ def prepare_osim(
     Raises:
         KinertiaError: the subject, the model or a trial cannot be used.
     """
+    settings = settings or Settings()
     subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
     if not model.skeleton.markers:
         raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
