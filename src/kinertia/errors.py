@@ -11,7 +11,15 @@ from pathlib import Path
 
 
 class KinertiaError(Exception):
-    """Base of all errors raised on purpose; `str(error)` is one complete sentence for the user."""
+    """Base of all errors raised on purpose; `str(error)` is one complete sentence for the user.
+
+    Examples:
+        >>> try:
+        ...     kinertia.read_recording("walk.trc")
+        ... except kinertia.KinertiaError as error:
+        ...     print(type(error).__name__)
+        FileError
+    """
 
 
 class FileError(KinertiaError):
@@ -21,6 +29,11 @@ class FileError(KinertiaError):
         path: the file.
         line: one-based line number where the trouble was found, or None.
         problem: what was found, what was expected and what to do.
+
+    Examples:
+        >>> error = kinertia.FileError("subject.toml", "unknown key 'mas_kg'; did you mean 'mass_kg'?", line=3)
+        >>> str(error), error.line
+        ("subject.toml, line 3: unknown key 'mas_kg'; did you mean 'mass_kg'?", 3)
     """
 
     def __init__(self, path: str | Path, problem: str, line: int | None = None) -> None:
@@ -37,6 +50,13 @@ class MarkerSetError(KinertiaError):
     Attributes:
         missing: what is missing (labels or landmarks).
         nearest: for each missing item, the labels of the trial that look most like it.
+
+    Examples:
+        >>> try:
+        ...     kinertia.choose_marker_set(["A", "B", "C"])
+        ... except kinertia.MarkerSetError as error:
+        ...     print(len(error.missing) > 10)
+        True
     """
 
     def __init__(self, problem: str, missing: Sequence[str] = (), nearest: dict[str, list[str]] | None = None):
@@ -51,6 +71,10 @@ class TrialError(KinertiaError):
     Attributes:
         trial: the trial's name.
         problem: what was found, what was expected and what to do.
+
+    Examples:
+        >>> str(kinertia.TrialError("walk 1", "no force plate in it; give its forces"))
+        "trial 'walk 1': no force plate in it; give its forces"
     """
 
     def __init__(self, trial: str, problem: str) -> None:
@@ -65,6 +89,10 @@ class SubjectError(KinertiaError):
     Attributes:
         field: the field's name (`mass_kg`, `height_m`, `sex`).
         value: what was given.
+
+    Examples:
+        >>> str(kinertia.SubjectError("mass_kg", 72600, "give the body mass in kilograms"))
+        'mass_kg = 72600: give the body mass in kilograms'
     """
 
     def __init__(self, field: str, value: object, problem: str) -> None:
@@ -86,7 +114,12 @@ class PriorError(KinertiaError):
 
 
 class SettingsError(KinertiaError):
-    """An entry of the subject file or an option of the command line is missing or cannot be."""
+    """An entry of the subject file or an option of the command line is missing or cannot be.
+
+    Examples:
+        >>> isinstance(kinertia.SettingsError("cutoff_hz must be positive"), kinertia.KinertiaError)
+        True
+    """
 
 
 class OsimError(FileError):
@@ -95,6 +128,10 @@ class OsimError(FileError):
     Attributes:
         element: name of the joint, body, marker or constraint it is about; empty where it is the file as a whole.
         kind: the element's type, for example "EllipsoidJoint".
+
+    Examples:
+        >>> kinertia.OsimError("scaled.osim", "a joint that closes a loop", 120, element="knee_r").element
+        'knee_r'
     """
 
     def __init__(self, path: str | Path, problem: str, line: int | None = None, element: str = "", kind: str = ""):

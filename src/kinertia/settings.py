@@ -33,6 +33,10 @@ class Subject(Table):
     """Who walked. Mass (kg) and height (m) are None where the file leaves them to the C3D files.
 
     With an OpenSim model neither sex nor height is needed.
+
+    Examples:
+        >>> kinertia.Subject(name="A", sex="female", mass_kg=61.5, height_m=1.68).mass_kg
+        61.5
     """
 
     name: str = Field(min_length=1, description="name in files and report; left out: the folder's name")
@@ -49,7 +53,12 @@ class Subject(Table):
 
 
 class Settings(Table):
-    """How to estimate."""
+    """How to estimate.
+
+    Examples:
+        >>> kinertia.Settings(cutoff_hz=6.0).method
+        'simultaneous'
+    """
 
     method: Literal["simultaneous", "two-level"] = Field(
         default="simultaneous", description='estimator: "simultaneous" or "two-level" (the study\'s)'

@@ -41,6 +41,12 @@ class ModelCheck:
         symmetric: whether left mirrors right.
         verdicts: what speaks for and against simulating with this model.
         left_out: checks that were not made, and why; one sentence each.
+
+    Examples:
+        >>> subject = kinertia.walking_subject()
+        >>> check = kinertia.check_model(subject.skeleton, subject.literature, 72.6, 1.803, "male")
+        >>> any(verdict.level == "against" for verdict in check.verdicts)
+        False
     """
 
     name: str

@@ -67,6 +67,12 @@ class RecordingCheck:
         scale_kg: body mass as given or as the file tells, or None.
         verdicts: what speaks for and against a fit with this recording.
         notes: assumptions made while reading and sorting the loads.
+
+    Examples:
+        >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
+        >>> check = kinertia.check_recording(walk, mass_kg=72.6)
+        >>> check.marker_set.name, bool(check.windows)
+        ('Cleveland Clinic', True)
     """
 
     recording: Recording

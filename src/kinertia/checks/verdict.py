@@ -35,7 +35,12 @@ _NAMED = 4
 
 
 class Verdict(NamedTuple):
-    """One judgement: "good", "okay" or "against" using the numbers, and why, in one sentence."""
+    """One judgement: "good", "okay" or "against" using the numbers, and why, in one sentence.
+
+    Examples:
+        >>> kinertia.verdicts(fit)[0]
+        Verdict(level='good', sentence='the estimate converged')
+    """
 
     level: Level
     sentence: str

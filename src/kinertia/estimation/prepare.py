@@ -36,7 +36,13 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class TrialInput:
-    """A recording and, where the user gives one, the window (s) to use instead of the detected one."""
+    """A recording and, where the user gives one, the window (s) to use instead of the detected one.
+
+    Examples:
+        >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
+        >>> kinertia.TrialInput(walk, window_s=(0.5, 1.0)).window_s
+        (0.5, 1.0)
+    """
 
     recording: Recording
     window_s: tuple[float, float] | None = None
@@ -57,6 +63,11 @@ class Prepared:
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
         warnings, notes: one sentence each.
+
+    Examples:
+        >>> ready = kinertia.prepare_subject("lab/subject.toml")
+        >>> [kinematics.trial.name for kinematics in ready.kinematics]
+        ['walk']
     """
 
     subject: Subject

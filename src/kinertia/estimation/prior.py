@@ -61,6 +61,13 @@ class BspPrior:
 
     Raises:
         PriorError: the covariance has the wrong shape or is not positive definite, or a deviation is not positive.
+
+    Examples:
+        >>> from dataclasses import replace
+        >>> prior = kinertia.literature_prior(kinertia.walking_subject().literature)
+        >>> wide = replace(prior, covariance=4.0 * prior.covariance)  # twice the deviations
+        >>> bool(np.allclose(wide.sd, 2.0 * prior.sd))
+        True
     """
 
     mean: BodySegmentParameters

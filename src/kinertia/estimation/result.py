@@ -72,6 +72,11 @@ class TrialFit:
         moment_sd: posterior deviations of those of the estimate, in the same form; None after two-level.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
+
+    Examples:
+        >>> trial = fit.trials[0]  # fit = kinertia.fit_subject("subject.toml")
+        >>> trial.moments["estimate"]["knee_angle_r"].name, list(trial.residuals)
+        ('knee_angle_r', ['literature', 'corrected', 'estimate'])
     """
 
     kinematics: Kinematics
@@ -124,6 +129,13 @@ class Fit:
         warnings: what the user should know before using the numbers; one sentence each.
         notes: assumptions made on the way; one sentence each.
         file: the OpenSim model that the skeleton is from, if it is.
+
+    Examples:
+        >>> mass = fit.bsp[fit.bsp.parameter == "mass"]  # fit = kinertia.fit_subject("subject.toml")
+        >>> list(mass.columns)  # doctest: +NORMALIZE_WHITESPACE
+        ['segment', 'parameter', 'unit', 'literature', 'estimate', 'prior_sd', 'sd', 'information', 'evidence']
+        >>> fit.save("results").name
+        'results'
     """
 
     subject: Subject

@@ -121,7 +121,13 @@ class TrialFiles(Table):
 
 
 class SubjectFile(Table):
-    """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist."""
+    """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist.
+
+    Examples:
+        >>> wanted = kinertia.read_subject("lab/subject.toml")  # the files of `kinertia demo`
+        >>> [trial.name for trial in wanted.trials]
+        ['walk']
+    """
 
     subject: Subject
     model: Model

@@ -46,6 +46,14 @@ class BodyGeometry:
             suffixes `_r` and `_l`: `thigh` hip JC to knee JC; `shank` knee JC to ankle JC; `foot` ankle JC to
             the midpoint of metatarsal heads 1 and 5; `foot_total` heel to toe tip (only de Leva needs it);
             `upper_arm` shoulder JC to elbow JC; `forearm` elbow JC to wrist JC.
+
+    Examples:
+        >>> lengths = {f"{name}_{side}": 0.4 for side in "rl" for name in ("thigh", "shank")}
+        >>> lengths |= {f"{name}_{side}": 0.28 for side in "rl" for name in ("upper_arm", "forearm", "foot_total")}
+        >>> lengths |= {"foot_r": 0.15, "foot_l": 0.15, "torso": 0.48}
+        >>> geometry = kinertia.BodyGeometry((-0.1, 0.03, 0.0), (-0.05, -0.08, 0.0), lengths)
+        >>> round(kinertia.literature_bsp(70.0, 1.75, "male", geometry).total_mass_kg, 1)
+        70.0
     """
 
     lumbar_joint_m: tuple[float, float, float]

@@ -53,6 +53,13 @@ class BodySegmentParameters:
 
     Raises:
         ValueError: wrong shape, a name twice, a value that is not finite, or a tensor that is not symmetric.
+
+    Examples:
+        >>> bsp = kinertia.BodySegmentParameters(
+        ...     ("shank",), np.array([3.0]), np.array([[0.0, -0.18, 0.0]]), np.diag([0.04, 0.004, 0.04])[None]
+        ... )
+        >>> bsp.total_mass_kg, bool(bsp.physically_consistent().all())
+        (3.0, True)
     """
 
     segments: tuple[str, ...]

@@ -73,6 +73,11 @@ class OsimModel:
         joints: in the skeleton's order.
         couplings: dependent coordinates, which the skeleton does not have.
         marker_frames: per label, (3, 3) orientation of the frame that its location is given in, in its body.
+
+    Examples:
+        >>> model = kinertia.read_osim("model.osim")  # as `kinertia demo` writes it
+        >>> len(model.coordinates), round(model.bsp.total_mass_kg, 1)
+        (27, 72.6)
     """
 
     path: Path

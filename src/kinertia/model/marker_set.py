@@ -52,6 +52,10 @@ class MarkerSet:
         landmarks: landmark -> the labels whose mean it is.
         segments: segment -> labels of the markers that move with it.
         widths: joint -> name of a measurement (m) that comes with the static file.
+
+    Examples:
+        >>> kinertia.read_marker_set("plug-in-gait").foot_labels()["r"]
+        ['RHEE', 'RTOE']
     """
 
     name: str

@@ -105,6 +105,11 @@ class Skeleton:
         feet: the segments that the ground acts on, right and left.
         start: coordinates from which inverse kinematics starts elsewhere than from zero (rad or m).
         carried: parameters of segments that are given once and for all; `model_with` adds others to them.
+
+    Examples:
+        >>> skeleton = kinertia.walking_subject().skeleton
+        >>> len(skeleton.segments), skeleton.coordinates[:2]
+        (14, ('pelvis_tx', 'pelvis_ty'))
     """
 
     name: str

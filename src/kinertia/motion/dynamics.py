@@ -18,7 +18,15 @@ from kinertia.model.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class Motion:
-    """Coordinates and their derivatives at n frames: `q`, `qd`, `qdd`, each (n, c), rad and m."""
+    """Coordinates and their derivatives at n frames: `q`, `qd`, `qdd`, each (n, c), rad and m.
+
+    Examples:
+        >>> subject = kinertia.walking_subject()
+        >>> trial = kinertia.walk(subject)
+        >>> left = kinertia.residual(subject.skeleton, subject.bsp, trial.motion, trial.foot_loads.sum(axis=1))
+        >>> bool(np.abs(left).max() < 1e-6)  # the motion is consistent with its ground reactions
+        True
+    """
 
     q: np.ndarray
     qd: np.ndarray

@@ -43,7 +43,15 @@ class Explained:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """One trial, explained by the literature's parameters and by those from the other trials."""
+    """One trial, explained by the literature's parameters and by those from the other trials.
+
+    Examples:
+        >>> try:
+        ...     kinertia.cross_validate(kinertia.prepare_subject("lab/subject.toml"), "gcv")
+        ... except kinertia.KinertiaError as error:
+        ...     print(str(error).split(",")[0])
+        cross-validation needs at least two trials
+    """
 
     trial: str
     others: tuple[str, ...]

@@ -54,6 +54,10 @@ class SyntheticSubject:
         skeleton: the model of `static`.
         literature: Dumas' values for this person; CoMs lie off the segment axes.
         bsp: the truth.
+
+    Examples:
+        >>> round(kinertia.walking_subject().bsp.total_mass_kg, 1)
+        72.6
     """
 
     static: Recording
@@ -73,6 +77,11 @@ class SyntheticTrial:
         motion: coordinates and derivatives; pelvis integrated by the trapezoid rule.
         foot_loads: (n, 2, 6) on the right and left foot: force (N), moment about the ground origin (N m), ground axes.
         deviation: (6,) largest change of each pelvis coordinate from the start motion (m, rad).
+
+    Examples:
+        >>> trial = kinertia.walk(kinertia.walking_subject(), duration_s=0.5)
+        >>> trial.markers.positions.shape[0] == len(trial.time) == 51
+        True
     """
 
     skeleton: Skeleton

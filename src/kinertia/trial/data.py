@@ -44,6 +44,11 @@ class Markers:
         time: (n,) s, uniform.
         labels: the m marker names, each once.
         positions: (n, m, 3) m in ground axes; NaN where a marker was not seen.
+
+    Examples:
+        >>> markers = kinertia.Markers(np.arange(3) / 100, ("HEEL", "TOE"), np.zeros((3, 2, 3)))
+        >>> markers.rate_hz, markers.select(["TOE"]).positions.shape
+        (100.0, (3, 1, 3))
     """
 
     time: FloatArray
@@ -110,6 +115,13 @@ class PlateLoads:
         declared_feet: for each plate "r" or "l" where file or column names say so, else None. Only a claim:
             the loads file may be wrong, `kinertia.trial.plate_assignment` decides by the data.
         corners: (p, 4, 3) m, or None where the file does not tell.
+
+    Examples:
+        >>> force, moment = np.zeros((5, 1, 3)), np.zeros((5, 1, 3))
+        >>> force[:, 0, 1] = 700.0
+        >>> plates = kinertia.PlateLoads(np.arange(5) / 1000, ("plate 1",), force, moment, declared_feet=(None,))
+        >>> float(plates.force[:, :, 1].max())
+        700.0
     """
 
     time: FloatArray
@@ -143,6 +155,11 @@ class Recording:
         notes: one sentence for each assumption made while reading.
         length_unit: of the marker file ("mm"); everything here is in m.
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
+
+    Examples:
+        >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
+        >>> recording.name, recording.plates.names
+        ('walk', ('1_ground_force', '2_ground_force'))
     """
 
     name: str
@@ -171,6 +188,11 @@ class FootLoads:
         plates: names of the plates.
         on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
             where each foot has a plate of its own.
+
+    Examples:
+        >>> loads = fit.trials[0].kinematics.trial.loads  # right foot, left foot
+        >>> loads.wrench.shape[1:]
+        (2, 6)
     """
 
     time: FloatArray
@@ -211,6 +233,14 @@ class Trial:
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
+
+    Examples:
+        >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
+        >>> feet = kinertia.choose_marker_set(recording.markers.labels).foot_labels()
+        >>> worn = {side: [one for one in labels if one in recording.markers.labels] for side, labels in feet.items()}
+        >>> trial = kinertia.build_trial(recording, worn)
+        >>> bool(trial.measured.any())
+        True
     """
 
     name: str
