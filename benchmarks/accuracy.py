@@ -43,10 +43,10 @@ mirrors right, and the total mass within 0.5 %. It reads the noise from the mark
 
 {sections["study"]}
 
-**The demanded figures are not met, and nobody can meet them on this walk.** *At best* is the Cramér-Rao bound of an
+**The aim is not met, and nobody can meet it on this walk.** *At best* is the Cramér-Rao bound of an
 estimate that knows all that none can know: forces count as exact, and the covariance of the noise over time is that of
 the study's sinusoids, so that only what they leave free tells something, seen by cameras of 0.1 mm or even 0.01 mm. The
-moments of inertia are then still off by far more than is demanded: the trunk hardly turns at 1.14 m/s, so that one
+moments of inertia are then still off by far more than the aim: the trunk hardly turns at 1.14 m/s, so that one
 stride says little about its moments, which dominate the RMS, and they stay near the start. The lines after
 "simultaneous" change one thing each. How the noise is weighted changes the result by a few percent; telling the
 estimator where starts come from helps the masses and costs in the inertias.
@@ -103,7 +103,7 @@ decides for many. With squats, arm swings and trunk sway beside the walk errors 
 literature's, and masses better in 85 %.
 
 **Joint angles**: where calibration is off, as it is in practice, the estimate's errors are half of those of inverse
-kinematics (0.52 after one walk under skin motion, where at most 0.50 was demanded; 0.57 where squats draw the skin
+kinematics (0.52 after one walk under skin motion, where at most 0.50 was the aim; 0.57 where squats draw the skin
 farther). With an exact skeleton inverse kinematics profits from knowing it; the estimate, which does not trust the
 skeleton, is off by constant angles, since skin that goes with a joint looks like a joint elsewhere. What varies in time
 is better throughout.

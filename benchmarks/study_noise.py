@@ -108,5 +108,5 @@ def study_section(draws: Sequence[dict[str, tuple[float, float, float]]], bounds
     rows += bounds
     rows.append(["published: Table 1, two-level", "1.71", "180", "0.382"])
     rows.append(["published: 2007, splines and prior", "1.33", "21.6", "0.0745"])
-    rows.append(["**demanded**", "0.90", "15.0", "0.030"])
+    rows.append(["**aim**", "0.90", "15.0", "0.030"])
     return table(["estimate", "mass (kg)", "CoM (mm)", "inertia (kg m2)"], rows)

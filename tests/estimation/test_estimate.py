@@ -27,12 +27,12 @@ def test_inverse_kinematics_follows_the_markers(fit_of, name):
 
 
 @walks
-@pytest.mark.parametrize(("quantity", "demanded"), [("residual_force_rms_N", 5.0), ("residual_moment_rms_Nm", 3.0)])
-def test_correction_and_estimate_lower_the_residual(fit_of, name, quantity, demanded):
+@pytest.mark.parametrize(("quantity", "limit"), [("residual_force_rms_N", 5.0), ("residual_moment_rms_Nm", 3.0)])
+def test_correction_and_estimate_lower_the_residual(fit_of, name, quantity, limit):
     """The estimate weighs it against the markers: with moments far below, its force may be that of the correction."""
     residual = fit_of(name).trial[quantity]
     assert max(residual["estimate"], residual["corrected"]) < residual["literature"]
-    assert residual["estimate"] < demanded
+    assert residual["estimate"] < limit
 
 
 @walks

@@ -130,7 +130,7 @@ def rank(skeleton, bsp) -> int:
 
 
 def test_masses_are_lost_when_the_centres_of_mass_lie_on_the_axes(model, truth):
-    """DESIGN section 5: zero products of inertia separate masses only through off-axis centres of mass."""
+    """zero products of inertia separate masses only through off-axis centres of mass."""
     table = truth.table()
     table[:, [1, 3]] = 0.0
     assert rank(model.skeleton, truth) == 49

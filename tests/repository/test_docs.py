@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 import typer
 
+import house
 import reference
 from command_line import run
 from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
@@ -169,6 +170,11 @@ def test_site_fetches_nothing_from_the_network(site):
             assert not re.search(r'(?:src|href)="(?:https?:)?//', tag), f"{page.name}: {tag}"
     for style in site.rglob("*.css"):
         assert not re.search(r"url\([\"']?https?:", style.read_text(encoding="utf-8")), style.name
+
+
+def test_the_house_is_drawn_from_the_contract():
+    assert house.PICTURE.read_text(encoding="utf-8") == house.drawn()
+    assert house.PAGE.read_text(encoding="utf-8") == house.filled(house.PAGE.read_text(encoding="utf-8"))
 
 
 def test_site_tells_of_every_exported_name(site):

@@ -110,7 +110,7 @@ def scaled_singular_values(trial, bsp) -> np.ndarray:
 
 
 def test_masses_are_found_only_with_centres_of_mass_off_the_segment_axes(subject, trial):
-    """DESIGN section 5: full rank off axis; on axis the last singular values fall to rounding, with a gap above."""
+    """full rank off axis; on axis the last singular values fall to rounding, with a gap above."""
     off_axis = symmetric_truth(subject.bsp)
     table = off_axis.table()
     table[:, [1, 3]] = 0.0

@@ -1,7 +1,7 @@
 """How far a person's body segment parameters may be from the literature: the prior of the simultaneous estimate.
 
-Standard deviations, and where they come from (all tables in Zatsiorsky 2002 after regression on mass and height, and
-the spread between published methods; collected in the project's `reference/anthropometry.md`, section 4):
+Standard deviations, and where they come from (4a, 4b: Zatsiorsky 2002, segment by segment, 4b after regression on mass
+and height; 4c: the spread between published methods):
 
 - mass: the larger of the between-subject residual deviation given mass and height (4b: thigh 7 %, shank 7 %, foot 10
   %, upper arm 9 %, forearm 9 %, trunk parts 10-12 %) and the spread between methods (4c: thigh 14 %, upper arm 16 %,

@@ -1,8 +1,8 @@
-"""The study's estimator: pelvis correction (inner level) and body segment parameters (outer level); DESIGN section 5.
+"""The study's estimator: pelvis correction (inner level) and body segment parameters (outer level).
 
-Inner level: equation (2) gives the pelvis acceleration that needs no residual at the measured state; integrated twice
-by the trapezoid rule, with the two constants per coordinate that track the measured pelvis best (linear least squares,
-closed form).
+Inner level: equation (2) of `kinertia.motion.dynamics` gives the pelvis acceleration that needs no residual at the
+measured state; integrated twice by the trapezoid rule, with the two constants per coordinate that track the measured
+pelvis best (linear least squares, closed form).
 Outer level: bounded nonlinear least squares on the residual P at the corrected motion, over all frames of all trials.
 
 Deviations from the study: CoM coordinates are bounded to 1 m (a mass near zero would send its CoM anywhere); no finite

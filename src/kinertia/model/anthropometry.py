@@ -4,7 +4,7 @@ Two tables, both scaled by total mass and segment lengths:
 
 - `dumas` (default): Dumas, Chèze & Verriest (2007) with the corrected foot and the thorax/abdomen split;
   centres of mass in three dimensions and full inertia tensors. Use it where BSPs are estimated: with centres
-  of mass on the segment axes, segment masses cannot be identified from gait (DESIGN section 5).
+  of mass on the segment axes, segment masses cannot be identified from gait.
 - `deleva`: de Leva (1996), Table 4; centres of mass on the segments' long axes, no products of inertia.
 
 The numbers are in `data/dumas2007.csv` and `data/deleva1996.csv`, with their units and endpoints.

@@ -1,7 +1,7 @@
 """`Skeleton`: segments, joints, coordinates and markers, as a Pinocchio model.
 
 A joint places its child segment in its parent by a constant placement followed by a list of single axes, each a
-rotation about or a translation along a fixed direction (DESIGN section 4). Every axis follows one coordinate and
+rotation about or a translation along a fixed direction. Every axis follows one coordinate and
 becomes one 1-DOF Pinocchio joint, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are
 constants: they are folded into the placements, which is how a calibrated joint-centre offset (a coordinate that
 does not move in time) or an arm rotation that no marker shows enters the model.

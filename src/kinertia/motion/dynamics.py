@@ -1,7 +1,12 @@
-"""Root equations of motion, their regressor and derivatives, and inverse dynamics of all joints (DESIGN section 5).
+"""Root equations of motion, their regressor and derivatives, and inverse dynamics of all joints.
 
-The root is the pelvis: three translations, then three rotations (`model.root_joint`). "Residual" is the root load
-P of equation (3): force (N) in ground axes, moment (N m) about the pelvis origin in ground axes.
+The root is the pelvis: three translations, then three rotations (`kinertia.model.root_joint`), the free coordinates f;
+all others, p, are prescribed. Of the equations of motion the root rows are
+
+    (1)  P = M_f q_f'' + M_p q_p'' + V(q, q') + G(q) - F      F: generalised force of the ground reactions
+    (2)  q_f''* = M_f^-1 (F - M_p q_p'' - V - G)              the root acceleration that makes P zero
+
+The residual is P: force (N) in ground axes, moment (N m) about the pelvis origin in ground axes.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ PUBLISHED = {
     ),
     "correction_noise": Errors(0.382, 1.84, 1.71, 3.07, 0.180, 0.559, 0.229, 0.961, 0.600, 1.53),
 }
-"""Table 1 as published (DESIGN section 1)."""
+"""Table 1 as published."""
 
 
 @dataclass(frozen=True)

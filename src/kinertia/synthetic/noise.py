@@ -23,7 +23,7 @@ OTHER_ARTEFACT_RANGE_M = (0.004, 0.009)
 
 
 def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
-    """The study's noise (DESIGN section 5): A sin(w t + phi) on every marker coordinate.
+    """The study's noise: A sin(w t + phi) on every marker coordinate.
 
     Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm
     RMS, below 4 Hz: no low-pass filter removes it (Chèze et al. 1995).

@@ -7,7 +7,7 @@ back the motion itself):
 - `walk`: the walk that comes with the package, any length; the ground reactions are what the motion asks for, shared
   out between the feet.
 - `consistent_trial`: as in the study, any measured window; the ground reactions are kept and the pelvis is modified
-  until equation (1) holds with P = 0.
+  until the residual is zero.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from kinertia.motion.one_thread import one_blas_thread
 
 PLATE_SD = {"x": 0.010, "z": 0.010, "gain": 0.02, "free moment": 0.0015}
 """Names and units as in PLATE_UNKNOWNS. Gain: scale and plates of a laboratory may differ by this much before it is
-worth a warning (DESIGN section 7). Free moment: half a percent of the vertical force at 0.3 m (no source)."""
+worth a warning. Free moment: half a percent of the vertical force at 0.3 m (no source)."""
 CLOCK_SD_S = 0.005
 _STAYING_SD_M = 1e-6
 """Of markers that stay where they are."""

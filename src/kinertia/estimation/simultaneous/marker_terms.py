@@ -1,7 +1,7 @@
 """Terms of the markers in a trial's normal equations, for errors that are alike from frame to frame.
 
 The errors of a marker coordinate are a first-order autoregressive process: e[t] = a e[t-1] + white noise, with the same
-deviation in every frame (DESIGN section 6). The inverse of its covariance, the information, is tridiagonal in time: a
+deviation in every frame. The inverse of its covariance, the information, is tridiagonal in time: a
 frame sees itself and its two neighbours, so the normal matrix stays banded. A gap starts the process anew.
 
 Slow skin motion (a near one) counts for few independent frames where the motion is slow, and hardly disturbs what is

@@ -1,7 +1,7 @@
 """What the simultaneous estimate sees of a measured trial: its frames, its smoothed loads, and how noisy its markers
 are.
 
-Marker noise is not white (DESIGN section 6): skin motion lasts for many frames. Its deviation and correlation length
+Marker noise is not white: skin motion lasts for many frames. Its deviation and correlation length
 are read from the errors that inverse kinematics leaves; the estimate takes it as a first-order autoregressive process
 (`marker_terms`). The deviation is inflated by the square root of the number of markers that err alike: those of a
 segment ride on the same skin. So are all deviations where errors come back (`repetition`). Inverse kinematics absorbs

@@ -1,4 +1,4 @@
-"""Motion, body segment parameters and calibration in one maximum-a-posteriori estimate (DESIGN section 6).
+"""Motion, body segment parameters and calibration in one maximum-a-posteriori estimate.
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
