@@ -25,6 +25,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.files import save_fit
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
+from kinertia.trial.rms import rms
 
 PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
 """Force plates at 1000 Hz, cameras at 100 Hz."""
@@ -59,9 +60,7 @@ class Demo:
         """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
         change = source.table() - self.truth.table()
         distance = np.linalg.norm(change[:, 1:4], axis=1)
-        mass, com, inertia = (
-            float(np.sqrt(np.mean(np.square(part)))) for part in (change[:, 0], distance, change[:, 4:7])
-        )
+        mass, com, inertia = (rms(part) for part in (change[:, 0], distance, change[:, 4:7]))
         return mass, com, inertia
 
 

@@ -18,6 +18,7 @@ from kinertia.report.table1 import save_table1, table1_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
+from kinertia.trial.rms import rms_length
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
@@ -81,7 +82,10 @@ def _report_demo(result: Demo, folder: Path) -> None:
     loads = {**trial.residuals, "two-level": result.two_level.trials[0].residuals["estimate"]}
     out.print(
         "residual at the pelvis, RMS: "
-        + "; ".join(f"{stage} {_rms(load[:, :3]):.1f} N, {_rms(load[:, 3:]):.1f} N m" for stage, load in loads.items())
+        + "; ".join(
+            f"{stage} {rms_length(load[:, :3]):.1f} N, {rms_length(load[:, 3:]):.1f} N m"
+            for stage, load in loads.items()
+        )
         + "\n"
     )
     out.print(_verdict(found[0], found[1]) + "\n")
@@ -94,11 +98,6 @@ def _report_demo(result: Demo, folder: Path) -> None:
         f"{folder / 'bsp_truth.csv'}\n"
         f"next, with your own files: kinertia init FOLDER, then kinertia fit FOLDER/subject.toml -o out"
     )
-
-
-def _rms(load: np.ndarray) -> float:
-    """Root mean square length of the vectors (w, 3), as in fit.json."""
-    return float(np.sqrt(np.mean(np.square(load).sum(axis=1))))
 
 
 def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:

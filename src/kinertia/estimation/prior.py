@@ -26,7 +26,14 @@ from itertools import product
 import numpy as np
 
 from kinertia.errors import PriorError
-from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, block_diagonal, second_moments
+from kinertia.model.bsp import (
+    MIRROR_SIGNS,
+    PARAMETERS,
+    BodySegmentParameters,
+    block_diagonal,
+    inertia_of,
+    second_moments,
+)
 from kinertia.model.log_cholesky import nearest_consistent
 
 MASS_SD = {
@@ -174,8 +181,7 @@ def _inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
         changes.append(change)
     columns = []
     for change in changes:
-        second = root @ change @ root.transpose(0, 2, 1)
-        inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+        inertia = inertia_of(root @ change @ root.transpose(0, 2, 1))
         columns.append(inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     factor = np.stack(columns, axis=-1)
     result: np.ndarray = factor @ factor.transpose(0, 2, 1)

@@ -263,6 +263,12 @@ def second_moments(inertia: FloatArray) -> FloatArray:
     return result
 
 
+def inertia_of(second: FloatArray) -> FloatArray:
+    """(..., 3, 3) inertia tensors from integrals of x x^T dm about the same point: the inverse of `second_moments`."""
+    result: FloatArray = np.trace(second, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - second
+    return result
+
+
 def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
     """(s, 10, 10) derivative of each segment's dynamic parameters by its row of `BodySegmentParameters.table`."""
     derivative = np.zeros((len(mass), 10, 10))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.bsp import BodySegmentParameters, dynamic_by_table, second_moments
+from kinertia.model.bsp import BodySegmentParameters, dynamic_by_table, inertia_of, second_moments
 
 _ROWS, _COLUMNS = np.array([0, 1, 2, 1, 2, 2]), np.array([0, 1, 2, 0, 0, 1])
 _ROUNDING = 1e-9
@@ -34,7 +34,9 @@ def from_log_cholesky(segments: tuple[str, ...], theta: np.ndarray) -> BodySegme
     """Body segment parameters of (10 s,) parameters."""
     rows = theta.reshape(-1, 10)
     lower = _lower(rows)
-    return BodySegmentParameters(segments, np.exp(rows[:, 0]), rows[:, 1:4], _inertia(lower @ lower.transpose(0, 2, 1)))
+    return BodySegmentParameters(
+        segments, np.exp(rows[:, 0]), rows[:, 1:4], inertia_of(lower @ lower.transpose(0, 2, 1))
+    )
 
 
 def table_jacobian(theta: np.ndarray) -> np.ndarray:
@@ -48,7 +50,7 @@ def table_jacobian(theta: np.ndarray) -> np.ndarray:
         change = np.zeros_like(lower)
         change[:, i, j] = lower[:, i, j] if i == j else 1.0
         product = change @ lower.transpose(0, 2, 1)
-        inertia = _inertia(product + product.transpose(0, 2, 1))
+        inertia = inertia_of(product + product.transpose(0, 2, 1))
         jacobian[:, 4:, 4 + entry] = inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return jacobian
 
@@ -69,15 +71,10 @@ def nearest_consistent(bsp: BodySegmentParameters, floor: float = 0.05) -> BodyS
     largest = values[:, -1:]
     values = np.where(values[:, :1] > _ROUNDING * largest, values, np.maximum(values, floor * largest))
     raised = (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
-    return BodySegmentParameters(bsp.segments, bsp.mass_kg, bsp.com_m, _inertia(raised))
+    return BodySegmentParameters(bsp.segments, bsp.mass_kg, bsp.com_m, inertia_of(raised))
 
 
 def _lower(rows: np.ndarray) -> np.ndarray:
     lower = np.zeros((len(rows), 3, 3))
     lower[:, _ROWS, _COLUMNS] = np.hstack([np.exp(rows[:, 4:7]), rows[:, 7:]])
     return lower
-
-
-def _inertia(second: np.ndarray) -> np.ndarray:
-    result: np.ndarray = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
-    return result

@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from kinertia.model.axis_functions import AxisFunction
-from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.bsp import BodySegmentParameters, inertia_of, second_moments
 from kinertia.model.coordinate_map import CoordinateMap
 from kinertia.model.root_joint import Root
 
@@ -349,14 +349,13 @@ def _unit_pseudo() -> np.ndarray:
     for k, (i, j) in enumerate(_INERTIA, start=4):
         inertia = np.zeros((3, 3))
         inertia[i, j] = inertia[j, i] = 1.0
-        pseudo[k, :3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        pseudo[k, :3, :3] = second_moments(inertia)
     return pseudo
 
 
 def _from_pseudo(pseudo: np.ndarray) -> np.ndarray:
     """(..., 10) dynamic parameters of pseudo-inertias (..., 4, 4)."""
-    second = pseudo[..., :3, :3]
-    inertia = np.trace(second, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - second
+    inertia = inertia_of(pseudo[..., :3, :3])
     rows, columns = zip(*_INERTIA, strict=True)
     return np.concatenate([pseudo[..., 3, 3:], pseudo[..., :3, 3], inertia[..., rows, columns]], axis=-1)
 

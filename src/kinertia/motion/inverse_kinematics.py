@@ -20,6 +20,7 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.trial.data import Markers
+from kinertia.trial.rms import rms
 
 _WARM_START_EVERY_S = 0.1
 _FAR = 1.0
@@ -66,11 +67,6 @@ class _Stop:
 
     gain_tolerance_m2: float
     most_steps: int
-
-
-def rms(values: np.ndarray) -> float:
-    """Root mean square over everything that is not NaN."""
-    return float(np.sqrt(np.nanmean(np.square(values))))
 
 
 @one_blas_thread

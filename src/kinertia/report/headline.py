@@ -13,11 +13,11 @@ import numpy as np
 from kinertia.checks.verdict import Level, Verdict, verdicts
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.motion.inverse_kinematics import rms
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
 from kinertia.report.wording import decimals, fixed, read_in, start_of
+from kinertia.trial.rms import rms
 
 _LISTED_FAR = 12
 _EVIDENCE = {

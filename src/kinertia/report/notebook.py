@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.motion.inverse_kinematics import rms
 from kinertia.report.headline import words
 from kinertia.report.page import bsp_rows, rendered, residual_rows
 from kinertia.report.wording import start_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial
+from kinertia.trial.rms import rms
 
 
 def fit_html(fit: Fit) -> str:

@@ -25,16 +25,10 @@ from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, informati
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
-from kinertia.report.time_figures import (
-    MOST_EVENTS,
-    MOST_FRAMES,
-    coordinate_figure,
-    moment_figure,
-    residual_figure,
-    rms_length,
-)
+from kinertia.report.time_figures import MOST_EVENTS, MOST_FRAMES, coordinate_figure, moment_figure, residual_figure
 from kinertia.report.wording import decimals, fixed, read_in, start_of
 from kinertia.trial.data import runs
+from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""

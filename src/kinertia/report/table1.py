@@ -16,6 +16,7 @@ from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.report.page import rendered
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
+from kinertia.trial.rms import rms
 
 QUANTITIES = {
     "inertia": ("inertia (kg m2)", "inertia_rms_kgm2", "inertia_max_kgm2"),
@@ -80,7 +81,7 @@ def table1_figure(table: Table1) -> Figure:
             heights = []
             for segment in segments:
                 chosen = [table.parameters.index(f"{segment}.{member}") for member in members]
-                heights.append(float(np.sqrt(np.mean(np.square(values[:, chosen])))))
+                heights.append(rms(values[:, chosen]))
             label = "start" if key == "start" else CONDITIONS[key]
             axis.plot(
                 segments, heights, linestyle="", marker=_MARKS[key], color=_COLOURS[key], label=label, markersize=7

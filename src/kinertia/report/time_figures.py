@@ -13,13 +13,13 @@ import plotly.graph_objects as go
 
 from kinertia.estimation.result import TrialFit
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.inverse_kinematics import rms
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate, panels_of
 from kinertia.report.panels import Panel, compact, small_multiples
 from kinertia.report.wording import LITERATURE, Start
 from kinertia.trial.gait_events import GaitEvent, gait_events
+from kinertia.trial.rms import rms, rms_length
 
 MOST_FRAMES = 1600
 """Drawn per curve."""
@@ -62,11 +62,6 @@ _MOMENT_AXES = ("forward axis", "vertical", "right axis")
 def stage_name(stage: str, start: Start) -> str:
     """A stage of `TrialFit.residuals` or `.moments` in words."""
     return {"literature": start.values, "corrected": f"{start.values}, pelvis corrected"}.get(stage, stage)
-
-
-def rms_length(vectors: np.ndarray) -> float:
-    """Root mean square length of vectors (n, k)."""
-    return rms(np.linalg.norm(vectors, axis=-1))
 
 
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> go.Figure:

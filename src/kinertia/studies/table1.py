@@ -26,6 +26,7 @@ from kinertia.motion.smoothing import smooth
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.noise import study_noise
 from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
+from kinertia.trial.rms import rms
 
 CONDITIONS = {
     "no_correction_no_noise": "no correction, no noise",
@@ -227,7 +228,7 @@ def _noisy_window(trial: SyntheticTrial, inner: slice, rng: np.random.Generator)
 def _errors(parameters: np.ndarray, residual: np.ndarray) -> Errors:
     by_segment = parameters.reshape(-1, 7)
     groups = (by_segment[:, 4:], by_segment[:, :1], by_segment[:, 1:4], residual[:, :3], residual[:, 3:])
-    values = [value for group in groups for value in (np.sqrt(np.mean(np.square(group))), np.abs(group).max())]
+    values = [value for group in groups for value in (rms(group), np.abs(group).max())]
     return Errors(*map(float, values))
 
 

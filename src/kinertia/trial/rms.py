@@ -1,0 +1,15 @@
+"""Root mean squares, of values and of the lengths of vectors; what is NaN was not measured and does not count."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square over everything that is not NaN."""
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def rms_length(vectors: np.ndarray) -> float:
+    """Root mean square length of vectors (..., k) over everything that is not NaN."""
+    return float(np.sqrt(np.nanmean(np.square(vectors).sum(axis=-1))))
