@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from kinertia import __version__
+from kinertia.bandwidth import Bandwidth
 from kinertia.cli_options import Force, Output, Quiet, results_folder
 from kinertia.config import read_subject
 from kinertia.crossval import HeldOut, cross_validate
@@ -84,7 +85,9 @@ def crossval(
     results_folder(output, force)
     wanted = read_subject(subject)
     with shown_progress() as progress:
-        found = cross_validate(read_prepared(wanted, progress), wanted.settings.cutoff_hz, progress)
+        ready = read_prepared(wanted, progress)
+        bandwidth = Bandwidth.of(ready.kinematics, wanted.settings.cutoff_hz)
+        found = cross_validate(ready, bandwidth, progress)
     _report_crossval(found)
     with complete_folder(output) as work:
         told = json.dumps({"kinertia": __version__, "held_out": [asdict(held) for held in found]}, indent=2)

@@ -83,6 +83,12 @@ def _cutoff(value: object) -> object:
     raise ValueError('must be "gcv" or a positive frequency in Hz')
 
 
+def _force_cutoff(value: object) -> object:
+    if value in ("auto", "none") or (type(value) in (int, float) and 0 < value < float("inf")):  # type: ignore[operator]
+        return value
+    raise ValueError('must be "auto", "none" or a positive frequency in Hz')
+
+
 def _trial_name(value: object) -> str:
     """A name that can be a folder's: the results of several trials go to one folder each."""
     if isinstance(value, str) and value.strip(" .") and not set(value) & set("/\\\0"):
@@ -100,6 +106,7 @@ def _window(value: object) -> tuple[float, float]:
 File = Annotated[Path, BeforeValidator(_file)]
 MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
+ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_cutoff)]
 TrialName = Annotated[str, BeforeValidator(_trial_name)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
 
@@ -169,7 +176,11 @@ class Settings(Table):
     symmetry: bool = Field(
         default=True, description="two-level only; true: left mirrors right, 49 parameters; false: 84"
     )
-    cutoff_hz: Cutoff = Field(default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz')
+    cutoff_hz: Cutoff = Field(default="gcv", description='bandwidth of the motion: "gcv" (from the data) or Hz')
+    force_cutoff_hz: ForceCutoff = Field(
+        default="auto",
+        description='simultaneous; forces in joint moments: "auto" (as measured, without impacts), "none" or Hz',
+    )
     joint_axes: bool = Field(
         default=False,
         description="simultaneous, built-in model; true: axes of knees, ankles, elbows are calibrated too",

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from kinertia.bandwidth import Bandwidth
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
 from kinertia.dynamics import residual
@@ -52,7 +53,7 @@ class HeldOut:
 
 
 def cross_validate(
-    ready: Prepared, cutoff_hz: float | str, progress: Progress = lambda stage, share: None
+    ready: Prepared, bandwidth: Bandwidth | None = None, progress: Progress = lambda stage, share: None
 ) -> tuple[HeldOut, ...]:
     """Hold out every trial in turn.
 
@@ -60,13 +61,14 @@ def cross_validate(
 
     Args:
         ready: the person, with two trials or more.
-        cutoff_hz: as `fit_simultaneous` has it.
+        bandwidth: of motion and forces; found from all trials if None.
         progress: called as the work goes on.
 
     Raises:
         KinertiaError: there are fewer than two trials.
     """
     trials = ready.kinematics
+    bandwidth = bandwidth or Bandwidth.of(trials)
     if len(trials) < 2:
         raise KinertiaError(
             f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
@@ -77,8 +79,8 @@ def cross_validate(
         for k, held in enumerate(trials):
             progress("held out", k / len(trials))
             others = [other for other in trials if other is not held]
-            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff_hz, ready.freedom).result.bsp
-            explained = (_explained(ready, bsp, held, cutoff_hz) for bsp in (ready.prior.mean, estimate))
+            estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidth, ready.freedom).result.bsp
+            explained = (_explained(ready, bsp, held, bandwidth) for bsp in (ready.prior.mean, estimate))
             found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(found)
 
@@ -88,8 +90,8 @@ def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
     return replace(prior, mean=bsp, covariance=_FROZEN**2 * prior.covariance, mass_kg=bsp.total_mass_kg)
 
 
-def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, cutoff_hz: float | str) -> Explained:
-    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], cutoff_hz, ready.freedom)
+def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, bandwidth: Bandwidth) -> Explained:
+    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], bandwidth, ready.freedom)
     (motion,), (loads,) = fitted.motions, fitted.foot_loads
     model = fitted.skeleton
     left = residual(model, fitted.bsp, motion, loads.sum(axis=1))

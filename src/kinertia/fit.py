@@ -13,11 +13,13 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from kinertia.bandwidth import Bandwidth
 from kinertia.bsp import BodySegmentParameters
 from kinertia.bsp_prior import BspPrior
 from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, turning_warnings, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
+from kinertia.ground_reactions import GroundReactions, ground_reactions, measured_reactions
 from kinertia.identifiability import evidence
 from kinertia.io.osim import OsimModel
 from kinertia.kinematics import Kinematics
@@ -26,6 +28,7 @@ from kinertia.osim_prepare import prepare_osim
 from kinertia.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.simultaneous_fit import Posterior, fit_simultaneous
 from kinertia.skeleton import Skeleton
+from kinertia.splines import interpolate
 from kinertia.trial import Recording
 from kinertia.two_level import Window, correct_pelvis, estimate_two_level, stretches
 
@@ -40,10 +43,18 @@ class TrialFit:
     Attributes:
         kinematics: markers, coordinates and ground reactions before estimation.
         skeleton: with the markers where they are in this trial (`displacement`).
-        motion: coordinates (rad, m) and derivatives that go with the estimate.
+        motion: coordinates (rad, m) that go with the estimate, and their derivatives as OpenSim's tools will find them
+            from `kinematics.mot`: those of natural quintic splines through the frames. They differ from the estimate's
+            own in the first and last frames only.
+        motion_hz: its bandwidth.
+        reactions: the ground reactions that go with it, at the plates' rate, of instruments put right.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
-            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
-        moments: joint inverse dynamics (w, 27; N m, N) per stage: "literature", "estimate".
+            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate"; forces have the
+            bandwidth of the motion.
+        full_residuals: the same at the forces' full bandwidth: before the estimate those as measured, after it
+            `reactions`. That of the estimate is what OpenSim's inverse dynamics finds on the result files.
+        moments: joint inverse dynamics (w, 27; N m, N) per stage: "literature" (with forces as measured), "estimate"
+            (with `reactions`); of the two-level estimate both with forces of the motion's bandwidth.
         moment_sd: (w, 27) posterior deviations of those of the estimate; None after two-level.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
@@ -52,7 +63,10 @@ class TrialFit:
     kinematics: Kinematics
     skeleton: Skeleton
     motion: Motion
+    motion_hz: float
+    reactions: GroundReactions
     residuals: Mapping[str, np.ndarray]
+    full_residuals: Mapping[str, np.ndarray]
     moments: Mapping[str, np.ndarray]
     moment_sd: np.ndarray | None
     marker_errors_m: Mapping[str, np.ndarray]
@@ -263,11 +277,12 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
         progress=lambda share: progress("estimate", share),
     )
     motions = iter(result.motions)
-    estimates = [
-        (joined([next(motions) for _ in parts]), k.foot_loads) for k, parts in zip(ready.kinematics, cut, strict=True)
-    ]
-    skeletons, unknown = [ready.skeleton] * len(estimates), [None] * len(estimates)
-    trials = _trial_fits(ready, skeletons, result.bsp, estimates, unknown, started)
+    estimates = []
+    for k, parts in zip(ready.kinematics, cut, strict=True):
+        smoothed = ground_reactions(k, k.cutoff_hz, k.cutoff_hz)
+        motion = joined([next(motions) for _ in parts])
+        estimates.append(_Estimated(ready.skeleton, motion, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
+    trials = _trial_fits(ready, result.bsp, estimates, started)
     warnings = two_level_warnings(result)
     return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
 
@@ -279,45 +294,90 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
         by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
     check_masses(known(ready.subject.mass_kg), by_force)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz, ready.freedom)
-    bsp, skeleton = fitted.bsp, fitted.skeleton
-    estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
-    trials = _trial_fits(ready, fitted.skeletons, bsp, estimates, fitted.result.moment_sd, started)
-    return _Outcome(skeleton, bsp, trials, fitted.result.converged, fitted.posterior, fitted.warnings)
+    bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.freedom)
+    result = fitted.result
+    parts = (fitted.skeletons, fitted.motions, fitted.foot_loads, result.reactions, result.moment_sd, ready.kinematics)
+    estimates = [
+        _Estimated(skeleton, motion, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
+        for skeleton, motion, loads, reactions, moment_sd, k in zip(*parts, strict=True)
+    ]
+    trials = _trial_fits(ready, fitted.bsp, estimates, started)
+    return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimated:
+    """One trial as estimated.
+
+    Attributes:
+        skeleton: with the markers where they are in it.
+        motion, motion_hz: and its bandwidth.
+        foot_loads: (w, 2, 6) of the motion's bandwidth.
+        reactions, before: for the joint moments after and before the estimate.
+        moment_sd: (w, c) of the joint moments, or None.
+    """
+
+    skeleton: Skeleton
+    motion: Motion
+    motion_hz: float
+    foot_loads: np.ndarray
+    reactions: GroundReactions
+    before: GroundReactions
+    moment_sd: np.ndarray | None
 
 
 def _trial_fits(
-    ready: Prepared,
-    skeletons: Sequence[Skeleton],
-    bsp: BodySegmentParameters,
-    estimates: Sequence[tuple[Motion, np.ndarray]],
-    moment_sds: Sequence[np.ndarray | None],
-    started: float,
+    ready: Prepared, bsp: BodySegmentParameters, estimates: Sequence[_Estimated], started: float
 ) -> tuple[TrialFit, ...]:
-    """Every trial before and after; `skeletons` have the markers where they are in it, `estimates` its motion and its
-    foot loads (w, 2, 6) as estimated.
-    """
+    """Every trial before and after."""
     spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
-    before, literature = ready.skeleton, ready.literature
+    rows = zip(ready.kinematics, ready.seconds, estimates, strict=True)
     trials = []
-    rows = zip(ready.kinematics, ready.seconds, skeletons, estimates, moment_sds, strict=True)
-    for k, seconds, skeleton, (motion, loads), moment_sd in rows:
-        window = _window(k)
-        corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
-        residuals = {
-            "literature": residual(before, literature, window.motion, window.wrench),
-            "corrected": residual(before, literature, corrected, window.wrench),
-            "estimate": residual(skeleton, bsp, motion, loads.sum(axis=1)),
-        }
-        moments = {
-            "literature": inverse_dynamics(before, literature, window.motion, k.foot_loads),
-            "estimate": inverse_dynamics(skeleton, bsp, motion, loads),
-        }
-        errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
+    for k, seconds, after in rows:
         timing = {**seconds, "estimate": spent * len(k.time)}
         timing["total"] = sum(timing.values())
-        trials.append(TrialFit(k, skeleton, motion, residuals, moments, moment_sd, errors, timing))
+        trials.append(_trial_fit(ready.skeleton, ready.literature, k, bsp, after, timing))
     return tuple(trials)
+
+
+def _trial_fit(
+    before: Skeleton,
+    literature: BodySegmentParameters,
+    k: Kinematics,
+    bsp: BodySegmentParameters,
+    after: _Estimated,
+    seconds: Mapping[str, float],
+) -> TrialFit:
+    window = _window(k)
+    corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
+    stages = {
+        "literature": (before, literature, window.motion),
+        "corrected": (before, literature, corrected),
+    }
+    measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
+    spline = interpolate(k.time, after.motion.q)
+    motion = Motion(*(spline(k.time, order) for order in range(3)))
+    narrow = {name: residual(*stage, window.wrench) for name, stage in stages.items()}
+    narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
+    full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
+    full["estimate"] = residual(after.skeleton, bsp, motion, delivered.sum(axis=1))
+    return TrialFit(
+        kinematics=k,
+        skeleton=after.skeleton,
+        motion=motion,
+        motion_hz=after.motion_hz,
+        reactions=after.reactions,
+        residuals=narrow,
+        full_residuals=full,
+        moments={
+            "literature": inverse_dynamics(before, literature, window.motion, measured),
+            "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
+        },
+        moment_sd=after.moment_sd,
+        marker_errors_m={"ik": k.ik.errors_m[k.frames], "final": _marker_errors(after.skeleton, k, after.motion)},
+        seconds=seconds,
+    )
 
 
 def _window(kinematics: Kinematics) -> Window:

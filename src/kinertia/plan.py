@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from kinertia.bandwidth import Bandwidth
 from kinertia.bsp import PARAMETERS, UNITS
 from kinertia.bsp_prior import BspPrior, literature_prior
 from kinertia.disturbed import Faults, measured
@@ -23,7 +25,6 @@ from kinertia.freedom import GAIT27_FREEDOM, Freedom
 from kinertia.identifiability import evidence
 from kinertia.kinematics import Kinematics
 from kinertia.map_terms import MapProblem
-from kinertia.observation import CUTOFF_HZ
 from kinertia.predicted import Information
 from kinertia.simultaneous_fit import calibration_prior, observed, used_skeleton
 from kinertia.skeleton import Skeleton
@@ -78,17 +79,17 @@ def plan_measured(
     skeleton: Skeleton,
     prior: BspPrior,
     trials: Sequence[Kinematics],
-    cutoff_hz: float | str,
+    cutoff_hz: float | Literal["gcv"],
     freedom: Freedom = GAIT27_FREEDOM,
 ) -> Plan:
     """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
-    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    bandwidth = Bandwidth.of(trials, cutoff_hz)
     used = used_skeleton(skeleton, trials, freedom)
 
     def told(chosen: Sequence[int]) -> Information:
-        seen = observed(used, prior, [trials[k] for k in chosen], cutoff, freedom)
+        seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, freedom)
         calibration = calibration_prior(used, freedom)
-        return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
+        return Information(MapProblem(used, prior, calibration, seen.alone, bandwidth.spacing_s), seen.repeats)
 
     everything = tuple(range(len(trials)))
     with threadpool_limits(1):

@@ -13,13 +13,14 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from kinertia.centre_of_pressure import centre_of_pressure
 from kinertia.errors import TrialError
 from kinertia.io.c3d_write import write_c3d
 from kinertia.io.folder import complete_folder
 from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
 from kinertia.noise import SkinMotion, camera_noise, plate_noise, study_noise
-from kinertia.synthetic import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial, centre_of_pressure
+from kinertia.synthetic import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial
 from kinertia.trial import FEET, LOAD_THRESHOLD_N, Markers, PlateLoads, Recording, runs
 
 PLATE_SIZE_M = (0.6, 0.4)
