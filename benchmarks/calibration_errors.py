@@ -9,16 +9,16 @@ import numpy as np
 
 from bsp_errors import errors
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.fit import PLATE_SD
+from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.motion.smoothing import smooth
-from kinertia.studies.accuracy import SPACING_S, held
+from kinertia.studies.accuracy import held
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 from measured_trials import table
-from synthetic_walks import FIRST_SEED, observation_of
+from synthetic_walks import BANDWIDTH, FIRST_SEED, observation_of
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,14 @@ class Disturbance:
     hips_m: float = 0.0
 
 
-PRIOR = Disturbance(0.020, 0.010, 0.010)
-"""Prior deviations, which are also the errors put in."""
+LARGEST = Disturbance(0.020, 0.010, 0.010)
+"""All errors that are put in; the hips' is also their prior deviation."""
 DISTURBANCES = {
     "nothing wrong": Disturbance(),
     "right plate 20 mm off": Disturbance(plate_m=0.020),
     "forces 10 ms late": Disturbance(clock_s=0.010),
     "hips 10 mm off": Disturbance(hips_m=0.010),
-    "all three": PRIOR,
+    "all three": LARGEST,
 }
 
 
@@ -79,11 +79,11 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     prior = literature_prior(person.literature)
 
     def estimate(calibration: CalibrationPrior) -> SimultaneousResult:
-        return estimate_simultaneous(off.skeleton, prior, calibration, [seen], SPACING_S)
+        return estimate_simultaneous(off.skeleton, prior, calibration, [seen], BANDWIDTH.spacing_s)
 
     marker_sd = np.full(len(off.skeleton.markers), 0.005)
-    plate_sd = {**PLATE_SD, "x": PRIOR.plate_m, "z": PRIOR.plate_m}
-    free = CalibrationPrior(dict.fromkeys(HIP_OFFSETS, PRIOR.hips_m), marker_sd, plate_sd, PRIOR.clock_s)
+    centres = dict.fromkeys(HIP_OFFSETS, LARGEST.hips_m)
+    free = CalibrationPrior(centres, marker_sd, PLATE_PRIOR, FLOOR_PRIOR, CLOCK_PRIOR_S)
     result = estimate(free)
     offsets, sds = result.plates["right foot"]
     clock, clock_sd = result.clock_s

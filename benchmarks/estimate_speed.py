@@ -12,11 +12,10 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
-from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
 from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from measured_trials import table
-from synthetic_walks import FIRST_SEED, kinematics_of
+from synthetic_walks import BANDWIDTH, FIRST_SEED, kinematics_of
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def timed(duration_s: float) -> Timing:
     kinematics = kinematics_of(trial, moved)
     with threadpool_limits(1):
         started = time.perf_counter()
-        fitted = fit_simultaneous(trial.skeleton, literature_prior(person.literature), [kinematics], CUTOFF_HZ)
+        fitted = fit_simultaneous(trial.skeleton, literature_prior(person.literature), [kinematics], BANDWIDTH)
         seconds = time.perf_counter() - started
     steps = fitted.result.iterations
     return Timing(duration_s, len(trial.time), steps, seconds, 1e6 * bare_calls(trial) / len(trial.time))

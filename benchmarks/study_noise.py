@@ -9,7 +9,7 @@ import numpy as np
 
 from bsp_errors import errors
 from kinertia.estimation.prior import BspPrior, with_symmetry
-from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.study_parameters import ParameterVector
@@ -24,7 +24,7 @@ from kinertia.synthetic.noise import camera_noise, study_noise
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.data import Markers
 from measured_trials import table
-from synthetic_walks import FIRST_SEED, observation_of, study_walk
+from synthetic_walks import BANDWIDTH, FIRST_SEED, observation_of, study_walk
 
 UNIFORM_SD = 0.29
 """Deviation of a uniform error of +/-50 %, share."""
@@ -70,10 +70,9 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
         found["two-level"] = estimate_two_level(trial.skeleton, start, [_window(trial, noisy)]).bsp
 
     def simultaneous(
-        observation: Observation, prior: BspPrior = prior, cutoff_hz: float = CUTOFF_HZ
+        observation: Observation, prior: BspPrior = prior, bandwidth: Bandwidth = BANDWIDTH
     ) -> BodySegmentParameters:
-        spacing_s = 1.0 / (2.0 * cutoff_hz)
-        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], spacing_s).bsp
+        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], bandwidth.spacing_s).bsp
 
     seen = observation_of(trial, noisy)
     found["simultaneous"] = simultaneous(seen)
@@ -82,7 +81,9 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     found["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
     sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
     found["forces three times as sure"] = simultaneous(sure)
-    found["20 Hz instead of 10 Hz"] = simultaneous(observation_of(trial, noisy, cutoff_hz=20.0), cutoff_hz=20.0)
+    found["20 Hz instead of 10 Hz"] = simultaneous(
+        observation_of(trial, noisy, bandwidth=Bandwidth(20.0)), bandwidth=Bandwidth(20.0)
+    )
     found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
     sharp = observation_of(trial, camera_noise(trial.markers, CAMERA_SD_M, rng))
     sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_autocorrelation=0.0)

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.observation import CUTOFF_HZ, observe
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.studies.table1 import MARGIN_S, symmetric_truth
@@ -15,6 +16,10 @@ from kinertia.trial.data import FootLoads, Markers, Trial
 
 STRIDE_S = 1.24
 FIRST_SEED = 1
+
+
+BANDWIDTH = Bandwidth(10.0)
+"""Of the estimates of the studies' walks."""
 
 
 def study_walk(duration_s: float = STRIDE_S + 2 * MARGIN_S) -> SyntheticTrial:
@@ -28,13 +33,13 @@ def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | N
     loads = trial.foot_loads if loads is None else loads
     measured = np.ones(len(trial.time), dtype=bool)
     feet = FootLoads(trial.time, loads[..., :3], loads[..., 3:])
-    return solve_kinematics(trial.skeleton, Trial("walk", markers, feet, measured), 0.0, CUTOFF_HZ)
+    return solve_kinematics(trial.skeleton, Trial("walk", markers, feet, measured), 0.0, BANDWIDTH.motion_hz)
 
 
 def observation_of(
-    trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None, cutoff_hz: float = CUTOFF_HZ
+    trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None, bandwidth: Bandwidth = BANDWIDTH
 ) -> Observation:
     """The observation of a synthetic trial with these markers and foot loads (n, 2, 6)."""
-    return observe(trial.skeleton, [kinematics_of(trial, markers, loads)], trial.bsp.total_mass_kg, cutoff_hz).together[
+    return observe(trial.skeleton, [kinematics_of(trial, markers, loads)], trial.bsp.total_mass_kg, bandwidth).together[
         0
     ]

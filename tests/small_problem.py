@@ -11,17 +11,23 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.plates import FootPlates
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.gait27 import HIP_OFFSETS
+from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
-PLATES = {"x": 0.02, "z": 0.03, "gain": 0.02, "free moment": 0.01}
+PLATES = {name: SoundOrFaulty.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
+FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3)}
+CLOCK = SoundOrFaulty.certain(0.01)
+SWITCH_S = 0.1
+"""When the right foot steps from one plate to another, without a flight."""
 LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
 
 
@@ -44,21 +50,28 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
         marker_autocorrelation=0.8,
         q=trial.motion.q,
         dynamic=dynamic,
-        ground=FootPlates(
-            smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0),
-            rng.normal(0.0, 5.0, (len(trial.time), 2, 6)),
-            ("first", "second", "third"),
-            np.stack([np.where(trial.time < 0.1, 0, 2), np.full(len(trial.time), 1)], axis=1),
-            Rotation.from_euler("y", 90, degrees=True).as_matrix(),
-        ),
+        ground=small_ground(trial, rng),
         force_sd=6.0,
         moment_sd=2.0,
     )
 
 
+def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
+    """Three plates, of ten samples to a frame; loads for joint moments differ from those of the root."""
+    loads = smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0)
+    fine = np.linspace(trial.time[0], trial.time[-1], 10 * len(trial.time))
+    wrench = 1.1 * loads(fine).reshape(-1, 2, 6) + [1.0, 2.0, 3.0, 1.0, 2.0, 3.0]
+    carriers = (np.stack([np.where(t < SWITCH_S, 0, 2), np.full(len(t), 1)], axis=1) for t in (fine, trial.time))
+    at_samples, at_frames = carriers
+    impact = rng.normal(0.0, 5.0, wrench.shape)
+    turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
+    reactions = GroundReactions(fine, wrench, at_samples, impact, None)
+    return FootPlates(loads, reactions, ("first", "second", "third"), at_frames, turn)
+
+
 def small_problem(n_trials: int = 1) -> MapProblem:
     trial = small_trial()
-    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), PLATES, 0.01)
+    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), PLATES, FLOOR, CLOCK)
     observations = [small_observation(trial, seed) for seed in range(n_trials)]
     return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations, 0.1)
 
@@ -90,7 +103,7 @@ def curved_problem(path: Path) -> MapProblem:
         moment_sd=2.0,
     )
     prior = BspPrior(ours.bsp, np.diag(np.square(np.full(20, 0.01))), 13.0, 0.1)
-    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), PLATES, 0.01)
+    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), PLATES, FLOOR, CLOCK)
     return MapProblem(skeleton, prior, calibration, [observation], 0.1)
 
 
@@ -113,7 +126,8 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     pose = skeleton.pose(q)
     errors = whitened(trial.markers - skeleton.marker_positions(pose), trial.marker_sd, trial.marker_autocorrelation)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
-    values = dict(zip(problem.plates, static[layout.plates].reshape(-1, 4), strict=True))
+    floor = [*static[layout.plates][-2:], 0.0, 0.0]
+    values = dict(zip(problem.plates, static[layout.plates][:-2].reshape(-1, 4) + floor, strict=True))
     for i, foot in np.ndindex(len(loads), 2):
         x, z, gain, free_moment = values[trial.ground.plates[trial.ground.carrier[i, foot]]]
         loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])

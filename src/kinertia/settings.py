@@ -20,7 +20,14 @@ def _cutoff(value: object) -> object:
     raise ValueError('must be "gcv" or a positive frequency in Hz')
 
 
+def _force_cutoff(value: object) -> object:
+    if value in ("auto", "none") or (type(value) in (int, float) and 0 < value < float("inf")):  # type: ignore[operator]
+        return value
+    raise ValueError('must be "auto", "none" or a positive frequency in Hz')
+
+
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
+ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_cutoff)]
 
 
 class Table(BaseModel):
@@ -67,7 +74,11 @@ class Settings(Table):
     symmetry: bool = Field(
         default=True, description="two-level only; true: left mirrors right, 49 parameters; false: 84"
     )
-    cutoff_hz: Cutoff = Field(default="gcv", description='smoothing: "gcv" (cross-validation) or a cutoff, Hz')
+    cutoff_hz: Cutoff = Field(default="gcv", description='bandwidth of the motion: "gcv" (from the data) or Hz')
+    force_cutoff_hz: ForceCutoff = Field(
+        default="auto",
+        description='simultaneous; forces in joint moments: "auto" (as measured, without impacts), "none" or Hz',
+    )
     joint_axes: bool = Field(
         default=False,
         description="simultaneous, built-in model; true: axes of knees, ankles, elbows are calibrated too",

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 import accuracy
 from bsp_errors import errors
-from calibration_errors import PRIOR, calibrated, calibration_section
+from calibration_errors import LARGEST, calibrated, calibration_section
 from estimate_speed import speed_section, timed
 from pooling import pooling_section
 from study_noise import study_draw, study_section
@@ -28,7 +28,7 @@ def test_errors_of_the_truth_are_zero():
 
 def test_page():
     draw = study_draw(0, two_level=False)
-    outcome = calibrated(PRIOR, 0, duration_s=0.8)
+    outcome = calibrated(LARGEST, 0, duration_s=0.8)
     values = {name: np.arange(3.0) for name in ("whole", "first half", "second half", "halves")}
     sds = {"whole": np.ones(3), "first half": np.full(3, 2.0), "second half": np.full(3, 2.0), "halves": np.ones(3)}
     timing = timed(1.0)

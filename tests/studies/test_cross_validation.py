@@ -34,7 +34,7 @@ def recordings(person):
 
 def test_own_parameters_explain_another_walk_better_than_the_literature_s(recordings):
     inputs = [TrialInput(replace(lab.walk, name=name)) for lab, name in zip(recordings, ("one", "two"), strict=True)]
-    found = cross_validate(prepare(SUBJECT, recordings[0].static, inputs, Settings()), "gcv")
+    found = cross_validate(prepare(SUBJECT, recordings[0].static, inputs, Settings()))
     assert [held.trial for held in found] == ["one", "two"]
     assert found[0].others == ("two",)
     for held in found:
@@ -53,7 +53,7 @@ def test_frozen_parameters_stay(person):
 
 def test_one_trial_cannot_be_held_out(recordings):
     with pytest.raises(KinertiaError, match=r"at least two trials.*the subject has 1"):
-        cross_validate(prepare(SUBJECT, recordings[0].static, [TrialInput(recordings[0].walk)], Settings()), "gcv")
+        cross_validate(prepare(SUBJECT, recordings[0].static, [TrialInput(recordings[0].walk)], Settings()))
 
 
 def test_command(person, tmp_path):

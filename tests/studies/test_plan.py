@@ -41,7 +41,7 @@ def test_prediction_is_what_a_fit_then_reports(prior, trials, planned, chosen):
     """A prediction is made at the literature and at the motion of inverse kinematics, a report at the estimate."""
     skeleton, kinematics = trials
     with threadpool_limits(1):
-        fit = fit_simultaneous(skeleton, prior, [k for k in kinematics if k.trial.name in chosen], "gcv")
+        fit = fit_simultaneous(skeleton, prior, [k for k in kinematics if k.trial.name in chosen])
     ratio = planned.sd[chosen] / fit.posterior.sd
     assert np.median(np.abs(ratio[:, :4] - 1.0)) < 0.03
     assert np.abs(np.log(ratio[:, :4])).max() < np.log(1.35)

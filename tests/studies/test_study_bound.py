@@ -9,9 +9,10 @@ import study_bound
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.studies.accuracy import SPACING_S, at_truth, held
+from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.studies.accuracy import at_truth, held
 from kinertia.synthetic.walk import walking_subject
-from synthetic_walks import observation_of, study_walk
+from synthetic_walks import BANDWIDTH, observation_of, study_walk
 
 
 def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
@@ -28,9 +29,12 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
         moment_sd=0.3 * study_bound.EXACT_N,
     )
     calibration = replace(held(trial.skeleton), marker_sd_m=np.full(len(trial.skeleton.markers), 1e-8))
-    calibration = replace(calibration, plate_sd=dict.fromkeys(calibration.plate_sd, 1e-9), clock_sd_s=1e-9)
+    exact = SoundOrFaulty.certain(1e-9)
+    plate, floor = (dict.fromkeys(names, exact) for names in (calibration.plate, calibration.floor))
+    calibration = replace(calibration, plate=plate, floor=floor, clock_s=exact)
     own = Information(
-        MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], SPACING_S), np.ones((1, 1))
+        MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], BANDWIDTH.spacing_s),
+        np.ones((1, 1)),
     )
     ours = study_bound.bound(found, replace(prior, mean=trial.bsp))
     sd = own.sd([0])[[k for k, segment in enumerate(prior.mean.segments) if not segment.endswith("_l")]]

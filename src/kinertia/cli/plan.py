@@ -12,6 +12,7 @@ import typer
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.estimation.from_files import prepare_subject
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.io.subject_file import read_subject
@@ -84,7 +85,9 @@ def crossval(
     results_folder(output, force)
     wanted = read_subject(subject)
     with shown_progress() as progress:
-        found = cross_validate(prepare_subject(wanted, progress), wanted.settings.cutoff_hz, progress)
+        ready = prepare_subject(wanted, progress)
+        bandwidth = Bandwidth.of(ready.kinematics, wanted.settings.cutoff_hz)
+        found = cross_validate(ready, bandwidth, progress)
     _report_crossval(found)
     with complete_folder(output) as work:
         told = json.dumps({"kinertia": VERSION, "held_out": [asdict(held) for held in found]}, indent=2)

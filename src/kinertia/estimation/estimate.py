@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit, by_coordinate
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
 from kinertia.estimation.warnings import fit_warnings, turning_warnings, two_level_warnings
@@ -21,8 +22,10 @@ from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, joined, residual
+from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.smoothing import interpolate
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
 
@@ -142,11 +145,12 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
         progress=lambda share: progress("estimate", share),
     )
     motions = iter(result.motions)
-    estimates = [
-        (joined([next(motions) for _ in parts]), k.foot_loads) for k, parts in zip(ready.kinematics, cut, strict=True)
-    ]
-    skeletons, unknown = [ready.skeleton] * len(estimates), [None] * len(estimates)
-    trials = _trial_fits(ready, skeletons, result.bsp, estimates, unknown, started)
+    estimates = []
+    for k, parts in zip(ready.kinematics, cut, strict=True):
+        smoothed = ground_reactions(k, k.cutoff_hz, k.cutoff_hz)
+        motion = joined([next(motions) for _ in parts])
+        estimates.append(_Estimated(ready.skeleton, motion, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
+    trials = _trial_fits(ready, result.bsp, estimates, started)
     warnings = two_level_warnings(result)
     return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
 
@@ -158,46 +162,90 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
         by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
     check_masses(known(ready.subject.mass_kg), by_force)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, settings.cutoff_hz, ready.freedom)
-    bsp, skeleton = fitted.bsp, fitted.skeleton
-    estimates = list(zip(fitted.motions, fitted.foot_loads, strict=True))
-    trials = _trial_fits(ready, fitted.skeletons, bsp, estimates, fitted.result.moment_sd, started)
-    return _Outcome(skeleton, bsp, trials, fitted.result.converged, fitted.posterior, fitted.warnings)
+    bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.freedom)
+    result = fitted.result
+    parts = (fitted.skeletons, fitted.motions, fitted.foot_loads, result.reactions, result.moment_sd, ready.kinematics)
+    estimates = [
+        _Estimated(skeleton, motion, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
+        for skeleton, motion, loads, reactions, moment_sd, k in zip(*parts, strict=True)
+    ]
+    trials = _trial_fits(ready, fitted.bsp, estimates, started)
+    return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimated:
+    """One trial as estimated.
+
+    Attributes:
+        skeleton: with the markers where they are in it.
+        motion, motion_hz: and its bandwidth.
+        foot_loads: (w, 2, 6) of the motion's bandwidth.
+        reactions, before: for the joint moments after and before the estimate.
+        moment_sd: (w, c) of the joint moments, or None.
+    """
+
+    skeleton: Skeleton
+    motion: Motion
+    motion_hz: float
+    foot_loads: np.ndarray
+    reactions: GroundReactions
+    before: GroundReactions
+    moment_sd: np.ndarray | None
 
 
 def _trial_fits(
-    ready: Prepared,
-    skeletons: Sequence[Skeleton],
-    bsp: BodySegmentParameters,
-    estimates: Sequence[tuple[Motion, np.ndarray]],
-    moment_sds: Sequence[np.ndarray | None],
-    started: float,
+    ready: Prepared, bsp: BodySegmentParameters, estimates: Sequence[_Estimated], started: float
 ) -> tuple[TrialFit, ...]:
-    """Every trial before and after; `skeletons` have the markers where they are in it, `estimates` its motion and its
-    foot loads (w, 2, 6) as estimated.
-    """
+    """Every trial before and after."""
     spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
-    before, literature = ready.skeleton, ready.literature
+    rows = zip(ready.kinematics, ready.seconds, estimates, strict=True)
     trials = []
-    rows = zip(ready.kinematics, ready.seconds, skeletons, estimates, moment_sds, strict=True)
-    for k, seconds, skeleton, (motion, loads), moment_sd in rows:
-        window = _window(k)
-        corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
-        residuals = {
-            "literature": residual(before, literature, window.motion, window.wrench),
-            "corrected": residual(before, literature, corrected, window.wrench),
-            "estimate": residual(skeleton, bsp, motion, loads.sum(axis=1)),
-        }
-        moments = {
-            "literature": by_coordinate(k, inverse_dynamics(before, literature, window.motion, k.foot_loads)),
-            "estimate": by_coordinate(k, inverse_dynamics(skeleton, bsp, motion, loads)),
-        }
-        errors = {"ik": k.ik.errors_m[k.frames], "final": _marker_errors(skeleton, k, motion)}
+    for k, seconds, after in rows:
         timing = {**seconds, "estimate": spent * len(k.time)}
         timing["total"] = sum(timing.values())
-        sd = None if moment_sd is None else by_coordinate(k, moment_sd)
-        trials.append(TrialFit(k, skeleton, motion, residuals, moments, sd, errors, timing))
+        trials.append(_trial_fit(ready.skeleton, ready.literature, k, bsp, after, timing))
     return tuple(trials)
+
+
+def _trial_fit(
+    before: Skeleton,
+    literature: BodySegmentParameters,
+    k: Kinematics,
+    bsp: BodySegmentParameters,
+    after: _Estimated,
+    seconds: Mapping[str, float],
+) -> TrialFit:
+    window = _window(k)
+    corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
+    stages = {
+        "literature": (before, literature, window.motion),
+        "corrected": (before, literature, corrected),
+    }
+    measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
+    spline = interpolate(k.time, after.motion.q)
+    motion = Motion(*(spline(k.time, order) for order in range(3)))
+    narrow = {name: residual(*stage, window.wrench) for name, stage in stages.items()}
+    narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
+    full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
+    full["estimate"] = residual(after.skeleton, bsp, motion, delivered.sum(axis=1))
+    return TrialFit(
+        kinematics=k,
+        skeleton=after.skeleton,
+        motion=motion,
+        motion_hz=after.motion_hz,
+        reactions=after.reactions,
+        residuals=narrow,
+        full_residuals=full,
+        moments={
+            "literature": by_coordinate(k, inverse_dynamics(before, literature, window.motion, measured)),
+            "estimate": by_coordinate(k, inverse_dynamics(after.skeleton, bsp, motion, delivered)),
+        },
+        moment_sd=None if after.moment_sd is None else by_coordinate(k, after.moment_sd),
+        marker_errors_m={"ik": k.ik.errors_m[k.frames], "final": _marker_errors(after.skeleton, k, after.motion)},
+        seconds=seconds,
+    )
 
 
 def _window(kinematics: Kinematics) -> Window:

@@ -17,6 +17,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
+from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Settings, Subject
 from kinertia.trial import display
@@ -64,11 +65,19 @@ class TrialFit:
     Attributes:
         kinematics: markers, coordinates and ground reactions before estimation.
         skeleton: with the markers where they are in this trial (`displacement`).
-        motion: coordinates (rad, m) and derivatives that go with the estimate.
+        motion: coordinates (rad, m) that go with the estimate, and their derivatives as OpenSim's tools will find them
+            from `kinematics.mot`: those of natural quintic splines through the frames. They differ from the estimate's
+            own in the first and last frames only.
+        motion_hz: its bandwidth.
+        reactions: the ground reactions that go with it, at the plates' rate, of instruments put right.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
-            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate".
-        moments: joint inverse dynamics per stage, "literature" and "estimate": N m (N of translations) over time, one
-            column per coordinate.
+            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate"; forces have the
+            bandwidth of the motion.
+        full_residuals: the same at the forces' full bandwidth: before the estimate those as measured, after it
+            `reactions`. That of the estimate is what OpenSim's inverse dynamics finds on the result files.
+        moments: joint inverse dynamics (N m, N of translations) over time, one column per coordinate, per stage:
+            "literature" (with forces as measured), "estimate" (with `reactions`); of the two-level estimate both with
+            forces of the motion's bandwidth.
         moment_sd: posterior deviations of those of the estimate, in the same form; None after two-level.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
@@ -82,7 +91,10 @@ class TrialFit:
     kinematics: Kinematics
     skeleton: Skeleton
     motion: Motion
+    motion_hz: float
+    reactions: GroundReactions
     residuals: Mapping[str, np.ndarray]
+    full_residuals: Mapping[str, np.ndarray]
     moments: Mapping[str, pd.DataFrame]
     moment_sd: pd.DataFrame | None
     marker_errors_m: Mapping[str, np.ndarray]

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.idle_plate import without_idle
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
@@ -80,12 +81,12 @@ def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, li
 def to_ground_plates(
     path: Path, plates: LabPlates | None, rotation: FloatArray, time: FloatArray
 ) -> tuple[PlateLoads | None, list[str]]:
-    """Loads on the person in ground axes, zero below the threshold."""
+    """Loads on the person in ground axes, zero where nobody stands on a plate."""
     if plates is None:
         return None, [f"{path.name}: no force plate that can be used"]
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
     corners = plates.corners @ rotation.T
-    notes = []
+    notes, noises = [], []
     for p, name in enumerate(plates.names):
         vertical = np.nan_to_num(force[:, p, 1])
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
@@ -100,8 +101,8 @@ def to_ground_plates(
         if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
             told = ", ".join(f"{value:.0f}" for value in offset)
             notes.append(f"{path.name}: {name} reads ({told}) N when nobody stands on it; this was not subtracted")
-        force[~loaded, p] = 0.0
-        moment[~loaded, p] = 0.0
+        force[:, p], moment[:, p], noise = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
+        noises.append(noise)
         if not loaded.any():
             notes.append(f"{path.name}: {name} never carries {LOAD_THRESHOLD_N:g} N")
         elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
@@ -109,7 +110,7 @@ def to_ground_plates(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
                 "corners; check the plate's corners, origin and units"
             )
-    return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners), notes
+    return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises)), notes
 
 
 def _corner_trouble(corners: FloatArray) -> str:

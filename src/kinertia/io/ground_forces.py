@@ -15,6 +15,7 @@ from kinertia.errors import FileError
 from kinertia.io.number_table import expect_file
 from kinertia.io.sto import read_sto
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.idle_plate import PlateLoad, without_idle
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
 
@@ -38,9 +39,9 @@ def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = Non
     by name: `ground_force_vx`, `1_ground_force_vx`, `ground_force_r_vx`, `ground_force_1_vx` and the like,
     with the point `..._px` and the torque `..._mx`, `ground_torque_...x` or `ground_moment_...mx`.
 
-    Samples with less than `LOAD_THRESHOLD_N` of vertical force are set to zero: their point of application is
-    garbage. Where no torque is given, the free moment is zero. `read_forces_with_notes` tells what was
-    assumed.
+    Below `LOAD_THRESHOLD_N` of vertical force the point of application is garbage: such samples are set to zero, unless
+    they are how a load begins or ends (`idle_plate`). Where no torque is given, the free moment is zero.
+    `read_forces_with_notes` tells what was assumed.
 
     Raises:
         FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
@@ -72,9 +73,10 @@ def read_forces_with_notes(
     loads = PlateLoads(
         table.index.to_numpy(float),
         tuple(group.name for group in groups),
-        np.stack([force for force, _ in wrenches], axis=1),
-        np.stack([moment for _, moment in wrenches], axis=1),
+        np.stack([plate.force for plate in wrenches], axis=1),
+        np.stack([plate.moment for plate in wrenches], axis=1),
         tuple(group.foot for group in groups),
+        noise_n=tuple(plate.noise_n for plate in wrenches),
     )
     return loads, (*notes, *_remarks(path, loads, groups))
 
@@ -94,8 +96,8 @@ def _expect_steady_time(path: Path, time: FloatArray) -> None:
         )
 
 
-def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArray, FloatArray]:
-    """Force (k, 3) and moment about the ground origin (k, 3), zero below the threshold."""
+def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> PlateLoad:
+    """Force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
     force = _triple(table, group.force)
     _expect_numbers(path, table, group.force, np.ones(len(force), dtype=bool))
     if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
@@ -110,7 +112,7 @@ def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> tuple[FloatArra
     if group.torque is not None:
         _expect_numbers(path, table, group.torque, loaded)
         moment = moment + _triple(table, group.torque)
-    return np.where(loaded[:, None], force, 0.0), np.where(loaded[:, None], moment, 0.0)
+    return without_idle(table.index.to_numpy(float), force, moment)
 
 
 def _triple(table: pd.DataFrame, identifier: str) -> FloatArray:

@@ -85,9 +85,14 @@ class Kinematics:
         Samples up to AROUND_WINDOW_S outside the window count: what a plate saw there may not be all of the ground
         contact, but is how the load on that plate went on.
         """
-        loads, (start, end) = self.trial.loads, self.window_s
-        near = (loads.time >= start - AROUND_WINDOW_S - 1e-9) & (loads.time <= end + AROUND_WINDOW_S + 1e-9)
+        loads, near = self.trial.loads, self.near_window
         return smooth(loads.time[near], loads.wrench[near].reshape(-1, 12), cutoff_hz)
+
+    @cached_property
+    def near_window(self) -> np.ndarray:
+        """(k,) which samples of the ground reactions are at most AROUND_WINDOW_S outside the window."""
+        time, (start, end) = self.trial.loads.time, self.window_s
+        return (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
 
 
 def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:

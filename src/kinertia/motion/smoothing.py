@@ -174,12 +174,25 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
             left_over = visible.sum() - trace
             sigma[group[which]] = np.sqrt(rss / left_over) if left_over > 0 else np.nan
         cutoff[group] = chosen / spacing
-    ends = [(3, np.zeros(columns.shape[1])), (4, np.zeros(columns.shape[1]))]
-    spline = make_interp_spline((time - time[0]) / spacing, fitted, k=5, bc_type=(ends, ends))
+    spline = _natural((time - time[0]) / spacing, fitted)
     if not shape:
         spline = BSpline.construct_fast(spline.t, spline.c[:, 0], 5)
     p = (2 * np.pi * cutoff) ** -6.0 / spacing
     return SmoothedSpline(time, p.reshape(shape), cutoff.reshape(shape), sigma.reshape(shape), spline, spacing)
+
+
+def interpolate(time: Array, values: Array) -> SmoothedSpline:
+    """Natural quintic splines through all samples (n, c), as OpenSim's tools lay them through the columns of a file."""
+    spacing = float((time[-1] - time[0]) / (len(time) - 1))
+    nothing, everything = np.zeros(values.shape[1]), np.full(values.shape[1], np.inf)
+    spline = _natural((time - time[0]) / spacing, values)
+    return SmoothedSpline(time, nothing, everything, np.full(values.shape[1], np.nan), spline, spacing)
+
+
+def _natural(time: Array, values: Array) -> BSpline:
+    """Quintic splines through values (n, c) that go on as parabolas at either end."""
+    ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
+    return make_interp_spline(time, values, k=5, bc_type=(ends, ends))
 
 
 def _validated(

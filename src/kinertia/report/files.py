@@ -25,8 +25,11 @@ from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.sto import write_sto
+from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 
+_PARTS = (slice(0, 3), slice(3, 6))
+"""Force and moment of a residual."""
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
 
@@ -66,6 +69,7 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     names = list(fit.skeleton.coordinates)
     rotational = fit.skeleton.rotational
     write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics")
+    write_ground_reactions(folder, trial.reactions, trial.kinematics.window_s, fit.skeleton.feet)
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
     for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
         write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage].to_numpy()), False, file)
@@ -76,8 +80,9 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
             False,
             "inverse_dynamics_sd",
         )
-    columns = [f"{stage}_{name}" for stage in trial.residuals for name in _RESIDUALS]
-    residuals = np.hstack(list(trial.residuals.values()))
+    stages = {**trial.residuals, "estimate_full": trial.full_residuals["estimate"]}
+    columns = [f"{stage}_{name}" for stage in stages for name in _RESIDUALS]
+    residuals = np.hstack(list(stages.values()))
     write_sto(folder / "residuals.sto", _table(trial, columns, residuals), False, "residuals")
 
 
@@ -145,8 +150,10 @@ def _identifiability(bsp: pd.DataFrame, base: BaseParameters) -> dict[str, Any]:
 
 
 def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
-    force = {stage: values[:, :3] for stage, values in trial.residuals.items()}
-    moment = {stage: values[:, 3:] for stage, values in trial.residuals.items()}
+    force, moment = ({stage: each[:, part] for stage, each in trial.residuals.items()} for part in _PARTS)
+    full_force, full_moment = (
+        {stage: each[:, part] for stage, each in trial.full_residuals.items()} for part in _PARTS
+    )
     return {
         "name": trial.name,
         "n_frames": len(trial.kinematics.trial.markers.time),
@@ -154,6 +161,9 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "window_s": list(trial.kinematics.window_s),
         "turned_deg": trial.kinematics.turned_deg,
         "cutoff_hz": trial.kinematics.cutoff_hz,
+        "motion_hz": trial.motion_hz,
+        "force_cutoff_hz": trial.reactions.cutoff_hz,
+        "impact_force_rms_N": trial.reactions.impact_n,
         "mass_from_force_kg": mass_from_force_kg(fit.literature, trial),
         "seconds": {stage: round(value, 4) for stage, value in trial.seconds.items()},
         "marker_rms_m": {stage: _rms(values[..., None]) for stage, values in trial.marker_errors_m.items()},
@@ -162,6 +172,10 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "residual_force_max_N": _each(force, _max),
         "residual_moment_rms_Nm": _each(moment, _rms),
         "residual_moment_max_Nm": _each(moment, _max),
+        "full_residual_force_rms_N": _each(full_force, _rms),
+        "full_residual_force_max_N": _each(full_force, _max),
+        "full_residual_moment_rms_Nm": _each(full_moment, _rms),
+        "full_residual_moment_max_Nm": _each(full_moment, _max),
     }
 
 

@@ -19,6 +19,7 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.bsp_figures import segment_name
 from kinertia.report.panels import base_layout
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
 
 _PLOTLY_FRAMES = 60
@@ -118,9 +119,9 @@ def _centres(
 
 def _arrows(kinematics: Kinematics) -> np.ndarray:
     """(w, f, 2, 3) m: from the centre of pressure along the force, 1 mm per newton."""
-    force, moment = kinematics.foot_loads[..., :3], kinematics.foot_loads[..., 3:]
-    load = np.where(force[..., 1] > LOAD_THRESHOLD_N, force[..., 1], np.nan)
-    at = np.stack([moment[..., 2] / load, np.zeros_like(load), -moment[..., 0] / load], axis=-1)
+    force = kinematics.foot_loads[..., :3]
+    loaded = force[..., 1:2] > LOAD_THRESHOLD_N
+    at = np.where(loaded, centre_of_pressure(kinematics.foot_loads), np.nan)
     return np.stack([at, at + _ARROW_M_PER_N * force], axis=2)
 
 

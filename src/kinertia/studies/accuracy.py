@@ -15,12 +15,14 @@ import numpy as np
 
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.observation import CUTOFF_HZ, observe
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.observation import observe
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.studies.parallel import in_parallel
@@ -29,7 +31,6 @@ from kinertia.synthetic.motions import MOTIONS
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 
 WALK_S = 2.5
-SPACING_S = 1.0 / (2.0 * CUTOFF_HZ)
 CLASSES = {
     "mass": slice(0, 1),
     "CoM": slice(1, 4),
@@ -200,19 +201,22 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     person = replace(subject, bsp=prior.draw(of_person))
     trials = [walk(person, scenario.walk_s, trapezoid=False), *(MOTIONS[name](person) for name in scenario.others)]
     skeleton, recorded = measured(trials, scenario.faults, of_noise)
-    seen = observe(skeleton, recorded, prior.mass_kg, CUTOFF_HZ)
+    bandwidth = Bandwidth.of(recorded)
+    seen = observe(skeleton, recorded, prior.mass_kg, bandwidth)
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
-    result = estimate_simultaneous(skeleton, prior, calibration, seen.together, SPACING_S)
+    result = estimate_simultaneous(skeleton, prior, calibration, seen.together, bandwidth.spacing_s)
     trial, kinematics = trials[0], recorded[0]
     true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
-    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, SPACING_S)
+    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, bandwidth.spacing_s)
     bound = Information(there, seen.repeats).root(range(len(true)))
     angles = np.flatnonzero(trial.skeleton.rotational)[3:]
     inside = np.flatnonzero(seen.alone[0].dynamic)
     at = np.searchsorted(trial.time, kinematics.time - 1e-9)
     truth = trial.motion.cut(at)
     off = [(q - truth.q)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]
-    found = inverse_dynamics(result.skeleton, result.bsp, result.motions[0].cut(inside), result.foot_loads[0][inside])
+    found = inverse_dynamics(
+        result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0].at(kinematics.time)
+    )
     wrong = found - inverse_dynamics(trial.skeleton, person.bsp, truth, trial.foot_loads[at])
     return Draw(
         result.bsp.table() - person.bsp.table(),
@@ -263,7 +267,9 @@ def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> d
 def held(skeleton: Skeleton) -> CalibrationPrior:
     """Calibration switched off: skeleton and instruments count as exact."""
     places = np.full(len(skeleton.markers), _HELD_SD_M)
-    return CalibrationPrior({}, places, dict.fromkeys(PLATE_UNKNOWNS, _HELD_SD_M), _HELD_SD_M)
+    exact = SoundOrFaulty.certain(_HELD_SD_M)
+    plate, floor = (dict.fromkeys(names, exact) for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS))
+    return CalibrationPrior({}, places, plate, floor, exact)
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:

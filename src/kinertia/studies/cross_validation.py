@@ -15,6 +15,7 @@ import numpy as np
 from kinertia.errors import KinertiaError
 from kinertia.estimation.prepare import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
@@ -47,7 +48,7 @@ class HeldOut:
 
     Examples:
         >>> try:
-        ...     kinertia.cross_validate(kinertia.prepare_subject("lab/subject.toml"), "gcv")
+        ...     kinertia.cross_validate(kinertia.prepare_subject("lab/subject.toml"))
         ... except kinertia.KinertiaError as error:
         ...     print(str(error).split(",")[0])
         cross-validation needs at least two trials
@@ -61,7 +62,7 @@ class HeldOut:
 
 @one_blas_thread
 def cross_validate(
-    ready: Prepared, cutoff_hz: float | str, progress: Progress = lambda stage, share: None
+    ready: Prepared, bandwidth: Bandwidth | None = None, progress: Progress = lambda stage, share: None
 ) -> tuple[HeldOut, ...]:
     """Hold out every trial in turn.
 
@@ -69,13 +70,14 @@ def cross_validate(
 
     Args:
         ready: the person, with two trials or more.
-        cutoff_hz: as `fit_simultaneous` has it.
+        bandwidth: of motion and forces; found from all trials if None.
         progress: called as the work goes on.
 
     Raises:
         KinertiaError: there are fewer than two trials.
     """
     trials = ready.kinematics
+    bandwidth = bandwidth or Bandwidth.of(trials)
     if len(trials) < 2:
         raise KinertiaError(
             f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
@@ -85,8 +87,8 @@ def cross_validate(
     for k, held in enumerate(trials):
         progress("held out", k / len(trials))
         others = [other for other in trials if other is not held]
-        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, cutoff_hz, ready.freedom).result.bsp
-        explained = (_explained(ready, bsp, held, cutoff_hz) for bsp in (ready.prior.mean, estimate))
+        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidth, ready.freedom).result.bsp
+        explained = (_explained(ready, bsp, held, bandwidth) for bsp in (ready.prior.mean, estimate))
         found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(found)
 
@@ -96,8 +98,8 @@ def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
     return replace(prior, mean=bsp, covariance=_FROZEN**2 * prior.covariance, mass_kg=bsp.total_mass_kg)
 
 
-def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, cutoff_hz: float | str) -> Explained:
-    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], cutoff_hz, ready.freedom)
+def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, bandwidth: Bandwidth) -> Explained:
+    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], bandwidth, ready.freedom)
     (motion,), (loads,) = fitted.motions, fitted.foot_loads
     model = fitted.skeleton
     left = residual(model, fitted.bsp, motion, loads.sum(axis=1))

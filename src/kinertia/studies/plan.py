@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -18,10 +19,10 @@ import pandas as pd
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior, observed, used_skeleton
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
-from kinertia.estimation.simultaneous.observation import CUTOFF_HZ
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.skeleton import Skeleton
@@ -81,7 +82,7 @@ class Plan:
         )
 
 
-def plan(ready: Prepared | None = None, cutoff_hz: float | str = "gcv") -> Plan:
+def plan(ready: Prepared | None = None, cutoff_hz: float | Literal["gcv"] = "gcv") -> Plan:
     """Error bars that every body segment parameter would have after candidate motions; estimates none.
 
     Args:
@@ -98,17 +99,17 @@ def plan_measured(
     skeleton: Skeleton,
     prior: BspPrior,
     trials: Sequence[Kinematics],
-    cutoff_hz: float | str,
+    cutoff_hz: float | Literal["gcv"],
     freedom: Freedom = GAIT27_FREEDOM,
 ) -> Plan:
     """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
-    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    bandwidth = Bandwidth.of(trials, cutoff_hz)
     used = used_skeleton(skeleton, trials, freedom)
 
     def told(chosen: Sequence[int]) -> Information:
-        seen = observed(used, prior, [trials[k] for k in chosen], cutoff, freedom)
+        seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, freedom)
         calibration = calibration_prior(used, freedom)
-        return Information(MapProblem(used, prior, calibration, seen.alone, 1.0 / (2.0 * cutoff)), seen.repeats)
+        return Information(MapProblem(used, prior, calibration, seen.alone, bandwidth.spacing_s), seen.repeats)
 
     everything = tuple(range(len(trials)))
     whole = told(everything)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.simultaneous.fit import CLOCK_SD_S, PLATE_SD
+from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M
 from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
@@ -122,10 +122,10 @@ class _Instruments:
     @classmethod
     def draw(cls, rng: np.random.Generator) -> _Instruments:
         """From the prior of `fit_simultaneous`."""
-        late_s = rng.normal(0.0, CLOCK_SD_S)
-        offset = rng.normal(0.0, 1.0, (2, 3)) * [PLATE_SD["x"], 0.0, PLATE_SD["z"]]
-        gain = 1.0 + rng.normal(0.0, PLATE_SD["gain"], (2, 1))
-        return cls(late_s, offset, gain, rng.normal(0.0, PLATE_SD["free moment"], 2))
+        plates = np.array([[prior.draw(rng) for prior in PLATE_PRIOR.values()] for _ in range(2)])
+        x, z = (prior.draw(rng) for prior in FLOOR_PRIOR.values())
+        offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
+        return cls(CLOCK_PRIOR_S.draw(rng), offset, 1.0 + plates[:, 2:3], plates[:, 3])
 
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """What they make of true loads (n, 2, 6)."""

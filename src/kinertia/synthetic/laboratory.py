@@ -19,7 +19,8 @@ from kinertia.io.output_folder import complete_folder
 from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
 from kinertia.synthetic.noise import SkinMotion, camera_noise, plate_noise, study_noise
-from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial, centre_of_pressure
+from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Markers, PlateLoads, Recording, runs
 
 PLATE_SIZE_M = (0.6, 0.4)

@@ -28,6 +28,7 @@ from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, Recording
 
 MASS_KG, HEIGHT_M, SEX = 72.6, 1.803, "male"
@@ -300,12 +301,6 @@ def _on_feet(
 def _smooth_step(x: np.ndarray) -> np.ndarray:
     x = np.clip(x, 0.0, 1.0)
     return x**2 * (3.0 - 2.0 * x)
-
-
-def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
-    """(..., 3) m, where on the ground (y = 0) a wrench (..., 6) acts with no moment but a vertical one."""
-    upward = np.where(wrench[..., 1] == 0.0, np.inf, wrench[..., 1])
-    return np.stack([wrench[..., 5] / upward, np.zeros_like(upward), -wrench[..., 3] / upward], axis=-1)
 
 
 def _foot_points(skeleton: Skeleton, motion: Motion, landmark: str) -> np.ndarray:

@@ -30,7 +30,8 @@ LOAD_THRESHOLD_N = 20.0
 """A plate that carries less than this vertical force counts as unloaded.
 
 Below it the centre of pressure is a quotient of two noises (346 m off the origin in one published trial), so
-the readers set force and moment of such samples to zero.
+the readers set force and moment of such samples to zero, but for those with which a load begins or ends
+(`kinertia.trial.idle_plate`).
 """
 
 _TIME_TOLERANCE_S = 1e-6
@@ -115,6 +116,7 @@ class PlateLoads:
         declared_feet: for each plate "r" or "l" where file or column names say so, else None. Only a claim:
             the loads file may be wrong, `kinertia.trial.plate_assignment` decides by the data.
         corners: (p, 4, 3) m, or None where the file does not tell.
+        noise_n: of each plate, deviation of its vertical force while nobody stands on it, N; None where it is unknown.
 
     Examples:
         >>> force, moment = np.zeros((5, 1, 3)), np.zeros((5, 1, 3))
@@ -130,6 +132,7 @@ class PlateLoads:
     moment: FloatArray
     declared_feet: tuple[str | None, ...]
     corners: FloatArray | None = None
+    noise_n: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.names), 3)
@@ -188,6 +191,7 @@ class FootLoads:
         plates: names of the plates.
         on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
             where each foot has a plate of its own.
+        noise_n: deviation of the vertical force of the noisiest plate while nobody stands on it, N.
 
     Examples:
         >>> loads = fit.trials[0].kinematics.trial.loads  # right foot, left foot
@@ -200,6 +204,7 @@ class FootLoads:
     moment: FloatArray
     plates: tuple[str, ...] = ("right foot", "left foot")
     on_plate: npt.NDArray[np.int_] | None = None
+    noise_n: float = 0.0
 
     def __post_init__(self) -> None:
         shape = (len(self.time), 2, 3)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import FloatArray, FootLoads
 from kinertia.trial.strides import periods
 
@@ -87,9 +88,8 @@ def mean_turning(loads: FootLoads, time: FloatArray, centre: FloatArray) -> Turn
     if not loaded.any(axis=0).all():
         return None
     body = np.stack([np.interp(loads.time[inside], time, centre[:, axis]) for axis in range(3)], axis=1)
-    vertical = np.where(loaded, force[..., 1], 1.0)
     # the height of the floor cancels
-    pressure = np.stack([moment[..., 2], np.zeros(loaded.shape), -moment[..., 0]], axis=-1) / vertical[..., None]
+    pressure = centre_of_pressure(loads.wrench[inside])
     free = np.where(loaded, _vertical_moment(force, moment, pressure), 0.0).mean(axis=0)
     return Turning(
         float(_vertical_moment(force, moment, body[:, None]).sum(axis=1).mean()),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.errors import MarkerSetError
-from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, nearest_samples, runs
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Markers, nearest_samples, runs
 
 BRIDGED_GAP_S = 0.02
 """A load that vanishes for less than this is one contact."""
@@ -83,7 +83,10 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Gro
     """Which foot is on the ground and which on a loaded plate, by the rules of `measured_frames`."""
     nearest = nearest_samples(loads.time, markers.time)
     inside = (markers.time >= loads.time[0] - 1e-6) & (markers.time <= loads.time[-1] + 1e-6)
-    loaded = np.stack([bridged(loads.time, loads.force[:, foot, 1] > 0)[nearest] & inside for foot in range(2)], axis=1)
+    loaded = np.stack(
+        [bridged(loads.time, loads.force[:, foot, 1] >= LOAD_THRESHOLD_N)[nearest] & inside for foot in range(2)],
+        axis=1,
+    )
     ground = loaded.copy()
     moves = [_foot_motion(markers.select(feet[foot])) for foot in FEET]
     if loaded.any():

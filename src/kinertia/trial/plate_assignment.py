@@ -129,7 +129,8 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 vertical = np.where(nearer == foot, plates.force[piece, p, 1], 0.0)
                 on_plate[piece, foot] = np.where(vertical > most[piece, foot], p, on_plate[piece, foot])
                 most[piece, foot] = np.maximum(most[piece, foot], vertical)
-    return FootLoads(plates.time, force, moment, plates.names, _held(plates.time, on_plate)), tuple(notes)
+    noise_n = max(plates.noise_n or (0.0,))
+    return FootLoads(plates.time, force, moment, plates.names, _held(plates.time, on_plate), noise_n), tuple(notes)
 
 
 def _held(time: FloatArray, on_plate: npt.NDArray[np.int_]) -> npt.NDArray[np.int_]:

@@ -10,7 +10,7 @@ from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.fit import CLOCK_SD_S, PLATE_SD, fit_simultaneous
+from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.report.files import save_fit
@@ -33,7 +33,7 @@ def fitted(trial: SyntheticTrial, literature=None, disturb=lambda positions, loa
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
     with threadpool_limits(1, user_api="blas"):
         prior = literature_prior(literature or walking_subject().literature)
-        return fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
+        return fit_simultaneous(trial.skeleton, prior, [kinematics])
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +61,11 @@ def test_information_is_between_nothing_and_everything(plain):
 def test_calibration_is_told_with_its_deviations(plain):
     told = plain.posterior.calibration
     assert told["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
-    assert told["plate right foot: x"]["prior_sd"] == PLATE_SD["x"]
-    assert told["plate left foot: gain"]["prior_sd"] == PLATE_SD["gain"]
+    assert told["plate right foot: x"]["prior_sd"] == pytest.approx(np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd))
+    assert told["plate left foot: gain"]["prior_sd"] == PLATE_PRIOR["gain"].sd
     assert told["clock: forces late by"] == {
         "value": plain.result.clock_s[0],
-        "prior_sd": CLOCK_SD_S,
+        "prior_sd": CLOCK_PRIOR_S.sd,
         "sd": plain.result.clock_s[1],
         "unit": "s",
     }
@@ -88,7 +88,7 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
     prior = literature_prior(walking_subject().literature)
     with threadpool_limits(1, user_api="blas"):
         outcome = fit_simultaneous(
-            off.skeleton, prior, [kinematics_of(off, noisy, trial.foot_loads)], "gcv", GAIT27_FREEDOM.with_axes()
+            off.skeleton, prior, [kinematics_of(off, noisy, trial.foot_loads)], freedom=GAIT27_FREEDOM.with_axes()
         )
     told = outcome.posterior.calibration
     for name, put_in in wrong.items():
@@ -107,7 +107,7 @@ def test_the_motion_is_known_in_every_frame_of_the_window_though_the_pelvis_is_n
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), trial.foot_loads)
     with threadpool_limits(1, user_api="blas"):
         prior = literature_prior(walking_subject().literature)
-        outcome = fit_simultaneous(trial.skeleton, prior, [kinematics], "gcv")
+        outcome = fit_simultaneous(trial.skeleton, prior, [kinematics])
     assert outcome.result.converged
     at = np.searchsorted(trial.time, kinematics.time - 1e-9)
     np.testing.assert_allclose(outcome.motions[0].q, trial.motion.q[at], atol=0.06)
@@ -139,7 +139,7 @@ def test_a_marker_attached_anew_between_trials_is_named(trial):
     positions[1][:, at] += turned @ [0.0, -0.05, 0.0]
     kinematics = [kinematics_of(trial, replace(trial.markers, positions=each), trial.foot_loads) for each in positions]
     with threadpool_limits(1, user_api="blas"):
-        outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics, "gcv")
+        outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
     assert len(outcome.warnings) == 2, outcome.warnings  # of two trials, either may be the odd one
     for said in outcome.warnings:
         assert "attached anew" in said
@@ -158,7 +158,7 @@ def test_markers_that_stay_do_so_in_every_trial(trial):
     kinematics = [kinematics_of(wrong, each, trial.foot_loads) for each in markers]
     prior, staying = literature_prior(walking_subject().literature), replace(GAIT27_FREEDOM, marker_sd_m=None)
     with threadpool_limits(1, user_api="blas"):
-        outcome = fit_simultaneous(wrong.skeleton, prior, kinematics, "gcv", staying)
+        outcome = fit_simultaneous(wrong.skeleton, prior, kinematics, freedom=staying)
     for skeleton in (outcome.skeleton, *outcome.skeletons):
         np.testing.assert_array_equal(skeleton.marker_locals, wrong.skeleton.marker_locals)
 
@@ -188,7 +188,7 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
 
     outcome = fitted(trial, disturb=crosstalk)
     told = outcome.posterior.calibration["plate left foot: free moment"]
-    assert told["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_SD["free moment"])
+    assert told["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
     assert any(w.startswith("plate left foot: free moment: -") and "N m/kN" in w for w in outcome.warnings)
 
 

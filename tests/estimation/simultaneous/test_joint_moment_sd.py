@@ -7,9 +7,10 @@ from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, moment_derivatives
 from kinertia.estimation.simultaneous.normal_equations import reduced
 from kinertia.estimation.simultaneous.problem import MapProblem, Point
-from kinertia.estimation.simultaneous.solver import _deviations, _step, root_of_covariance
+from kinertia.estimation.simultaneous.solver import _deviations, _eliminated, _step, root_of_covariance
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
 from kinertia.motion.dynamics import Motion, inverse_dynamics
-from small_problem import curved_problem, point, small_problem
+from small_problem import SWITCH_S, curved_problem, point, small_problem
 from study_bound import dense_band
 
 
@@ -22,15 +23,21 @@ def estimate(request, tmp_path_factory):
     return problem, coefficients, static
 
 
-def moments(problem, coefficients: np.ndarray, static: np.ndarray, added: np.ndarray | None = None) -> np.ndarray:
-    """(d, c) joint moments at a point, by `inverse_dynamics`; with other loads added to those on the feet."""
+def moments(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bool = False) -> np.ndarray:
+    """(d, c) joint moments at a point, by `inverse_dynamics`; with the impacts added to the loads on the feet."""
     names = problem.calibration.coordinates
     values = dict(zip(names, static[problem.layout.coordinates].tolist(), strict=True))
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
     motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
-    loads = problem.foot_loads(0, static) + (0.0 if added is None else added)
-    loads = loads[dynamic]
+    reactions, time = problem.reactions(0, static), problem.trials[0].time[dynamic]
+    loads = reactions.at(time) + (reactions.impact_at(time) if with_impact else 0.0)
     return inverse_dynamics(problem.skeleton.lock(values), problem.bsp(static), motion, loads)
+
+
+def prior_information(problem, static: np.ndarray) -> np.ndarray:
+    information, places = problem.prior_terms(static)[0], problem.layout.instruments
+    information[places, places] += np.diag(GaussianPriors.of(problem.instruments).precision)
+    return information
 
 
 def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
@@ -42,7 +49,7 @@ def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     full[:n, :n] = band
     full[:n, n:] = normal.border.reshape(n, s)
     full[n:, :n] = full[:n, n:].T
-    full[n:, n:] = normal.static + problem.prior_terms(static)[0]
+    full[n:, n:] = normal.static + prior_information(problem, static)
     return full
 
 
@@ -50,7 +57,7 @@ def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray) -> n
     """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns."""
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
     motion = [part[frames] for part in problem.full(basis.evaluate(coefficients), static)]
-    by = moment_derivatives(problem, 0, motion, static, frames)
+    by = moment_derivatives(problem, 0, motion, static, problem.reactions(0, static), frames)
     size, c = coefficients.shape
     through = np.zeros((len(frames), c, size, c))
     for row, t in enumerate(frames):
@@ -78,7 +85,10 @@ def test_derivatives_agree_with_finite_differences(estimate):
                 for s in (1.0, -1.0)
             )
             found = derivative @ h
-            np.testing.assert_allclose(found, (ahead - behind) / 2.0, atol=1e-6 * np.abs(found).max())
+            # a step under load, which there is none of, makes the splines through the loads swing for some samples
+            away = np.abs(problem.trials[0].time[problem.trials[0].dynamic] - SWITCH_S) > 0.05
+            expected = (ahead - behind) / 2.0
+            np.testing.assert_allclose(found[away], expected[away], atol=1e-6 * np.abs(found).max())
 
 
 def test_deviations_are_those_of_the_dense_covariance(estimate):
@@ -87,9 +97,11 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
     full = root @ root.T
     n = coefficients.size
     by = dense_derivative(problem, coefficients, static)
-    expected = np.sqrt(np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + lost(problem, coefficients, static))
+    expected = np.sqrt(
+        np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + of_impacts(problem, coefficients, static)
+    )
     part = reduced(problem.normal(0, coefficients, static), 0.0)
-    root = root_of_covariance(problem.prior_terms(static)[0] + part.information)
+    root = root_of_covariance(prior_information(problem, static) + part.information)
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     found = joint_moment_sd(problem, 0, coefficients, static, part, root)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
@@ -104,13 +116,14 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials, 0.1)
     rng = np.random.default_rng(0)
     here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
+    here = here.under(GaussianPriors.of(pair.instruments), pair.layout.instruments)
     chains, information, right = dense_pair(pair, here)
     covariance = inverse(information)
     found, moment_sd = _deviations(pair, here)
     s = pair.layout.size
     scale = np.sqrt(np.diag(found))
     np.testing.assert_allclose(found / np.outer(scale, scale), covariance[:s, :s] / np.outer(scale, scale), atol=1e-6)
-    _, promised, _ = _step(pair, here, 0.0, np.zeros(s))
+    _, promised, _ = _step(pair, here, _eliminated(pair, here, 0.0), 0.0, np.zeros(s))
     assert promised == pytest.approx(0.5 * right @ covariance @ right, rel=1e-6)
 
     in_trial = pair.in_trial(0, here.point)
@@ -122,7 +135,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
     expected = np.einsum("dri,ij,drj->dr", by[..., :n], motion / 2.0, by[..., :n], optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
-    expected = np.sqrt(expected + lost(problem, coefficients, in_trial))
+    expected = np.sqrt(expected + of_impacts(problem, coefficients, in_trial))
     np.testing.assert_allclose(moment_sd[0], expected, rtol=1e-3)
 
 
@@ -159,10 +172,9 @@ def dense_pair(pair, here) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     return chains, information, right
 
 
-def lost(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """(d, c) moving mean square of what the loads that smoothing took off would have added to the joint moments."""
-    (trial,) = problem.trials
-    more = moments(problem, coefficients, static, trial.ground.lost) - moments(problem, coefficients, static)
+def of_impacts(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(d, c) moving mean square of what impacts would add to the joint moments."""
+    more = moments(problem, coefficients, static, True) - moments(problem, coefficients, static)
     basis = problem.bases[0]
     half = round(2.0 * len(basis.first) / (basis.size - 5))
     rows = np.clip(np.arange(len(more))[:, None] + np.arange(-half, half + 1), 0, len(more) - 1)

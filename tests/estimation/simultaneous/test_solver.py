@@ -11,12 +11,14 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 
 SPACING_S = 0.05
 PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001}
+EXACT = SoundOrFaulty.certain(1e-9)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -43,7 +45,8 @@ def trial(person):
 
 @pytest.fixture(scope="module")
 def calibration(trial):
-    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), PLATES, 0.005)
+    plates, clock = {name: SoundOrFaulty.certain(sd) for name, sd in PLATES.items()}, SoundOrFaulty.certain(0.005)
+    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), plates, {"x": EXACT, "z": EXACT}, clock)
 
 
 def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: float = 0.0, seed: int = 0) -> Observation:

@@ -17,6 +17,7 @@ from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.normal_equations import reduced
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import root_of_covariance
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 
@@ -43,8 +44,11 @@ class Information:
 
     @cached_property
     def of_prior(self) -> np.ndarray:
-        """(S, S) information of all priors."""
-        return self.problem.prior_terms(self.problem.start_static)[0]
+        """(S, S) information of all priors; the instruments may be sound or not."""
+        information = self.problem.prior_terms(self.problem.start_static)[0]
+        places = self.problem.layout.instruments
+        information[places, places] += np.diag(GaussianPriors.of(self.problem.instruments).precision)
+        return information
 
     def root(self, trials: Iterable[int]) -> np.ndarray:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""

@@ -9,21 +9,34 @@ import numpy as np
 
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
-from kinertia.estimation.simultaneous.observation import CUTOFF_HZ, MarkerNoise, Observations, observe
+from kinertia.estimation.simultaneous.observation import MarkerNoise, Observations, observe
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
 
-PLATE_SD = {"x": 0.010, "z": 0.010, "gain": 0.02, "free moment": 0.0015}
-"""Names and units as in PLATE_UNKNOWNS. Gain: scale and plates of a laboratory may differ by this much before it is
-worth a warning. Free moment: half a percent of the vertical force at 0.3 m (no source)."""
-CLOCK_SD_S = 0.005
+FAULTY_SHARE = 0.05
+PLATE_PRIOR = {
+    "x": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
+    "z": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
+    "gain": SoundOrFaulty(0.002, 0.03, FAULTY_SHARE),
+    "free moment": SoundOrFaulty(0.0003, 0.003, FAULTY_SHARE),
+}
+"""Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
+and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
+scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
+the vertical force at 0.3 m, and ten times that (no source)."""
+FLOOR_PRIOR = {"x": SoundOrFaulty(0.0005, 0.010, FAULTY_SHARE), "z": SoundOrFaulty(0.0005, 0.010, FAULTY_SHARE)}
+"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes."""
+CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
+"""Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""
 _STAYING_SD_M = 1e-6
 """Of markers that stay where they are."""
 _NOTABLE = 2.0
@@ -75,7 +88,8 @@ class SimultaneousFit:
         skeletons: the same per trial, with the markers where they are in it.
         posterior: deviations and calibration.
         motions: per trial, at the frames of its measured window.
-        foot_loads: per trial (w, 2, 6) at the corrected place and time.
+        foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
+        bandwidth: of motion and forces.
         warnings: one sentence each.
     """
 
@@ -86,6 +100,7 @@ class SimultaneousFit:
     posterior: Posterior
     motions: tuple[Motion, ...]
     foot_loads: tuple[np.ndarray, ...]
+    bandwidth: Bandwidth
     warnings: tuple[str, ...]
 
 
@@ -94,7 +109,7 @@ def fit_simultaneous(
     skeleton: Skeleton,
     prior: BspPrior,
     trials: Sequence[Kinematics],
-    cutoff_hz: float | str,
+    bandwidth: Bandwidth | None = None,
     freedom: Freedom = GAIT27_FREEDOM,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
@@ -103,15 +118,15 @@ def fit_simultaneous(
         skeleton: calibrated.
         prior: of the body segment parameters, and the total mass of its segments by the scale.
         trials: kinematics of the trials.
-        cutoff_hz: bandwidth of motion and forces; "gcv" means CUTOFF_HZ.
+        bandwidth: of motion and forces; found from the trials if None.
         freedom: what may move beside these segments.
     """
-    cutoff = CUTOFF_HZ if isinstance(cutoff_hz, str) else cutoff_hz
+    bandwidth = bandwidth or Bandwidth.of(trials)
     used = used_skeleton(skeleton, trials, freedom)
-    seen = observed(used, prior, trials, cutoff, freedom)
+    seen = observed(used, prior, trials, bandwidth, freedom)
     together = seen.together
     calibration = calibration_prior(used, freedom)
-    result = estimate_simultaneous(used, prior, calibration, together, 1.0 / (2.0 * cutoff))
+    result = estimate_simultaneous(used, prior, calibration, together, bandwidth.spacing_s)
     found = result.skeleton.carrying(None)
     if freedom.marker_sd_m is None:
         found = found.with_markers(used.markers)
@@ -137,6 +152,7 @@ def fit_simultaneous(
         posterior,
         motions,
         loads,
+        bandwidth,
         tuple(_warnings(prior, freedom, result, posterior, trials)),
     )
 
@@ -149,17 +165,17 @@ def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], freedom: Fre
 
 
 def observed(
-    skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], cutoff_hz: float, freedom: Freedom
+    skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], bandwidth: Bandwidth, freedom: Freedom
 ) -> Observations:
     """What the estimate sees of trials of a `used_skeleton`."""
     staying = freedom.marker_sd_m is None
-    return observe(skeleton, trials, prior.mass_kg + freedom.held_kg, cutoff_hz, staying)
+    return observe(skeleton, trials, prior.mass_kg + freedom.held_kg, bandwidth, staying)
 
 
 def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
     """How far a calibrated skeleton with these markers, plates and clock may be off."""
     places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
-    return CalibrationPrior(freedom.coordinates, places, PLATE_SD, CLOCK_SD_S)
+    return CalibrationPrior(freedom.coordinates, places, PLATE_PRIOR, FLOOR_PRIOR, CLOCK_PRIOR_S)
 
 
 def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
@@ -171,10 +187,11 @@ def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResul
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
-            told = {"value": float(value), "prior_sd": PLATE_SD[unknown], "sd": float(deviation)}
+            expected = np.hypot(PLATE_PRIOR[unknown].sd, FLOOR_PRIOR[unknown].sd if unknown in FLOOR_PRIOR else 0.0)
+            told = {"value": float(value), "prior_sd": float(expected), "sd": float(deviation)}
             found[f"{name}: {unknown}"] = {**told, "unit": unit}
     clock, clock_sd = result.clock_s
-    found["clock: forces late by"] = {"value": clock, "prior_sd": CLOCK_SD_S, "sd": clock_sd, "unit": "s"}
+    found["clock: forces late by"] = {"value": clock, "prior_sd": CLOCK_PRIOR_S.sd, "sd": clock_sd, "unit": "s"}
     return found
 
 

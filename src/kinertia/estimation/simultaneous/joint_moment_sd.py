@@ -4,8 +4,9 @@ Delta method: the joint moments' analytic derivatives by spline coefficients and
 covariance. Errors that come back (`repetition`) make the motion no vaguer, only what many frames say of what does not
 move: what is left of the motion if that were known is that of the errors alone. Of the coefficients' covariance only
 the blocks near the diagonal are needed, since six splines are active in any frame; they come from the block-banded
-factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what smoothing took off the loads under the feet,
-as a moving mean square: sharp forces at foot strike are lost to the moments of the leg.
+factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what of the forces is faster than the motion
+(`GroundReactions.impact`), as a moving mean square: whether it acts on the joints or is spent on segments that slow
+down is unknown.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK,
 from kinertia.estimation.simultaneous.problem import MapProblem, by_body
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Pose, Skeleton
+from kinertia.motion.ground_reactions import GroundReactions
 
 _LOST_KNOTS = 2.0
-"""Half of the stretch over which what smoothing took off is averaged, in knot intervals: one period of the cutoff."""
+"""Half of the stretch over which it is averaged, in knot intervals: one period of the cutoff."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +36,14 @@ class MomentDerivatives:
     Attributes:
         q, qd, qdd: (d, c, c) by the coordinates that move and their rates.
         static: (d, c, s) by the static unknowns that root equations depend on.
-        lost: (d, c) what the loads that smoothing took off would have added.
+        impact: (d, c) what impacts would add.
     """
 
     q: np.ndarray
     qd: np.ndarray
     qdd: np.ndarray
     static: np.ndarray
-    lost: np.ndarray
+    impact: np.ndarray
 
 
 def joint_moment_sd(
@@ -64,13 +66,14 @@ def joint_moment_sd(
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     parts = problem.full(basis.evaluate(coefficients), static)
     motion = _MotionSpread.of(eliminated, coefficients.shape[1], root)
-    variance, lost = np.empty((2, len(frames), coefficients.shape[1]))
+    variance, impact = np.empty((2, len(frames), coefficients.shape[1]))
+    reactions = problem.reactions(k, static)
     for start in range(0, len(frames), FRAMES_AT_ONCE):
         chosen = frames[start : start + FRAMES_AT_ONCE]
-        by = moment_derivatives(problem, k, [part[chosen] for part in parts], static, chosen)
+        by = moment_derivatives(problem, k, [part[chosen] for part in parts], static, reactions, chosen)
         still = by.static @ root[problem.layout.in_root]
         through = by_splines(basis.values[:, chosen], (by.q, by.qd, by.qdd)).reshape(*by.q.shape[:2], -1)
-        lost[start : start + len(chosen)] = by.lost
+        impact[start : start + len(chosen)] = by.impact
         for first in np.unique(basis.first[chosen]):
             rows = np.flatnonzero(basis.first[chosen] == first)
             own, carried = motion.active(int(first))
@@ -78,12 +81,17 @@ def joint_moment_sd(
             spread += np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
             variance[start + rows] = spread
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    variance += uniform_filter1d(np.square(lost), around, axis=0, mode="nearest")
+    variance += uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
     return np.sqrt(np.maximum(variance, 0.0))
 
 
 def moment_derivatives(
-    problem: MapProblem, k: int, motion: Sequence[np.ndarray], static: np.ndarray, frames: np.ndarray
+    problem: MapProblem,
+    k: int,
+    motion: Sequence[np.ndarray],
+    static: np.ndarray,
+    reactions: GroundReactions,
+    frames: np.ndarray,
 ) -> MomentDerivatives:
     """Derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
 
@@ -92,6 +100,7 @@ def moment_derivatives(
         k: the trial.
         motion: all coordinates, static ones included, and their rates (d, c), as `MapProblem.full` has them.
         static: the estimate.
+        reactions: `MapProblem.reactions` there.
         frames: (d,) indices.
     """
     trial, layout = problem.trials[k], problem.layout
@@ -110,19 +119,21 @@ def moment_derivatives(
         tau[i], dq[i], dv[i], da[i] = data.tau, data.dtau_dq, data.dtau_dv, data.M
         regressor[i] = pin.computeJointTorqueRegressor(model, data, x[i], v[i], a[i])[:, columns]
     da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
-    loads, rates = (problem.foot_loads(k, static, order, frames) for order in (0, 1))
+    time = trial.time[frames]
+    loads, rates, fast = reactions.at(time), reactions.rate(time), reactions.impact_at(time)
     pose = skeleton.pose(q)
-    by_static, lost = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
+    by_static, impact = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
     by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
     for foot, name in enumerate(skeleton.feet):
         moves = skeleton.support[skeleton.segments.index(name)]
         jacobian = (pose.jacobian * moves).transpose(0, 2, 1)
         only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
         by_plate = trial.ground.by_plate(only, problem.carriers[k][frames], problem.plate_values(static))
+        by_plate = by_plate @ problem.to_plates
         by_static[:, :, layout.plates] -= jacobian @ by_plate
         by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]
         tau -= (jacobian @ loads[:, foot, :, None])[..., 0]
-        lost -= (jacobian @ trial.ground.lost[frames, foot, :, None])[..., 0]
+        impact -= (jacobian @ fast[:, foot, :, None])[..., 0]
         dq -= _load_derivative(pose, moves, loads[:, foot])
     by_q, by_qd, by_qdd = (
         _rows_to_coordinates(skeleton, pose, part)
@@ -134,8 +145,8 @@ def moment_derivatives(
     by_static[:, :, layout.coordinates] = by_q[:, :, problem.still]
     rows = problem.moving[:, None]
     by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (by_q, by_qd, by_qdd))
-    lost = skeleton.map.to_coordinates(lost, pose.slopes)[:, problem.moving]
-    return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving], lost)
+    impact = skeleton.map.to_coordinates(impact, pose.slopes)[:, problem.moving]
+    return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving], impact)
 
 
 def _rows_to_coordinates(skeleton: Skeleton, pose: Pose, by: np.ndarray) -> np.ndarray:

@@ -16,15 +16,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.repetition import Repetition, repeats
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
+from kinertia.settings import ForceCutoff
 from kinertia.trial.data import nearest_samples
 
-CUTOFF_HZ = 10.0
-"""Bandwidth where the user leaves the cutoff to cross-validation, which correlated noise deceives."""
 FORCE_SD_OF_WEIGHT = 0.005
 """Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
 MOMENT_ARM_M = 0.3
@@ -77,7 +78,7 @@ class Observations:
 
 
 def observe(
-    skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, cutoff_hz: float, staying: bool = False
+    skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidth: Bandwidth, staying: bool = False
 ) -> Observations:
     """The observations of trials of one person, and the noise of their markers.
 
@@ -85,11 +86,11 @@ def observe(
         skeleton: with exactly the markers to use, in the order of the observations; a trial may lack some.
         trials: kinematics of each.
         mass_kg: for the size of force errors.
-        cutoff_hz: bandwidth of the forces.
+        bandwidth: of motion and forces.
         staying: markers stay where the skeleton has them, in all trials: no displacements.
     """
     errors = [_errors(skeleton, each) for each in trials]
-    found = [_observed(skeleton, k, each, mass_kg, cutoff_hz) for k, each in zip(trials, errors, strict=True)]
+    found = [_observed(skeleton, k, each, mass_kg, bandwidth) for k, each in zip(trials, errors, strict=True)]
     places = np.stack([each.displaced for each in errors])
     displaced = np.zeros(places.shape[1]) if staying else _displacement_sd(skeleton, places)
     varying = [_columns(each.varying, o.marker_sd) for each, (o, _) in zip(errors, found, strict=True)]
@@ -163,7 +164,7 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
 
 
 def _observed(
-    skeleton: Skeleton, kinematics: Kinematics, errors: _Errors, mass_kg: float, cutoff_hz: float
+    skeleton: Skeleton, kinematics: Kinematics, errors: _Errors, mass_kg: float, bandwidth: Bandwidth
 ) -> tuple[Observation, MarkerNoise]:
     """One trial on its own."""
     (start, end), time = kinematics.window_s, errors.time
@@ -171,7 +172,7 @@ def _observed(
         skeleton, errors.varying, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
     )
     # within the band, neighbouring frames repeat one another
-    repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * cutoff_hz)))
+    repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     return (
         Observation(
@@ -181,7 +182,7 @@ def _observed(
             marker_autocorrelation=autocorrelation,
             q=errors.q,
             dynamic=(time >= start - 1e-9) & (time <= end + 1e-9),
-            ground=_ground(kinematics, time, cutoff_hz),
+            ground=_ground(kinematics, time, bandwidth.motion_hz, bandwidth.force),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
         ),
@@ -189,16 +190,20 @@ def _observed(
     )
 
 
-def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float) -> FootPlates:
+def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cutoff: ForceCutoff) -> FootPlates:
     loads = kinematics.trial.loads
-    nearest = nearest_samples(loads.time, time)
     turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
-    used, carrier = np.unique(loads.carrier[nearest], return_inverse=True)
-    names = tuple(loads.plates[i] for i in used)
-    smoothed = kinematics.smoothed_loads(cutoff_hz)
-    raw = loads.wrench[nearest]
-    lost = raw - smoothed(loads.time[nearest]).reshape(raw.shape)
-    return FootPlates(smoothed, lost, names, carrier.reshape(-1, 2), turn)
+    reactions = ground_reactions(kinematics, cutoff_hz, force_cutoff)
+    at_frames = loads.carrier[nearest_samples(loads.time, time)]
+    used, places = np.unique(np.concatenate([at_frames, reactions.carrier]), return_inverse=True)
+    places = places.reshape(-1, 2)
+    return FootPlates(
+        kinematics.smoothed_loads(cutoff_hz),
+        replace(reactions, carrier=places[len(time) :]),
+        tuple(loads.plates[i] for i in used),
+        places[: len(time)],
+        turn,
+    )
 
 
 def _noise(

@@ -16,7 +16,8 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.marker_terms import marker_terms
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, assemble
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors, SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     dynamic_jacobian,
@@ -26,6 +27,7 @@ from kinertia.model.log_cholesky import (
     to_log_cholesky,
 )
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.inverse_kinematics import ancestor_of
 
 COEFFICIENT_SD = 1.0
@@ -80,19 +82,26 @@ class CalibrationPrior:
     Attributes:
         coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
-        plate_sd: of each of PLATE_UNKNOWNS.
-        clock_sd_s: of the time between forces and markers.
+        plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
+        floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
+        clock_s: prior of the time between forces and markers.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
-    plate_sd: Mapping[str, float]
-    clock_sd_s: float
+    plate: Mapping[str, SoundOrFaulty]
+    floor: Mapping[str, SoundOrFaulty]
+    clock_s: SoundOrFaulty
+
+    def of_instruments(self, n_plates: int) -> list[SoundOrFaulty]:
+        """Priors of all plates' unknowns and of the clock, in the order of `Layout.instruments`."""
+        plates = [self.plate[name] for _ in range(n_plates) for name in PLATE_UNKNOWNS]
+        return [*plates, *(self.floor[name] for name in FLOOR_UNKNOWNS), self.clock_s]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each kind of static unknown stands in the vector."""
+    """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's."""
 
     theta: slice
     plates: slice
@@ -103,12 +112,17 @@ class Layout:
     @classmethod
     def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int) -> Layout:
         """The layout for these numbers of unknowns."""
-        counts = [n_bsp, len(PLATE_UNKNOWNS) * n_plates, 1, n_coordinates, 3 * n_markers]
+        counts = [n_bsp, len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS), 1, n_coordinates, 3 * n_markers]
         ends = np.cumsum(counts).tolist()
         theta, plates, clock, coordinates, places = (
             slice(end - count, end) for end, count in zip(ends, counts, strict=True)
         )
         return cls(theta, plates, clock.start, coordinates, places)
+
+    @property
+    def instruments(self) -> slice:
+        """The plates' unknowns and the clock."""
+        return slice(self.plates.start, self.clock + 1)
 
     @property
     def in_root(self) -> slice:
@@ -146,6 +160,8 @@ class Point:
 class Linearised:
     """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
     squares of everything. Each trial's are those of the static unknowns as they are in it.
+
+    The priors of the instruments are none of a Gaussian: they count only after `under`.
     """
 
     point: Point
@@ -153,6 +169,14 @@ class Linearised:
     information: np.ndarray
     right: np.ndarray
     cost: float
+
+    def under(self, instruments: GaussianPriors, places: slice) -> Linearised:
+        """The same with these Gaussians for the instruments, which stand at these places of the static unknowns."""
+        values = self.point.static[places]
+        information, right = self.information.copy(), self.right.copy()
+        information[places, places] += np.diag(instruments.precision)
+        right[places] += instruments.pull - instruments.precision * values
+        return replace(self, information=information, right=right, cost=self.cost + instruments.cost(values))
 
 
 class MapProblem:
@@ -175,7 +199,8 @@ class MapProblem:
         self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
         self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
         self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
-        self.carriers = [trial.ground.columns(self.plates) for trial in trials]
+        self.carriers = [trial.ground.among(self.plates)[trial.ground.carrier] for trial in trials]
+        self.to_plates = plates_with_floor(len(self.plates))
         self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
         self.above = ancestor_of(self.free)
         count = len(skeleton.markers)
@@ -188,8 +213,7 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        deviation[self.layout.plates] = [calibration.plate_sd[name] for name in PLATE_UNKNOWNS] * len(self.plates)
-        deviation[self.layout.clock] = calibration.clock_sd_s
+        self.instruments = calibration.of_instruments(len(self.plates))
         self.weight = 1.0 / np.square(deviation)
 
     @property
@@ -224,7 +248,7 @@ class MapProblem:
         return result
 
     def prior_terms(self, static: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Information (S, S), right-hand side (S,) and cost of all priors."""
+        """Information (S, S), right-hand side (S,) and cost of all priors but the instruments'."""
         bsp = self.bsp(static)
         jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
         gap = (bsp.table() - self.prior.mean.table()).ravel()
@@ -256,8 +280,14 @@ class MapProblem:
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
     def plate_values(self, static: np.ndarray) -> np.ndarray:
-        """(p, 4) what is wrong with every plate, in the order of PLATE_UNKNOWNS."""
-        return static[self.layout.plates].reshape(-1, len(PLATE_UNKNOWNS))
+        """(p, 4) what is wrong with every plate, in the order of PLATE_UNKNOWNS: its own and the floor's."""
+        result: np.ndarray = (self.to_plates @ static[self.layout.plates]).reshape(-1, len(PLATE_UNKNOWNS))
+        return result
+
+    def plate_sd(self, covariance: np.ndarray) -> np.ndarray:
+        """(p, 4) deviations of `plate_values` for this covariance (S, S) of the static unknowns."""
+        own = covariance[self.layout.plates, self.layout.plates]
+        return np.sqrt(np.diag(self.to_plates @ own @ self.to_plates.T)).reshape(-1, len(PLATE_UNKNOWNS))
 
     def foot_loads(
         self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
@@ -266,6 +296,12 @@ class MapProblem:
         trial = self.trials[k]
         at = trial.time[frames] + static[self.layout.clock]
         return trial.ground.corrected(at, self.carriers[k][frames], self.plate_values(static), derivative)
+
+    def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
+        """The loads for the joint moments of trial k, of instruments put right."""
+        ground = self.trials[k].ground
+        plates = self.plate_values(static)[ground.among(self.plates)]
+        return ground.corrected_reactions(plates, float(static[self.layout.clock]))
 
     def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
         """Normal equations of trial k."""
@@ -318,7 +354,7 @@ class MapProblem:
         by_static = np.zeros((d, 6, layout.in_root.stop))
         by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
         by_static[:, :, layout.coordinates] = dq[:, :, self.still]
-        by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static))
+        by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static)) @ self.to_plates
         for column in range(by_plate.shape[2]):
             by_static[:, :, layout.plates.start + column] = -root.ground_load_to_generalised(q, by_plate[..., column])
         rates = self.foot_loads(k, static, 1, frames).sum(axis=1)

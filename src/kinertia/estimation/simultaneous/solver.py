@@ -1,18 +1,20 @@
 """Motion, body segment parameters and calibration in one maximum-a-posteriori estimate.
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
-log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their
-segments, how far they are from these in each of several trials (`displacement`), what is wrong with each plate
+log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
+how far they are from these in each of several trials (`displacement`), what is wrong with each plate
 (`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
-deviation, of: marker errors, root residuals, and departures from the priors. Gauss-Newton with Levenberg damping, all
-derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`);
-its Schur complement is the information on them, and its inverse their covariance.
+deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are Gaussians
+that change with what the data say of them (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives
+analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`); its Schur
+complement is the information on them, and its inverse their covariance.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +23,12 @@ from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
 from kinertia.estimation.simultaneous.normal_equations import Reduced, reduced
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
+from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.one_thread import one_blas_thread
 
 
@@ -39,7 +43,8 @@ class SimultaneousResult:
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
         plates: per plate what is wrong with it (4,), in the order of PLATE_UNKNOWNS, and the posterior deviations (4,).
         clock_s: the time offset and its posterior deviation, s.
-        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right.
+        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
+        reactions: per trial the loads for the joint moments, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
         displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
         moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
@@ -55,6 +60,7 @@ class SimultaneousResult:
     plates: dict[str, tuple[np.ndarray, np.ndarray]]
     clock_s: tuple[float, float]
     foot_loads: tuple[np.ndarray, ...]
+    reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
     displacements_m: tuple[np.ndarray, ...]
     moment_sd: tuple[np.ndarray, ...]
@@ -83,20 +89,39 @@ def estimate_simultaneous(
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
+    instruments = GaussianPriors.of(problem.instruments)
     here = problem.at(problem.beginning)
     begin, damping, iterations, converged = here.cost, _FIRST_DAMPING, 0, False
     scale = np.zeros(problem.layout.size)
     while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
         iterations += 1
-        scale = np.maximum(scale, np.diag(here.information) + sum(np.diag(normal.static) for normal in here.normals))
-        there, promised, moved_sd = _step(problem, here, damping, scale)
-        kept = (here.cost - there.cost) / promised
+        eliminated = _eliminated(problem, here, damping)
+        if iterations > 1 and damping <= _FIRST_DAMPING:
+            instruments = _judged(problem, here, eliminated, instruments)
+        under = here.under(instruments, problem.layout.instruments)
+        scale = np.maximum(scale, np.diag(under.information) + sum(np.diag(normal.static) for normal in here.normals))
+        there, promised, moved_sd = _step(problem, under, eliminated, damping, scale)
+        kept = (under.cost - there.under(instruments, problem.layout.instruments).cost) / promised
         converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
         if kept > 0.0:
             here = there
         damping = max(damping * _change_of_damping(kept), 1e-9)
-    covariance, moment_sd = _deviations(problem, here)
-    return _result(problem, here.point, covariance, moment_sd, converged, iterations, (begin, here.cost))
+    under = here.under(instruments, problem.layout.instruments)
+    covariance, moment_sd = _deviations(problem, under)
+    return _result(problem, here.point, covariance, moment_sd, converged, iterations, (begin, under.cost))
+
+
+def _judged(
+    problem: MapProblem, here: Linearised, eliminated: Eliminated, instruments: GaussianPriors
+) -> GaussianPriors:
+    """Gaussians for the instruments that fit what the data say of them at this point."""
+    places = problem.layout.instruments
+    under = here.under(instruments, places)
+    information = under.information + sum(each.information for each in eliminated.displaced)
+    right = under.right + sum(each.right for each in eliminated.displaced)
+    covariance = np.linalg.inv(information)
+    mean = here.point.static[places] + (covariance @ right)[places]
+    return instruments.updated(problem.instruments, mean, covariance[places, places])
 
 
 def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
@@ -115,12 +140,18 @@ def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tupl
     return root @ root.T, tuple(moment_sd)
 
 
-def _eliminated(problem: MapProblem, here: Linearised, damping: float) -> tuple[list[Reduced], list[Displaced]]:
+class Eliminated(NamedTuple):
     """Normal equations of all trials without motion, and without motion and displacements."""
+
+    parts: list[Reduced]
+    displaced: list[Displaced]
+
+
+def _eliminated(problem: MapProblem, here: Linearised, damping: float) -> Eliminated:
     parts = [reduced(normal, damping) for normal in here.normals]
     rows = zip(parts, problem.displacement_sd_m, here.point.displaced, strict=True)
     places = problem.layout.locals
-    return parts, [Displaced.of(part.information, part.right, places, sd, own) for part, sd, own in rows]
+    return Eliminated(parts, [Displaced.of(part.information, part.right, places, sd, own) for part, sd, own in rows])
 
 
 def _change_of_damping(kept: float) -> float:
@@ -141,11 +172,13 @@ def root_of_covariance(information: np.ndarray) -> np.ndarray:
     return result
 
 
-def _step(problem: MapProblem, here: Linearised, damping: float, scale: np.ndarray) -> tuple[Linearised, float, float]:
+def _step(
+    problem: MapProblem, here: Linearised, eliminated: Eliminated, damping: float, scale: np.ndarray
+) -> tuple[Linearised, float, float]:
     """Where a step leads, by how much it promises to lower the cost, and how far body and calibration move, in
     deviations of all of them together.
     """
-    parts, displaced = _eliminated(problem, here, damping)
+    parts, displaced = eliminated
     information = here.information + sum(each.information for each in displaced)
     right = here.right + sum(each.right for each in displaced)
     information[np.diag_indices_from(information)] += damping * scale
@@ -186,7 +219,7 @@ def _result(
     }
     markers = problem.placed(values).markers
     skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in found.items()})
-    plates = zip(problem.plate_values(values), problem.plate_values(sd), strict=True)
+    plates = zip(problem.plate_values(values), problem.plate_sd(covariance), strict=True)
     return SimultaneousResult(
         bsp,
         chain @ covariance[layout.theta, layout.theta] @ chain.T,
@@ -195,6 +228,7 @@ def _result(
         dict(zip(problem.plates, plates, strict=True)),
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
+        tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
         tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
         moment_sd,

@@ -1,0 +1,148 @@
+"""The ground reactions that joint moments are computed from: the plates' full rate, less what no motion can follow.
+
+Below the hip joint moments are forces times lever arms, and forces change within milliseconds where a foot lands or
+leaves; filtered like the motion they are wrong there by several N m. But not everything fast belongs into a joint
+moment. What one foot loses the other gains: of that the motion shows nothing, since it cancels in the sum. An impact
+does not cancel: it slows down foot and shank, faster than markers can show, and put into equations of motion that lack
+this acceleration it appears as a spike at knee and hip (Bisseling and Hof 2006, J Biomech 39:2438; Kristianslund et al.
+2012, J Biomech 45:666).
+
+So forces keep the bandwidth of the plates, and only the part of their sum that is faster than the motion is taken off,
+from the foot that makes it, where it is more than rigid segments leave anyway. Where forces and motion are of one
+bandwidth (the two-level estimate of the study), nothing is faster.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.smoothing import smooth
+from kinertia.settings import ForceCutoff
+from kinertia.trial.centre_of_pressure import held_centre_of_pressure
+from kinertia.trial.data import nearest_samples
+
+IMPACT_SHARE_OF_WEIGHT = 0.01
+"""Forces faster than the motion that stay below this (RMS over about one period, share of the mean vertical force) are
+no impact: twice what rigid segments leave (`observation.FORCE_SD_OF_WEIGHT`)."""
+NOISE_LEFT_N = 1.0
+"""Deviation of the noise that may stay in the vertical force."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundReactions:
+    """Loads on both feet at the plates' samples.
+
+    Attributes:
+        time: (k,) s.
+        wrench: (k, 2, 6) on right and left foot: force (N), moment about the ground origin (N m), ground axes.
+        carrier: (k, 2) index of the plate that each foot stands on, among those of the trial's `FootLoads`.
+        impact: (k, 2, 6) what motion cannot follow, whether it was taken off or not: joint moments are that uncertain
+            for lack of the acceleration that goes with it.
+        cutoff_hz: low pass of the forces; None: as the plates gave them.
+    """
+
+    time: np.ndarray
+    wrench: np.ndarray
+    carrier: np.ndarray
+    impact: np.ndarray
+    cutoff_hz: float | None
+
+    @property
+    def impact_n(self) -> float:
+        """RMS length of the impact's force."""
+        return float(np.sqrt(np.square(self.impact[..., :3].sum(axis=1)).sum(axis=-1).mean()))
+
+    @cached_property
+    def point(self) -> np.ndarray:
+        """(k, 2, 3) m: centres of pressure, held where there is next to no load."""
+        return np.stack([held_centre_of_pressure(self.wrench[:, foot]) for foot in range(2)], axis=1)
+
+    @cached_property
+    def torque(self) -> np.ndarray:
+        """(k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
+        return self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
+
+    def at(self, time: np.ndarray) -> np.ndarray:
+        """(n, 2, 6) loads at these times: natural cubic splines of force, point and torque, as OpenSim's tools lay them
+        through the columns of the file that is written of them.
+        """
+        force, point, torque = np.moveaxis(self._spline(time), 2, 0)
+        return np.concatenate([force, torque + np.cross(point, force)], axis=-1)
+
+    def rate(self, time: np.ndarray) -> np.ndarray:
+        """(n, 2, 6) derivative of `at` by time, N/s and N m/s."""
+        (force, point, _), (by_force, by_point, by_torque) = (
+            np.moveaxis(self._spline(time, order), 2, 0) for order in (0, 1)
+        )
+        return np.concatenate([by_force, by_torque + np.cross(by_point, force) + np.cross(point, by_force)], axis=-1)
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        columns = np.stack([self.wrench[..., :3], self.point, self.torque], axis=2)
+        return CubicSpline(self.time, columns, bc_type="natural")
+
+    def impact_at(self, time: np.ndarray) -> np.ndarray:
+        """(n, 2, 6) `impact` at the samples nearest to these times."""
+        return self.impact[nearest_samples(self.time, time)]
+
+
+def measured_reactions(kinematics: Kinematics) -> GroundReactions:
+    """As the plates gave them, but for a low pass where they are noisy when unloaded."""
+    loads, near = kinematics.trial.loads, kinematics.near_window
+    time, wrench = loads.time[near], loads.wrench[near]
+    rate_hz = (len(time) - 1) / (time[-1] - time[0])
+    cutoff_hz = None
+    if loads.noise_n > NOISE_LEFT_N:
+        # white noise of deviation s, cut off at f, keeps s sqrt(2 f / rate)
+        cutoff_hz = float(max(rate_hz / 2.0 * (NOISE_LEFT_N / loads.noise_n) ** 2, kinematics.cutoff_hz))
+        wrench = _low_passed(time, wrench, cutoff_hz)
+    return GroundReactions(time, wrench, loads.carrier[near], np.zeros_like(wrench), cutoff_hz)
+
+
+def ground_reactions(kinematics: Kinematics, motion_hz: float, wanted: ForceCutoff = "auto") -> GroundReactions:
+    """For the joint moments of a motion of this bandwidth.
+
+    Args:
+        kinematics: of the trial.
+        motion_hz: what the motion can follow.
+        wanted: "auto" as this module says; "none", as the plates gave them; or a low pass, Hz.
+    """
+    measured = measured_reactions(kinematics)
+    if not isinstance(wanted, str):
+        loads, near = kinematics.trial.loads, kinematics.near_window
+        return replace(measured, wrench=_low_passed(measured.time, loads.wrench[near], wanted), cutoff_hz=wanted)
+    impact = _impact(measured, motion_hz)
+    return replace(measured, wrench=measured.wrench - (impact if wanted == "auto" else 0.0), impact=impact)
+
+
+def _low_passed(time: np.ndarray, wrench: np.ndarray, cutoff_hz: float) -> np.ndarray:
+    return smooth(time, wrench.reshape(len(time), -1), cutoff_hz)(time).reshape(wrench.shape)
+
+
+def _impact(measured: GroundReactions, motion_hz: float) -> np.ndarray:
+    """(k, 2, 6): what of the sum of both feet's forces is faster than the motion, and more than rigid segments leave.
+    Each foot has it in proportion to the power of its own fast forces, at its own centre of pressure.
+    """
+    force = measured.wrench[..., :3]
+    fast = force - _low_passed(measured.time, force, motion_hz)
+    step = float(np.median(np.diff(measured.time)))
+    power = _around(np.square(fast).sum(axis=-1), step, motion_hz)
+    both = fast.sum(axis=1)
+    limit = (IMPACT_SHARE_OF_WEIGHT * force[..., 1].sum(axis=1).mean()) ** 2
+    of_both = _around(np.square(both).sum(axis=-1, keepdims=True), step, motion_hz)
+    impact = np.maximum(1.0 - limit / np.maximum(of_both, 1e-12), 0.0) * both
+    shares = power / np.maximum(power.sum(axis=1, keepdims=True), 1e-12)
+    parts = shares[..., None] * impact[:, None]
+    return np.concatenate([parts, np.cross(measured.point, parts)], axis=-1)
+
+
+def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
+    """Mean over about half a period of the motion's cutoff."""
+    result: np.ndarray = gaussian_filter1d(values, 0.25 / motion_hz / step_s, axis=0, mode="nearest")
+    return result

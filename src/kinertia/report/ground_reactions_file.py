@@ -1,0 +1,77 @@
+"""Ground reactions as OpenSim reads them: `ground_reactions.mot`, and `external_loads.xml` that says what they act
+on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+import pandas as pd
+
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.sto import write_sto
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.trial.data import FEET
+
+_MARGIN = 12
+"""Samples outside the motion's time."""
+FORCES_FILE, LOADS_FILE = "ground_reactions.mot", "external_loads.xml"
+
+
+def write_ground_reactions(
+    folder: Path, reactions: GroundReactions, window_s: tuple[float, float], feet: Sequence[str]
+) -> None:
+    """Write both files.
+
+    Per foot: force (N), the point on the ground where it acts (m), torque there (N m), in ground axes. Where there is
+    no load the point stays where it was or will be: OpenSim lays splines through the columns, which would swing at a
+    jump.
+
+    Args:
+        folder: where to.
+        reactions: by the motion's clock.
+        window_s: first and last time of the motion; some samples outside are written, too, since splines err at ends.
+        feet: bodies that right and left foot's forces act on.
+    """
+    first, last = np.searchsorted(reactions.time, window_s)
+    rows = slice(max(int(first) - _MARGIN, 0), int(last) + _MARGIN)
+    columns: dict[str, np.ndarray] = {}
+    for foot, side in enumerate(FEET):
+        force = reactions.wrench[:, foot, :3]
+        point = reactions.point[:, foot]
+        for stem, values in (("force_{}_v", force), ("force_{}_p", point), ("torque_{}_", reactions.torque[:, foot])):
+            columns |= {f"ground_{stem.format(side)}{axis}": values[rows, k] for k, axis in enumerate("xyz")}
+    table = pd.DataFrame(columns, index=pd.Index(reactions.time[rows], name="time"))
+    write_sto(folder / FORCES_FILE, table, False, "ground_reactions")
+    write_then_rename(folder / LOADS_FILE, _external_loads(feet))
+
+
+def _external_loads(feet: Sequence[str]) -> str:
+    forces = [
+        f'''      <ExternalForce name="{name}_foot">
+        <applied_to_body>{escape(body)}</applied_to_body>
+        <force_expressed_in_body>ground</force_expressed_in_body>
+        <point_expressed_in_body>ground</point_expressed_in_body>
+        <force_identifier>ground_force_{side}_v</force_identifier>
+        <point_identifier>ground_force_{side}_p</point_identifier>
+        <torque_identifier>ground_torque_{side}_</torque_identifier>
+      </ExternalForce>'''
+        for name, side, body in zip(("right", "left"), FEET, feet, strict=True)
+    ]
+    return "\n".join(
+        [
+            '<?xml version="1.0" encoding="UTF-8" ?>',
+            '<OpenSimDocument Version="40000">',
+            '  <ExternalLoads name="ground_reactions">',
+            "    <objects>",
+            *forces,
+            "    </objects>",
+            "    <groups />",
+            f"    <datafile>{FORCES_FILE}</datafile>",
+            "  </ExternalLoads>",
+            "</OpenSimDocument>",
+            "",
+        ]
+    )

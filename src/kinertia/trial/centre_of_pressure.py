@@ -1,0 +1,27 @@
+"""Where on the ground a foot's load acts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.trial.data import LOAD_THRESHOLD_N
+
+
+def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
+    """(..., 3) m, where on the ground (y = 0) a wrench (..., 6) acts with no moment but a vertical one.
+
+    A wrench without vertical force has none: the origin stands for it.
+    """
+    upward = np.where(wrench[..., 1] == 0.0, np.inf, wrench[..., 1])
+    return np.stack([wrench[..., 5] / upward, np.zeros_like(upward), -wrench[..., 3] / upward], axis=-1)
+
+
+def held_centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
+    """(k, 3) m over k samples of one foot's load (k, 6); where it is below LOAD_THRESHOLD_N, that of the nearest sample
+    that is not. The origin for a foot that is never loaded.
+    """
+    firm = np.flatnonzero(wrench[:, 1] >= LOAD_THRESHOLD_N)
+    if not len(firm):
+        return np.zeros((len(wrench), 3))
+    nearest = firm[np.searchsorted((firm[1:] + firm[:-1]) / 2, np.arange(len(wrench)))]
+    return centre_of_pressure(wrench[nearest])

@@ -1,0 +1,63 @@
+"""Which samples of a force plate are a load, how a load begins and ends, and how noisy the unloaded plate is.
+
+Below some 20 N the centre of pressure is a quotient of two noises, and all day long a plate reads a little of
+something. But a foot that lands or leaves passes through these small forces too: set to zero, they are missing from the
+legs' joint moments. So what joins a load without a break and stands out of the plate's noise belongs to it, and acts
+where the nearest firm sample does.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import binary_propagation
+
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, nearest_samples
+
+LONGEST_TAIL_S = 0.03
+"""A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
+_ABOVE_NOISE, _LEAST_TAIL_N = 4.0, 1.0
+_FEWEST_IDLE = 20
+_GAUSSIAN = 1.4826
+"""Deviation of Gaussian noise over its median absolute deviation."""
+
+
+class PlateLoad(NamedTuple):
+    """One plate without what it reads when unloaded: force (k, 3) N, moment (k, 3) N m, noise of the vertical force
+    N."""
+
+    force: FloatArray
+    moment: FloatArray
+    noise_n: float
+
+
+def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> PlateLoad:
+    """Zero wherever nobody stands on the plate.
+
+    Args:
+        time: (k,) s.
+        force, moment: (k, 3) N and N m about the ground origin, on the person; where the force is below
+            LOAD_THRESHOLD_N the moment is not looked at and may be anything.
+    """
+    loaded = force[:, 1] >= LOAD_THRESHOLD_N
+    offset_n, noise_n = _idle(force[~loaded, 1])
+    if not loaded.any():
+        return PlateLoad(np.zeros_like(force), np.zeros_like(force), noise_n)
+    firm = np.flatnonzero(loaded)
+    nearest = firm[nearest_samples(time[firm], time)] if len(firm) > 1 else np.full(len(time), firm[0])
+    stands_out = force[:, 1] > max(offset_n + _ABOVE_NOISE * noise_n, _LEAST_TAIL_N)
+    near = np.abs(time - time[nearest]) <= LONGEST_TAIL_S
+    tail = binary_propagation(loaded, mask=loaded | (stands_out & near)) & ~loaded
+    point = np.zeros_like(force)
+    point[:, 0], point[:, 2] = moment[nearest, 2] / force[nearest, 1], -moment[nearest, 0] / force[nearest, 1]
+    moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))
+    return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n)
+
+
+def _idle(vertical: FloatArray) -> tuple[float, float]:
+    """Offset and deviation (N) of what an unloaded plate reads; zero where it is hardly ever unloaded."""
+    if len(vertical) < _FEWEST_IDLE:
+        return 0.0, 0.0
+    offset = float(np.median(vertical))
+    return offset, float(_GAUSSIAN * np.median(np.abs(vertical - offset)))

@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors, SoundOrFaulty
+
+PLATE = SoundOrFaulty(0.001, 0.015, 0.1)
+
+
+def density(x: float) -> float:
+    return 0.9 * norm.pdf(x, 0.0, PLATE.sound_sd) + 0.1 * norm.pdf(x, 0.0, PLATE.faulty_sd)
+
+
+@pytest.mark.parametrize(("mean", "sd"), [(0.0, 0.002), (0.004, 0.002), (-0.012, 0.006), (0.02, 0.003)])
+def test_moments_are_those_of_the_product(mean, sd):
+    def part(power):
+        def value(x):
+            return x**power * density(x) * norm.pdf(x, mean, sd)
+
+        return quad(value, -0.1, 0.1, points=[0.0, mean], limit=200, epsabs=0)[0]
+
+    first, variance = PLATE.moments(mean, sd**2)
+    expected = part(1) / part(0)
+    assert first == pytest.approx(expected, rel=1e-5, abs=1e-9)
+    assert variance == pytest.approx(part(2) / part(0) - expected**2, rel=1e-4)
+
+
+def test_a_certain_prior_stays_what_it_is():
+    priors = [SoundOrFaulty.certain(0.01), SoundOrFaulty.certain(0.2)]
+    covariance = np.array([[2e-5, 1e-5], [1e-5, 0.01]])
+    found = GaussianPriors.of(priors).updated(priors, np.array([0.02, -0.1]), covariance)
+    np.testing.assert_allclose(found.precision, [1e4, 25.0])
+    np.testing.assert_allclose(found.pull, 0.0, atol=1e-9)
+
+
+def posterior(priors, data, right):
+    """Mean and covariance, by expectation propagation, of quantities that data (k, k) and right (k,) tell of."""
+    sites = GaussianPriors.of(priors)
+    for _ in range(5):
+        covariance = np.linalg.inv(data + np.diag(sites.precision))
+        sites = sites.updated(priors, covariance @ (right + sites.pull), covariance)
+    covariance = np.linalg.inv(data + np.diag(sites.precision))
+    return covariance @ (right + sites.pull), covariance
+
+
+def test_the_plate_that_is_off_takes_the_whole_error():
+    """Their difference is known to 1 mm, their mean to 6 mm: a single Gaussian would share 20 mm out."""
+    apart, together = np.array([1.0, -1.0]) / np.sqrt(2), np.array([1.0, 1.0]) / np.sqrt(2)
+    data = np.outer(apart, apart) / 0.001**2 + np.outer(together, together) / 0.006**2
+    truth = np.array([0.0, -0.020])
+    mean, covariance = posterior([PLATE, PLATE], data, data @ truth)
+    np.testing.assert_allclose(mean, truth, atol=0.002)
+    assert np.sqrt(covariance[1, 1]) < 0.005
+    alone = np.linalg.solve(data + np.eye(2) / PLATE.sd**2, data @ truth)
+    assert alone[0] > 0.004
+
+
+def test_sound_plates_stay_where_they_are():
+    """Though skin motion says 5 mm, with a deviation of 6 mm."""
+    data = np.eye(1) / 0.006**2
+    mean, covariance = posterior([PLATE], data, data @ [0.005])
+    assert 0.0 < mean[0] < 0.0008
+    assert PLATE.sound_sd < np.sqrt(covariance[0, 0]) < 0.004
+
+
+def test_one_quantity_has_the_exact_mean():
+    for value in np.linspace(-0.03, 0.03, 7):
+        data = np.eye(1) / 0.003**2
+        mean, covariance = posterior([PLATE], data, data @ [value])
+        first, variance = PLATE.moments(value, 0.003**2)
+        assert mean[0] == pytest.approx(first, abs=1e-6)
+        # where both components are as likely, the posterior is wider than any Gaussian prior can make it
+        assert covariance[0, 0] <= variance * (1 + 1e-6)
+
+
+def test_drawn_instruments_have_the_prior_s_deviation():
+    rng = np.random.default_rng(1)
+    drawn = np.array([PLATE.draw(rng) for _ in range(20000)])
+    assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(PLATE.sd, rel=0.05)
+    assert np.mean(np.abs(drawn) < 0.003) == pytest.approx(0.9 + 0.1 * 0.16, abs=0.01)

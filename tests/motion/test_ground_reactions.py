@@ -1,0 +1,103 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.motion.ground_reactions import ground_reactions, measured_reactions
+from kinertia.motion.smoothing import smooth
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import FootLoads
+
+RATE_HZ, WEIGHT_N = 1000.0, 700.0
+TIME = np.arange(2000) / RATE_HZ
+PLACES = np.array([[0.6, 0.0, 0.1], [0.1, 0.0, -0.1]])
+
+
+def loads(right_n: np.ndarray, left_n: np.ndarray) -> np.ndarray:
+    """(k, 2, 6) of vertical forces with some push forward, at PLACES, with a free moment."""
+    force = np.stack([right_n, left_n], axis=1)[..., None] * [0.1, 1.0, 0.02]
+    moment = np.cross(PLACES, force) + force[..., 1:2] * [0.0, 0.01, 0.0]
+    return np.concatenate([force, moment], axis=-1)
+
+
+def kinematics(wrench: np.ndarray, noise_n: float = 0.0):
+    """As far as ground reactions look at a trial."""
+    feet = FootLoads(TIME, wrench[..., :3], wrench[..., 3:], noise_n=noise_n)
+    return SimpleNamespace(trial=SimpleNamespace(loads=feet), near_window=np.ones(len(TIME), bool), cutoff_hz=10.0)
+
+
+def step(at_s: float, over_s: float = 0.01) -> np.ndarray:
+    """From 1 to 0 within some milliseconds."""
+    x = np.clip((TIME - at_s) / over_s, 0.0, 1.0)
+    return 1.0 - x**2 * (3.0 - 2.0 * x)
+
+
+def passed_on() -> np.ndarray:
+    """The weight goes from foot to foot within 10 ms: the body's acceleration does not know."""
+    return loads(WEIGHT_N * (1.0 - step(1.0)), WEIGHT_N * step(1.0))
+
+
+def struck() -> np.ndarray:
+    """The right foot lands with an impact of 20 ms while the left foot stands."""
+    bump = 400.0 * np.exp(-0.5 * np.square((TIME - 1.0) / 0.005))
+    return loads(WEIGHT_N * 0.3 * (TIME > 0.9) + bump, np.full(len(TIME), 0.6 * WEIGHT_N))
+
+
+def test_what_one_foot_passes_to_the_other_stays_as_sharp_as_it_is():
+    wrench = passed_on()
+    found = ground_reactions(kinematics(wrench), 12.0)
+    assert found.cutoff_hz is None
+    np.testing.assert_allclose(found.wrench, wrench, atol=1e-9)
+    assert found.impact_n == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_impact_is_taken_off_the_foot_that_makes_it():
+    wrench = struck()
+    found = ground_reactions(kinematics(wrench), 12.0)
+    assert found.impact_n > 10.0
+    at = np.argmax(wrench[:, 0, 1])
+    slow = smooth(TIME, wrench[..., :3].sum(axis=1), 12.0)(TIME)[at]
+    left = found.wrench[at, :, :3].sum(axis=0) - slow
+    assert np.linalg.norm(left) < 0.1 * np.linalg.norm(wrench[at, :, :3].sum(axis=0) - slow)
+    assert np.abs(found.wrench - wrench)[at, 1, 1] < 0.05 * np.abs(found.wrench - wrench)[at, 0, 1]
+    np.testing.assert_allclose(centre_of_pressure(found.wrench[at]), PLACES, atol=1e-6)
+
+
+def test_the_user_may_keep_impacts_and_still_hears_of_them():
+    wrench = struck()
+    found = ground_reactions(kinematics(wrench), 12.0, "none")
+    np.testing.assert_array_equal(found.wrench, wrench)
+    assert found.impact_n > 10.0
+
+
+def test_the_user_may_ask_for_a_low_pass():
+    found = ground_reactions(kinematics(passed_on()), 12.0, 8.0)
+    assert found.cutoff_hz == 8.0
+    expected = smooth(TIME, passed_on().reshape(-1, 12), 8.0)(TIME).reshape(-1, 2, 6)
+    np.testing.assert_allclose(found.wrench, expected)
+
+
+@pytest.mark.parametrize(("noise_n", "cutoff_hz"), [(0.9, None), (4.0, 31.25), (30.0, 10.0)])
+def test_noisy_plates_are_low_passed_as_far_as_their_noise_wants(noise_n, cutoff_hz):
+    rng = np.random.default_rng(0)
+    wrench = passed_on()
+    noisy = wrench + rng.normal(0.0, noise_n, wrench.shape)
+    found = measured_reactions(kinematics(noisy, noise_n))
+    assert found.cutoff_hz == cutoff_hz
+    if cutoff_hz == 31.25:
+        calm = slice(300, 700)
+        assert np.std((found.wrench - wrench)[calm, 1, 1]) < 1.3
+
+
+def test_between_samples_loads_are_splines_of_force_point_and_torque():
+    found = measured_reactions(kinematics(passed_on()))
+    np.testing.assert_allclose(found.at(TIME[5:-5]), found.wrench[5:-5], atol=1e-9)
+    h, at = 1e-6, TIME[100:-100:50] + 0.0003
+    slope = (found.at(at + h) - found.at(at - h)) / (2 * h)
+    np.testing.assert_allclose(found.rate(at), slope, atol=1e-4 * np.abs(slope).max())
+
+
+def test_a_foot_off_the_ground_keeps_its_last_centre_of_pressure():
+    found = measured_reactions(kinematics(passed_on()))
+    np.testing.assert_allclose(found.point[:, 0], np.broadcast_to(PLACES[0], (len(TIME), 3)), atol=1e-9)
+    assert not found.wrench[:900, 0].any()
