@@ -76,8 +76,8 @@ class OsimModel:
 
     Examples:
         >>> model = kinertia.read_osim("model.osim")  # as `kinertia demo` writes it
-        >>> len(model.coordinates), round(model.bsp.total_mass_kg, 1)
-        (27, 72.6)
+        >>> len(model.coordinates), model.skeleton.segments[0]
+        (27, 'pelvis')
     """
 
     path: Path
