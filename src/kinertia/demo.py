@@ -16,13 +16,15 @@ import pandas as pd
 
 from kinertia.bsp import BodySegmentParameters
 from kinertia.config import read_subject, with_settings
+from kinertia.dynamics import inverse_dynamics
 from kinertia.fit import Fit, estimate_bsp
 from kinertia.inputs import read_inputs
 from kinertia.io.folder import complete_folder
+from kinertia.joint_accuracy import JOINTS
 from kinertia.prepare import Progress
 from kinertia.provenance import provenance_of
 from kinertia.results import save_fit
-from kinertia.synthetic import unlike_literature, walk, walking_subject
+from kinertia.synthetic import SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.synthetic_lab import LabNoise, record, write_lab
 
 PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
@@ -38,14 +40,40 @@ class Demo:
     Attributes:
         fit: the simultaneous estimate.
         two_level: the two-level estimate from the same files.
-        truth: the BSPs that the files were made with.
+        walk: what the person did, and with which BSPs; from it the files were made.
         subject_file: of the synthetic laboratory.
     """
 
     fit: Fit
     two_level: Fit
-    truth: BodySegmentParameters
+    walk: SyntheticTrial
     subject_file: Path
+
+    @property
+    def truth(self) -> BodySegmentParameters:
+        """The person's BSPs."""
+        return self.walk.bsp
+
+    @cached_property
+    def moment_errors(self) -> dict[str, tuple[float, float]]:
+        """Per joint, RMS error (N m) of joint moments by the usual way (measured motion, literature BSPs, forces as
+        measured) and by the simultaneous estimate.
+        """
+        trial = self.fit.trials[0]
+        at = np.searchsorted(self.walk.time, trial.time - 1e-9)
+        true = inverse_dynamics(self.walk.skeleton, self.walk.bsp, self.walk.motion.cut(at), self.walk.foot_loads[at])
+        names = self.walk.skeleton.coordinates
+        columns = {name: k for k, name in enumerate(trial.skeleton.coordinates)}
+        found = {}
+        for joint, begins in JOINTS.items():
+            own = [k for k, name in enumerate(names) if name.startswith(begins) and name in columns]
+            theirs = [columns[names[k]] for k in own]
+            before, after = (
+                float(np.sqrt(np.mean(np.square(trial.moments[stage][:, theirs] - true[:, own]))))
+                for stage in ("literature", "estimate")
+            )
+            found[joint] = (before, after)
+        return found
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -98,6 +126,6 @@ def run_demo(
             settings = with_settings(wanted, method=method).settings
             fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
             save_fit(fits[-1], results, provenance)
-        demo = Demo(fits[0], fits[1], subject.bsp, folder / "lab" / "subject.toml")
+        demo = Demo(fits[0], fits[1], trial, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

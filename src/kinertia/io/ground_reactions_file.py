@@ -24,13 +24,14 @@ def write_ground_reactions(
 ) -> None:
     """Write both files.
 
-    Per foot: force (N), the point on the ground where it acts (m), torque there (N m), in ground axes. Where there is no
-    load the point stays where it was or will be: OpenSim lays splines through the columns, which would swing at a jump.
+    Per foot: force (N), the point on the ground where it acts (m), torque there (N m), in ground axes. Where there is
+    no load the point stays where it was or will be: OpenSim lays splines through the columns, which would swing at a
+    jump.
 
     Args:
         folder: where to.
         reactions: by the motion's clock.
-        window_s: first and last time of the motion; some samples outside are written, too, since splines err at ends.
+        window_s: first and last time of the motion; some samples outside are written, too: splines err at ends.
         feet: bodies that right and left foot's forces act on.
     """
     first, last = np.searchsorted(reactions.time, window_s)
