@@ -58,6 +58,16 @@ def joint_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     return rows
 
 
+def moments_markdown(found: Mapping[str, ScenarioAccuracy]) -> str:
+    """One table: per laboratory and joint the RMS error of joint moments, estimate / usual pipeline."""
+    joints = list(next(iter(found.values())).joints)
+    rows = [
+        [scenario.title, *(f"{one.moment_nm:.2f} / {one.usual_nm:.2f}" for one in scenario.joints.values())]
+        for scenario in found.values()
+    ]
+    return _table(["N m", *joints], rows)
+
+
 def accuracy_markdown(found: Mapping[str, ScenarioAccuracy]) -> str:
     """A table per scenario."""
     parts = []
