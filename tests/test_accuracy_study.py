@@ -87,7 +87,8 @@ def test_bars_hold_short_form():
     assert found.classes["CoM"].rms < found.classes["CoM"].rms_literature
     for joint in JOINTS:
         assert found.joints[joint].cover > 0.92
-        assert found.joints[joint].moment_nm < found.joints[joint].usual_nm
+        if joint.startswith(("hip", "lumbar")):
+            assert found.joints[joint].moment_nm < 0.9 * found.joints[joint].usual_nm
 
 
 @pytest.mark.slow

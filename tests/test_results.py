@@ -15,6 +15,7 @@ STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {
     "report.html", "fit.json", "model.osim",
     "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
+    "ground_reactions.mot", "external_loads.xml",
 }  # fmt: skip
 FOR_ALL = {"report.html", "fit.json", "bsp.csv", "model.osim"}
 PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
@@ -122,12 +123,14 @@ def test_opensim_reads_residuals_that_give_the_numbers_of_fit_json(saved, opensi
     _, folder = saved
     _, labels, values = table(opensim, folder / "residuals.sto")
     told = json.loads((folder / "fit.json").read_text())["trials"][0]
-    assert len(labels) == 18
-    for stage in STAGES:
+    assert len(labels) == 24
+    for stage in (*STAGES, "estimate_full"):
         for kind, unit in (("force", "N"), ("moment", "Nm")):
             size = np.linalg.norm(values[:, [labels.index(f"{stage}_{kind}_{axis}") for axis in "xyz"]], axis=1)
-            assert told[f"residual_{kind}_rms_{unit}"][stage] == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
-            assert told[f"residual_{kind}_max_{unit}"][stage] == pytest.approx(size.max(), rel=1e-5)
+            which, name = ("full_", "estimate") if stage == "estimate_full" else ("", stage)
+            rms, largest = (told[f"{which}residual_{kind}_{value}_{unit}"][name] for value in ("rms", "max"))
+            assert rms == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
+            assert largest == pytest.approx(size.max(), rel=1e-5)
 
 
 def test_marker_rms_is_over_visible_markers(short_fit):
