@@ -19,6 +19,7 @@ from kinertia.config import read_subject
 from kinertia.dynamics import Motion
 from kinertia.provenance import provenance_of
 from kinertia.report.page import MOST_TRIALS, bsp_rows, render
+from kinertia.report.time_figures import bandwidths
 from kinertia.report.verdict import words
 from kinertia.report.wording import fixed
 from kinertia.trial import FootLoads, Markers, PlateLoads, Recording
@@ -228,6 +229,33 @@ def test_report_tells_warnings_assumptions_and_settings(fit):
         assert name in told
 
 
+def test_residuals_are_told_at_both_bandwidths(fit, two_level):
+    for one in (fit, two_level):
+        trial = one.trials[0]
+        told = Elements(render(one)).text
+        assert f"motion's bandwidth ({bandwidths(trial)})" in told
+        for found in (trial.residuals, trial.full_residuals):
+            for part in np.hsplit(found["estimate"], 2):
+                size = np.linalg.norm(part, axis=1)
+                assert f"{np.sqrt(np.mean(size**2)):.1f} ({size.max():.1f})" in told
+        assert "what OpenSim's Inverse Dynamics finds on the delivered files" in told
+
+
+def test_report_says_which_forces_the_moments_are_from(fit, two_level):
+    trial = fit.trials[0]
+    (note,) = [note for note in fit.notes if "joint moments are from" in note]
+    assert note.startswith(f"{trial.name}: ")
+    assert note.partition("ground reactions ")[2] in Elements(render(fit)).text
+    struck = np.zeros_like(trial.reactions.impact)
+    struck[:, 0, 1] = 20.0
+    hit = replace(fit, trials=(replace(trial, reactions=replace(trial.reactions, impact=struck)),))
+    told = Elements(render(hit)).text
+    assert "less an impact of 20.0 N (RMS)" in told
+    assert "Bisseling and Hof 2006" in told
+    assert 'force_cutoff_hz = "none" under [settings]' in told
+    assert f"low-passed at {two_level.trials[0].motion_hz:.3g} Hz, the bandwidth" in Elements(render(two_level)).text
+
+
 def test_two_level_report_says_that_it_has_no_error_bars(two_level):
     told = Elements(render(two_level))
     assert "no error bars" in told.text
@@ -262,6 +290,7 @@ def prolonged(trial, times):
         kinematics=replace(kinematics, trial=walked, ik=solved, window_s=(0.0, float(time[-1]))),
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
+        full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},
         moments={stage: again(values) for stage, values in trial.moments.items()},
         moment_sd=again(trial.moment_sd),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
@@ -323,7 +352,7 @@ def test_fit_trial_and_parameters_show_themselves(fit, two_level):
         told = Elements(one._repr_html_())
         assert one.subject.name in told.text
         assert words(one).headline in told.text
-        assert len(told.named("tr")) == 1 + 2 + 1 + 120
+        assert len(told.named("tr")) == 1 + 4 + 1 + 120
     trial = fit.trials[0].kinematics.trial
     told = Elements(trial._repr_html_()).text
     assert f"{len(trial.markers.time)} frames at 100 Hz" in told
@@ -334,7 +363,7 @@ def test_fit_trial_and_parameters_show_themselves(fit, two_level):
     told = Elements(fitted._repr_html_())
     assert fitted.name in told.text
     assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in told.text
-    assert len(told.named("tr")) == 3
+    assert len(told.named("tr")) == 5
     table = Elements(fit.estimate._repr_html_())
     assert len(table.named("tr")) == 2 + 12
     assert f"{fit.estimate.mass_kg[1]:.4g}" in table.text

@@ -4,11 +4,13 @@ from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from kinertia.config import Settings
 from kinertia.errors import FileError
 from kinertia.io.folder import check_folder
+from kinertia.io.sto import read_sto
 from kinertia.results import save_fit, summary
 
 STAGES = {"literature", "corrected", "estimate"}
@@ -63,7 +65,9 @@ def test_fit_json_keeps_its_contract(saved):
     assert trial["seconds"]["read"] == 0.25
     assert set(trial["marker_rms_m"]) == {"ik", "final"}
     for quantity in ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm"):
-        assert set(trial[f"residual_{quantity}"]) == STAGES
+        assert set(trial[f"residual_{quantity}"]) == set(trial[f"full_residual_{quantity}"]) == STAGES
+    assert trial["motion_hz"] == trial["cutoff_hz"] == trial["force_cutoff_hz"]
+    assert trial["impact_force_rms_N"] == 0.0
 
 
 def test_bsp_csv_keeps_its_contract(saved):
@@ -131,6 +135,27 @@ def test_opensim_reads_residuals_that_give_the_numbers_of_fit_json(saved, opensi
             rms, largest = (told[f"{which}residual_{kind}_{value}_{unit}"][name] for value in ("rms", "max"))
             assert rms == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
             assert largest == pytest.approx(size.max(), rel=1e-5)
+
+
+HEADER_LINES = 7
+
+
+def test_headers_say_which_forces_and_hurt_nobody(saved, opensim):
+    """pandas with one number of lines to skip for all files; OpenSim by both of its readers."""
+    _, folder = saved
+    for path in (*folder.glob("*.sto"), *folder.glob("*.mot")):
+        header = path.read_text().splitlines()[:HEADER_LINES]
+        assert header[-1] == "endheader"
+        assert header[-2].endswith("Hz")
+        assert ("Ground reactions: " in header[-2]) == (path.name != "kinematics.mot")
+        by_pandas = pd.read_csv(path, sep="\t", skiprows=HEADER_LINES, index_col="time")
+        time, labels, values = table(opensim, path)
+        assert list(by_pandas.columns) == labels
+        np.testing.assert_array_equal(by_pandas.index, time)
+        np.testing.assert_array_equal(by_pandas, values)
+        pd.testing.assert_frame_equal(by_pandas, read_sto(path), check_exact=True)
+        storage = opensim.Storage(str(path))
+        assert (storage.getName(), storage.getSize()) == (path.stem, len(time))
 
 
 def test_marker_rms_is_over_visible_markers(short_fit):

@@ -19,6 +19,7 @@ from kinertia.bsp_prior import BspPrior
 from kinertia.checks import check_masses, fit_warnings, known, mass_by_force_kg, turning_warnings, two_level_warnings
 from kinertia.config import Settings, Subject
 from kinertia.dynamics import Motion, inverse_dynamics, joined, residual
+from kinertia.forces_used import forces_used
 from kinertia.ground_reactions import GroundReactions, ground_reactions, measured_reactions
 from kinertia.identifiability import evidence
 from kinertia.io.osim import OsimModel
@@ -249,9 +250,14 @@ def _estimate(ready: Prepared, settings: Settings, progress: Progress) -> Fit:
         converged=outcome.converged,
         posterior=outcome.posterior,
         warnings=tuple(dict.fromkeys(warnings)),
-        notes=ready.notes,
+        notes=(*ready.notes, *_force_notes(outcome.trials, settings)),
         file=ready.file,
     )
+
+
+def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
+    """Per trial, which ground reactions the joint moments are from."""
+    return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
 
 
 @dataclass(frozen=True, eq=False)

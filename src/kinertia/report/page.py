@@ -19,6 +19,7 @@ from plotly.offline import get_plotlyjs
 from kinertia import __version__
 from kinertia.bsp import PARAMETERS
 from kinertia.fit import Fit, TrialFit
+from kinertia.forces_used import forces_used, full_bandwidth
 from kinertia.identifiability import evidence
 from kinertia.provenance import Provenance, versions
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
@@ -27,6 +28,7 @@ from kinertia.report.skeleton_view import packed, scene
 from kinertia.report.time_figures import (
     MOST_EVENTS,
     MOST_FRAMES,
+    bandwidths,
     coordinate_figure,
     moment_figure,
     residual_figure,
@@ -121,6 +123,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
         "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames, start_of(fit))),
         "bands": trial.moment_sd is not None,
+        "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
@@ -132,14 +135,17 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
 
 
 def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
-    """Per trial and stage: RMS and peak of force and of moment."""
+    """Per trial, bandwidth of the forces and stage: RMS and peak of force and of moment."""
     rows = []
     for trial in trials:
-        row: dict[str, Any] = {"name": trial.name, "stages": {}}
-        for stage, values in trial.residuals.items():
-            parts = values[:, :3], values[:, 3:]
-            row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
-        rows.append(row)
+        narrow = f"motion's bandwidth ({bandwidths(trial)})"
+        full = full_bandwidth(trial.reactions).removeprefix("forces ").removeprefix("at ")
+        for k, (bandwidth, found) in enumerate(((narrow, trial.residuals), (full, trial.full_residuals))):
+            row: dict[str, Any] = {"name": "" if k else trial.name, "bandwidth": bandwidth, "stages": {}}
+            for stage, values in found.items():
+                parts = values[:, :3], values[:, 3:]
+                row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
+            rows.append(row)
     return rows
 
 
