@@ -250,7 +250,7 @@ def test_report_says_which_forces_the_moments_are_from(fit, two_level):
     struck[:, 0, 1] = 20.0
     hit = replace(fit, trials=(replace(trial, reactions=replace(trial.reactions, impact=struck)),))
     told = Elements(render(hit)).text
-    assert "less an impact of 20.0 N (RMS)" in told
+    assert "less impacts of 20.0 N (RMS over the trial)" in told
     assert "Bisseling and Hof 2006" in told
     assert 'force_cutoff_hz = "none" under [settings]' in told
     assert f"low-passed at {two_level.trials[0].motion_hz:.3g} Hz, the bandwidth" in Elements(render(two_level)).text

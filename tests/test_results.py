@@ -153,7 +153,7 @@ def test_headers_say_which_forces_and_hurt_nobody(saved, opensim):
         assert list(by_pandas.columns) == labels
         np.testing.assert_array_equal(by_pandas.index, time)
         np.testing.assert_array_equal(by_pandas, values)
-        pd.testing.assert_frame_equal(by_pandas, read_sto(path), check_exact=True)
+        pd.testing.assert_frame_equal(by_pandas, read_sto(path), check_exact=True, check_dtype=False)
         storage = opensim.Storage(str(path))
         assert (storage.getName(), storage.getSize()) == (path.stem, len(time))
 

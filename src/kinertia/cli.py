@@ -295,8 +295,8 @@ def _report_trial(trial: dict[str, Any]) -> None:
     names = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
     full = [f"{trial[f'full_residual_{name}']['estimate']:.1f}" for name in names]
     out.print(
-        "estimate with forces at full bandwidth (what OpenSim finds on these files): "
-        f"{full[0]} ({full[1]}) N, {full[2]} ({full[3]}) N m\n"
+        " estimate with forces at full bandwidth (what OpenSim finds on these files):\n"
+        f" force {full[0]} ({full[1]}) N, moment {full[2]} ({full[3]}) N m"
     )
 
 

@@ -8,7 +8,7 @@ from kinertia.config import Settings
 from kinertia.ground_reactions import GroundReactions
 
 NOTABLE_IMPACT_N = 0.5
-"""RMS below which an impact is not mentioned."""
+"""RMS below which impacts are not mentioned."""
 
 
 class ForcesUsed(NamedTuple):
@@ -39,13 +39,13 @@ def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float
     which, why = _bandwidth(reactions, settings)
     if reactions.impact_n < NOTABLE_IMPACT_N:
         return ForcesUsed(which, why)
-    size = f"an impact of {reactions.impact_n:.1f} N (RMS)"
-    spike = "a spike into the moments of knee and hip (Bisseling and Hof 2006, J Biomech 39:2438)"
+    size = f"impacts of {reactions.impact_n:.1f} N (RMS over the trial)"
+    spikes = "spikes into the moments of knee and hip (Bisseling and Hof 2006, J Biomech 39:2438)"
     faster = f"faster than the motion ({motion_hz:g} Hz)"
     if settings.force_cutoff_hz == "none":
-        return ForcesUsed(f"{which}, {size} included", f"{why}; it is {faster} and puts {spike}")
-    keep = 'to keep it: force_cutoff_hz = "none" under [settings]'
-    return ForcesUsed(f"{which}, less {size}", f"{why}; it is {faster} and would put {spike}; {keep}")
+        return ForcesUsed(f"{which}, {size} included", f"{why}; they are {faster} and put {spikes}")
+    keep = 'to keep them: force_cutoff_hz = "none" under [settings]'
+    return ForcesUsed(f"{which}, less {size}", f"{why}; they are {faster} and would put {spikes}; {keep}")
 
 
 def forces_before(reactions: GroundReactions, settings: Settings) -> str:
