@@ -84,7 +84,7 @@ def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_p
 
 @pytest.mark.parametrize("name", CASES)
 def test_our_reader_takes_the_ground_reactions_as_they_are(folder_of, name):
-    """Force everywhere, centre of pressure and free moment where there is load; each load on the foot it is named for."""
+    """Forces and their moments where there is load; each on the foot that it is named for."""
     folder = folder_of(CASES[name])
     loads, notes = read_forces_with_notes(folder / FORCES_FILE, folder / LOADS_FILE)
     table = read_sto(folder / FORCES_FILE)

@@ -5,10 +5,11 @@ import pytest
 from kinertia.config import Settings
 from kinertia.forces_used import forces_before, forces_used, full_bandwidth
 
+RMS = "of 21.3 N (RMS over the trial)"
 CASES = [
     ({}, None, 0.4, "as measured", "as measured"),
-    ({}, None, 21.3, "as measured, less impacts of 21.3 N (RMS over the trial)", "as measured"),
-    ({"force_cutoff_hz": "none"}, None, 21.3, "as measured, impacts of 21.3 N (RMS over the trial) included", "as measured"),
+    ({}, None, 21.3, f"as measured, less impacts {RMS}", "as measured"),
+    ({"force_cutoff_hz": "none"}, None, 21.3, f"as measured, impacts {RMS} included", "as measured"),
     ({}, 31.25, 0.0, "low-passed at 31.2 Hz", "low-passed at 31.2 Hz"),
     ({"force_cutoff_hz": 8.0}, 8.0, 0.0, "low-passed at 8 Hz", "as measured"),
     ({"method": "two-level"}, 7.5, 0.0, "low-passed at 7.5 Hz", "low-passed at 7.5 Hz"),

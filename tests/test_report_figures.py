@@ -46,7 +46,8 @@ def test_coordinates_are_drawn_in_degrees_by_side(fit):
 def test_curves_are_thinned_but_not_moved(fit):
     trial = fit.trials[0]
     figure = residual_figure(trial, most_frames=20)
-    trace = next(t for t in figure.data if t.name == stage_name("estimate", LITERATURE, trial.motion_hz) and t.yaxis == "y")
+    name = stage_name("estimate", LITERATURE, trial.motion_hz)
+    trace = next(t for t in figure.data if t.name == name and t.yaxis == "y")
     assert len(trace.y) <= 20
     step = -(-len(trial.time) // 20)
     np.testing.assert_allclose(trace.x0 + trace.dx * np.arange(len(trace.y)), trial.time[::step], atol=1e-6)
