@@ -45,13 +45,13 @@ def vector(values: Iterable[float]) -> opensim.Vec3:
 
 
 def radians(model: opensim.Model, motion: Path) -> pd.DataFrame:
-    """A motion file's columns in the order of the model's coordinates, in rad and m; coordinates it lacks are left out."""
-    table, in_degrees = read_sto(motion), opensim.Storage(str(motion)).isInDegrees()
+    """A motion file's coordinates in the model's order, in rad and m; those it lacks are left out."""
+    table = read_sto(motion)
     coordinates = model.getCoordinateSet()
     columns = {}
     for coordinate in (coordinates.get(k) for k in range(coordinates.getSize())):
         if coordinate.getName() in table:
-            turns = in_degrees and coordinate.getMotionType() == 1
+            turns = table.attrs["in_degrees"] and coordinate.getMotionType() == 1
             columns[coordinate.getName()] = table[coordinate.getName()] * (np.pi / 180 if turns else 1)
     return pd.DataFrame(columns)
 
