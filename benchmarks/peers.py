@@ -260,8 +260,8 @@ by `python benchmarks/peers.py`; do not edit it by hand.
   measured. At truth trials every joint is given its best cutoff of 6, 10 and 12 Hz, which a user could not know; all
   else is at 6 Hz, OpenSim's usual choice.
 - *RRA*: `RRATool` with the actuators, tracking weights and 6 Hz filter of OpenSim's gait2354 example. A first pass
-  moves the centre of mass of the torso and recommends masses, which are applied; a second pass, with that model, changes
-  the motion. Then inverse dynamics of this motion with this model.
+  moves the centre of mass of the torso and recommends masses, which are applied; a second pass, with that model,
+  changes the motion. Then inverse dynamics of this motion with this model.
 - *Kinertia*: `kinertia fit --model`; with `--calibrate`, markers and joint centres of the model may move.
 
 OpenSim's model is scaled to the person's mass; Kinertia is told that mass. All programs are judged at the same frames.
