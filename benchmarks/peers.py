@@ -303,8 +303,9 @@ The same for two measured walks, with OpenSim's scaled models and the marker wei
 ## Moments over time
 
 Vertical lines: heel strike (solid) and toe-off (dotted); grey: the foot is on the ground. Kinertia with its default
-settings, OpenSim's inverse dynamics with coordinates at 6 Hz and unfiltered forces. Extension moments of the hip are
-negative, of the knee positive, plantar flexion moments of the ankle negative, as OpenSim has them.
+settings, OpenSim's inverse dynamics with coordinates at 6 Hz and unfiltered forces. Signs are those of the model's
+coordinates: hip flexion and ankle dorsiflexion are positive; so is knee extension in gait2354, but knee flexion in
+Rajagopal's model.
 
 {pictures}
 
