@@ -137,17 +137,9 @@ def delivered(case: Case, result: Result, out: Path) -> None:
     work.mkdir(exist_ok=True)
     with quietly(work / "opensim.log"):
         without_forces(out / "model.osim", work / "model.osim")
-        loads = delivered_loads(case, out, work)
+        loads = out / "external_loads.xml"
         result.opensim = inverse_dynamics(work / "model.osim", out / "kinematics.mot", loads, work / "moments.sto")
         result.marker_rms_m = marker_errors(case, out / "model.osim", out / "kinematics.mot", frames(out))
-
-
-def delivered_loads(case: Case, out: Path, work: Path) -> Path:
-    """The ExternalLoads that Kinertia delivers."""
-    if (out / "external_loads.xml").exists():
-        return out / "external_loads.xml"
-    with_forces_file(case.loads, case.forces, work / "loads.xml")
-    return work / "loads.xml"
 
 
 def opensim_default(case: Case, time: np.ndarray) -> Result:
