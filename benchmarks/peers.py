@@ -287,8 +287,8 @@ the first 50 ms after heel strike.
 
 Residual: RMS size of the force and of the moment at the pelvis that OpenSim's `InverseDynamicsTool` finds with the
 model, motion and ground reactions that each program delivers (OpenSim's leave the laboratory's as they are), forces
-unfiltered; the moment is about the axes of tilt, list and rotation. Markers: RMS distance to the measured ones. Seconds are this machine's, per walk; Kinertia's include
-its report, OpenSim's one cutoff.
+unfiltered; the moment is about the axes of tilt, list and rotation. Markers: RMS distance to the measured ones. Seconds
+are this machine's, per walk; Kinertia's include its report, OpenSim's one cutoff.
 
 {truth}
 
