@@ -36,15 +36,16 @@ This page is written by `python benchmarks/accuracy.py`; do not edit it by hand.
 ## Joint moments
 
 RMS errors of joint moments (N m), estimate / usual pipeline, {sections["people"]} people in each laboratory, a walk of
-2.5 s (`kinertia study accuracy`). *Usual pipeline*: inverse kinematics, literature BSPs, forces as measured, coordinates
-low-passed at the best of 6, 10 and 12 Hz for each joint. Both know the same skeleton and see the same markers and forces.
+2.5 s (`kinertia study accuracy`). *Usual pipeline*: inverse kinematics, literature BSPs, forces as measured,
+coordinates low-passed at the best of 6, 10 and 12 Hz for each joint. Both know the same skeleton and see the same
+markers and forces.
 
 {sections["moments"]}
 
-At hips and back the estimate is better in every laboratory, and with wrong instruments everywhere below them, too. Where
-instruments *and* skeleton are exact, as no laboratory's are, the usual pipeline knows knee and ankle better: it trusts
-them, the estimate lets markers and joint centres move. On trials that OpenSim made, with OpenSim's own tools as the usual
-pipeline and its model kept as it is: [peers](peers.md).
+At hips and back the estimate is better in every laboratory, and with wrong instruments everywhere below them, too.
+Where instruments *and* skeleton are exact, as no laboratory's are, the usual pipeline knows knee and ankle better: it
+trusts them, the estimate lets markers and joint centres move. On trials that OpenSim made, with OpenSim's own tools as
+the usual pipeline and its model kept as it is: [peers](peers.md).
 
 ## The study's noise, from starts 50 % off
 
@@ -68,8 +69,8 @@ estimator where starts come from helps the masses and costs in the inertias.
 
 Errors put into the truth of a walk of 2.5 s (people unlike the literature, 1 mm of camera noise, prior of the
 literature), five people each. Per quantity: RMS error / mean posterior deviation (largest error in posterior
-deviations). Priors: plates and clock as in every fit, sound or faulty; hips 10 mm. BSPs: RMS errors of mass (kg), CoM (mm), inertia
-(kg m2) with calibration free, held at its wrong values, and of the literature.
+deviations). Priors: plates and clock as in every fit, sound or faulty; hips 10 mm. BSPs: RMS errors of mass (kg), CoM
+(mm), inertia (kg m2) with calibration free, held at its wrong values, and of the literature.
 
 {sections["calibration"]}
 
@@ -104,7 +105,8 @@ parameters whose truth lies in the 95 % interval, and the standard error over pe
 Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model. *Better*:
 people for whom the RMS error is below the literature's, and in brackets the share for whom that of an estimate at the
 bound would be. *Measured*, *informed* and *assumed*: parameters of all kinds, in prior deviations. Skin, skeleton and
-instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is told in [error bars](error-bars.md).
+instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is told in [error
+bars](error-bars.md).
 
 {sections["error_bars"]}
 
@@ -116,9 +118,9 @@ decides for many. With squats, arm swings and trunk sway beside the walk errors 
 literature's, and masses better in 85 %.
 
 **Joint angles**: where calibration is off, as it is in practice, the estimate's errors are about half of those of
-inverse kinematics. With an exact skeleton inverse kinematics profits from knowing it; the estimate, which does not trust the
-skeleton, is off by constant angles, since skin that goes with a joint looks like a joint elsewhere. What varies in time
-is better throughout.
+inverse kinematics. With an exact skeleton inverse kinematics profits from knowing it; the estimate, which does not
+trust the skeleton, is off by constant angles, since skin that goes with a joint looks like a joint elsewhere. What
+varies in time is better throughout.
 
 **Joint moments** lie in their intervals, which are too wide: deviations are about right at knees and ankles, about two
 times the errors at hips and back under skin motion, and more under the study's noise.
