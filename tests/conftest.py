@@ -7,6 +7,7 @@ from unittest import mock
 import pytest
 from hypothesis import settings
 
+import osim_models
 from command_line import fitted
 from kinertia.cli.demo import Demo, run_demo
 from kinertia.estimation.estimate import estimate_bsp
@@ -51,6 +52,22 @@ def fit_of(shared_data, tmp_path_factory):
             folder = tmp_path_factory.mktemp(name) / "results" / "out"
             done[name] = fitted(folder, *fit_arguments(shared_data, name))
         return done[name]
+
+    return get
+
+
+@pytest.fixture(scope="session")
+def fit_with_model(shared_data, tmp_path_factory):
+    """Folder of results of `kinertia fit` with a user's model, by person and calibration; run once."""
+    done: dict[tuple[str, bool], Path] = {}
+
+    def get(name: str, calibrate: bool) -> Path:
+        if (name, calibrate) not in done:
+            folder = tmp_path_factory.mktemp(name)
+            subject = folder / f"{name}.toml"
+            subject.write_text(osim_models.subject_file(shared_data, osim_models.PEOPLE[name], calibrate))
+            done[name, calibrate] = fitted(folder / "out", subject).folder
+        return done[name, calibrate]
 
     return get
 

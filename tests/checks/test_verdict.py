@@ -26,7 +26,10 @@ def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes
     loads[:, :, 1] = external_n / 2
     trial = SimpleNamespace(
         name="walk",
+        motion_hz=12.0,
+        reactions=SimpleNamespace(cutoff_hz=None),
         residuals={"estimate": residual},
+        full_residuals={"estimate": 3.0 * residual},
         kinematics=SimpleNamespace(foot_loads=loads),
         marker_errors_m={"final": np.full((FRAMES, 3), markers_m)},
     )
@@ -61,6 +64,17 @@ def test_force_by_the_guideline(force, expected):
     found = verdicts(fit(force))
     assert level(found, "walk: residual force") == expected
     assert stands_against(found) == (expected == "against")
+
+
+def test_residuals_are_judged_at_the_motions_bandwidth_and_told_at_both():
+    """Three times as much at full bandwidth changes no level."""
+    for start, expected, full in (
+        ("walk: residual force", "RMS 4.0 N, peak 4.0 N: good", "RMS 12.0 N"),
+        ("walk: residual moment", "RMS 20.0 N m, peak 20.0 N m: good", "RMS 60.0 N m"),
+    ):
+        (told,) = [one.sentence for one in verdicts(fit(4.0, 20.0)) if one.sentence.startswith(start)]
+        assert told.startswith(f"{start} at the motion's bandwidth (12 Hz) {expected}")
+        assert told.endswith(f"with forces at full bandwidth {full}")
 
 
 @pytest.mark.parametrize(("markers_m", "expected"), [(0.012, "good"), (0.013, "okay"), (0.021, "against")])

@@ -16,24 +16,6 @@ from kinertia.io.trc import read_trc
 CASES = [("gait2354", False), ("gait2354", True), ("rajagopal", True)]
 
 
-@pytest.fixture(scope="module")
-def fitted(shared_data, tmp_path_factory):
-    """Folder of results by person and calibration; run once."""
-    done: dict[tuple[str, bool], Path] = {}
-
-    def get(name: str, calibrate: bool) -> Path:
-        if (name, calibrate) not in done:
-            folder = tmp_path_factory.mktemp(name)
-            subject = folder / f"{name}.toml"
-            subject.write_text(osim_models.subject_file(shared_data, osim_models.PEOPLE[name], calibrate))
-            outcome = run("fit", subject, "-o", folder / "out")
-            assert outcome.status in (0, 1), outcome.err
-            done[name, calibrate] = folder / "out"
-        return done[name, calibrate]
-
-    return get
-
-
 def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndarray, np.ndarray]:
     """Times and (n, m, 3) m markers of a model that OpenSim moves by a motion file."""
     loaded = opensim.Model(str(model))
@@ -57,9 +39,9 @@ def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndar
 
 
 @pytest.mark.parametrize(("name", "calibrate"), CASES)
-def test_opensim_sees_the_markers_where_the_fit_says(opensim, shared_data, fitted, name, calibrate):
+def test_opensim_sees_the_markers_where_the_fit_says(opensim, shared_data, fit_with_model, name, calibrate):
     """Model and motion as written: all coordinates, locked and coupled ones too, and calibrated markers and joints."""
-    folder = fitted(name, calibrate)
+    folder = fit_with_model(name, calibrate)
     told = json.loads((folder / "fit.json").read_text())["trials"][0]
     (markers_file,) = osim_models.PEOPLE[name].trials
     measured = read_trc(shared_data / f"{markers_file}.trc")
@@ -76,8 +58,8 @@ def told_labels(folder: Path):
 
 
 @pytest.mark.parametrize(("name", "calibrate"), CASES)
-def test_the_written_model_carries_the_estimate(opensim, fitted, name, calibrate):
-    folder = fitted(name, calibrate)
+def test_the_written_model_carries_the_estimate(opensim, fit_with_model, name, calibrate):
+    folder = fit_with_model(name, calibrate)
     estimate = pd.read_csv(folder / "bsp.csv").pivot(index="segment", columns="parameter", values="estimate")
     loaded = opensim.Model(str(folder / "model.osim"))
     loaded.initSystem()
@@ -90,8 +72,8 @@ def test_the_written_model_carries_the_estimate(opensim, fitted, name, calibrate
 
 
 @pytest.mark.parametrize(("name", "calibrate"), CASES)
-def test_changes_are_what_was_asked_for(fitted, name, calibrate):
-    changes = pd.read_csv(fitted(name, calibrate) / "model_changes.csv")
+def test_changes_are_what_was_asked_for(fit_with_model, name, calibrate):
+    changes = pd.read_csv(fit_with_model(name, calibrate) / "model_changes.csv")
     mass = {"mass", "mass_center", "inertia"}
     assert set(changes["property"]) == (mass | {"location", "translation"} if calibrate else mass)
 
@@ -112,13 +94,13 @@ def assert_targets(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["gait2354", "rajagopal"])
-def test_residuals_markers_and_parameters(fitted, name):
-    assert_targets(fitted(name, True))
+def test_residuals_markers_and_parameters(fit_with_model, name):
+    assert_targets(fit_with_model(name, True))
 
 
 @pytest.mark.slow
-def test_walks_and_squats_pooled(fitted):
-    folder = fitted("subject4", True)
+def test_walks_and_squats_pooled(fit_with_model):
+    folder = fit_with_model("subject4", True)
     assert_targets(folder)
     told = json.loads((folder / "fit.json").read_text())
     assert [trial["name"] for trial in told["trials"]] == ["walking1", "walking2", "squats1"]
@@ -126,10 +108,10 @@ def test_walks_and_squats_pooled(fitted):
     assert (folder / "walking2" / "kinematics.mot").is_file()
 
 
-def test_page_of_the_benchmark(fitted):
+def test_page_of_the_benchmark(fit_with_model):
     runs = {}
     for calibrate in (False, True):
-        folder = fitted("gait2354", calibrate)
+        folder = fit_with_model("gait2354", calibrate)
         bsp = pd.read_csv(folder / "bsp.csv")
         runs["gait2354", calibrate] = {**json.loads((folder / "fit.json").read_text()), "bsp": bsp}
     page = osim_models.document(runs)

@@ -39,6 +39,7 @@ bsp = "deleva"
 symmetry = false
 cutoff_hz = 6
 hip_centre = "harrington"
+force_cutoff_hz = "none"
 """
 
 
@@ -87,6 +88,7 @@ def test_reads_everything(folder):
         "cutoff_hz": 6.0,
         "joint_axes": False,
         "hip_centre": "harrington",
+        "force_cutoff_hz": "none",
     }
 
 
@@ -104,6 +106,7 @@ def test_least_file_gets_defaults(folder):
         "cutoff_hz": "gcv",
         "joint_axes": False,
         "hip_centre": "bell",
+        "force_cutoff_hz": "auto",
     }
 
 
@@ -154,6 +157,7 @@ CASES = [
     ("symmetry = false", 'symmetry = "no"', 22, 'symmetry = "no"'),
     ("cutoff_hz = 6", "cutoff_hz = 0", 23, 'must be "gcv" or a positive frequency in Hz'),
     ("cutoff_hz = 6", 'cutoff_hz = "6"', 23, 'must be "gcv" or a positive frequency in Hz'),
+    ('force_cutoff_hz = "none"', 'force_cutoff_hz = "raw"', 25, 'must be "auto", "none" or a positive frequency in Hz'),
     ("cutoff_hz = 6", "cutoff_hz = true", 23, 'must be "gcv" or a positive frequency in Hz'),
     ("[0.4, 2]", "[2, 0.4]", 14, "window_s = [2, 0.4]: must be [start, end] in seconds"),
     ("[0.4, 2]", "[2]", 14, "must be [start, end] in seconds"),
@@ -195,7 +199,7 @@ def test_errors_name_the_line(folder, old, new, line, message):
             1,
             "[[trial]], in double",
         ),
-        (GOOD + "[settings", 25, "not valid TOML"),
+        (GOOD + "[settings", 26, "not valid TOML"),
     ],
 )
 def test_errors_of_the_whole(folder, text, line, message):

@@ -14,7 +14,14 @@ from kinertia.report.coordinate_titles import panels_of, title_of
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
-from kinertia.report.time_figures import coordinate_figure, moment_figure, motion_change, residual_figure
+from kinertia.report.time_figures import (
+    coordinate_figure,
+    moment_figure,
+    motion_change,
+    residual_figure,
+    stage_name,
+)
+from kinertia.report.wording import LITERATURE
 from kinertia.trial.data import FootLoads, Markers, Trial
 from kinertia.trial.gait_events import gait_events
 from report_page import figures_of, numbers
@@ -39,11 +46,26 @@ def test_coordinates_are_drawn_in_degrees_by_side(fit):
 def test_curves_are_thinned_but_not_moved(fit):
     trial = fit.trials[0]
     figure = residual_figure(trial, most_frames=20)
-    trace = next(t for t in figure.data if t.name == "estimate" and t.yaxis == "y")
+    name = stage_name("estimate", LITERATURE, trial.motion_hz)
+    trace = next(t for t in figure.data if t.name == name and t.yaxis == "y")
     assert len(trace.y) <= 20
     step = -(-len(trial.time) // 20)
     np.testing.assert_allclose(trace.x0 + trace.dx * np.arange(len(trace.y)), trial.time[::step], atol=1e-6)
     np.testing.assert_allclose(trace.y, trial.residuals["estimate"][::step, 0], rtol=1e-6)
+
+
+def test_residuals_are_drawn_at_both_bandwidths(fit):
+    trial = fit.trials[0]
+    drawn = {t.name: t.y for t in residual_figure(trial).data if t.yaxis == "y"}
+    before, after = (f"({hz:.3g} Hz)" for hz in (trial.kinematics.cutoff_hz, trial.motion_hz))
+    assert list(drawn) == [
+        "estimate, forces at full bandwidth",
+        f"literature values {before}",
+        f"literature values, pelvis corrected {before}",
+        f"estimate {after}",
+    ]
+    full = drawn["estimate, forces at full bandwidth"]
+    np.testing.assert_allclose(full, trial.full_residuals["estimate"][: len(full), 0], rtol=1e-5, atol=1e-5)
 
 
 def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit):

@@ -4,10 +4,12 @@ from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from kinertia.errors import FileError
 from kinertia.io.output_folder import check_folder
+from kinertia.io.sto import read_sto
 from kinertia.report.files import save_fit, summary
 from kinertia.settings import Settings
 
@@ -15,6 +17,7 @@ STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {
     "report.html", "fit.json", "model.osim",
     "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
+    "ground_reactions.mot", "external_loads.xml",
 }  # fmt: skip
 FOR_ALL = {"report.html", "fit.json", "bsp.csv", "model.osim"}
 PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
@@ -62,7 +65,9 @@ def test_fit_json_keeps_its_contract(saved):
     assert trial["seconds"]["read"] == 0.25
     assert set(trial["marker_rms_m"]) == {"ik", "final"}
     for quantity in ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm"):
-        assert set(trial[f"residual_{quantity}"]) == STAGES
+        assert set(trial[f"residual_{quantity}"]) == set(trial[f"full_residual_{quantity}"]) == STAGES
+    assert trial["motion_hz"] == trial["cutoff_hz"] == trial["force_cutoff_hz"]
+    assert trial["impact_force_rms_N"] == 0.0
 
 
 def test_bsp_csv_keeps_its_contract(saved):
@@ -122,12 +127,35 @@ def test_opensim_reads_residuals_that_give_the_numbers_of_fit_json(saved, opensi
     _, folder = saved
     _, labels, values = table(opensim, folder / "residuals.sto")
     told = json.loads((folder / "fit.json").read_text())["trials"][0]
-    assert len(labels) == 18
-    for stage in STAGES:
+    assert len(labels) == 24
+    for stage in (*STAGES, "estimate_full"):
         for kind, unit in (("force", "N"), ("moment", "Nm")):
             size = np.linalg.norm(values[:, [labels.index(f"{stage}_{kind}_{axis}") for axis in "xyz"]], axis=1)
-            assert told[f"residual_{kind}_rms_{unit}"][stage] == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
-            assert told[f"residual_{kind}_max_{unit}"][stage] == pytest.approx(size.max(), rel=1e-5)
+            which, name = ("full_", "estimate") if stage == "estimate_full" else ("", stage)
+            rms, largest = (told[f"{which}residual_{kind}_{value}_{unit}"][name] for value in ("rms", "max"))
+            assert rms == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
+            assert largest == pytest.approx(size.max(), rel=1e-5)
+
+
+HEADER_LINES = 7
+
+
+def test_headers_say_which_forces_and_hurt_nobody(saved, opensim):
+    """pandas with one number of lines to skip for all files; OpenSim by both of its readers."""
+    _, folder = saved
+    for path in (*folder.glob("*.sto"), *folder.glob("*.mot")):
+        header = path.read_text().splitlines()[:HEADER_LINES]
+        assert header[-1] == "endheader"
+        assert header[-2].endswith("Hz")
+        assert ("Ground reactions: " in header[-2]) == (path.name != "kinematics.mot")
+        by_pandas = pd.read_csv(path, sep="\t", skiprows=HEADER_LINES, index_col="time")
+        time, labels, values = table(opensim, path)
+        assert list(by_pandas.columns) == labels
+        np.testing.assert_array_equal(by_pandas.index, time)
+        np.testing.assert_array_equal(by_pandas, values)
+        pd.testing.assert_frame_equal(by_pandas, read_sto(path), check_exact=True, check_dtype=False)
+        storage = opensim.Storage(str(path))
+        assert (storage.getName(), storage.getSize()) == (path.stem, len(time))
 
 
 def test_marker_rms_is_over_visible_markers(short_fit):

@@ -263,6 +263,7 @@ def prolonged(trial, times):
         kinematics=replace(kinematics, trial=walked, ik=solved, window_s=(0.0, float(time[-1]))),
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
+        full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},
         moments={
             stage: pd.DataFrame(again(values.to_numpy()), columns=values.columns)
             for stage, values in trial.moments.items()
@@ -327,7 +328,7 @@ def test_fit_trial_and_parameters_show_themselves(fit, two_level):
         told = Elements(one._repr_html_())
         assert one.subject.name in told.text
         assert words(one).headline in told.text
-        assert len(told.named("tr")) == 1 + 2 + 1 + 120
+        assert len(told.named("tr")) == 1 + 4 + 1 + 120
     trial = fit.trials[0].kinematics.trial
     told = Elements(trial._repr_html_()).text
     assert f"{len(trial.markers.time)} frames at 100 Hz" in told
@@ -338,7 +339,7 @@ def test_fit_trial_and_parameters_show_themselves(fit, two_level):
     told = Elements(fitted._repr_html_())
     assert fitted.name in told.text
     assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in told.text
-    assert len(told.named("tr")) == 3
+    assert len(told.named("tr")) == 5
     table = Elements(fit.estimate._repr_html_())
     assert len(table.named("tr")) == 2 + 12
     assert f"{fit.estimate.mass_kg[1]:.4g}" in table.text

@@ -11,12 +11,12 @@ from kinertia.studies.accuracy import (
     PROOF,
     SCENARIOS,
     Draw,
-    MomentAccuracy,
     attainable,
     run_accuracy,
     run_draw,
     summarised,
 )
+from kinertia.studies.joint_accuracy import JointErrors
 from kinertia.synthetic.faults import CAMERA_SD_M, Faults, measured, tilted
 from kinertia.synthetic.walk import walk, walking_subject
 
@@ -32,10 +32,8 @@ def made_up(scale: float, seed: int = 0) -> Draw:
     prior = np.full((12, 10), 2.0)
     sd = np.tile([0.5, 1.2, 1.9, 1.0, 1.0, 1.0, 1.0, 1.9, 1.9, 1.9], (12, 1))
     shares = dict.fromkeys(CLASSES, 0.8)
-    angles, moments = (0.1, 0.2), dict.fromkeys(JOINTS, (4.0, 9.0, 0.9))
-    return Draw(
-        scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, shares, angles, angles, moments, True
-    )
+    joints = dict.fromkeys(JOINTS, JointErrors(4.0, 9.0, 0.9, (25.0, 16.0, 36.0), 0.01, 0.04, 0.0025, 0.09))
+    return Draw(scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, shares, joints, True)
 
 
 def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
@@ -48,7 +46,10 @@ def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
     assert good.classes["measured"].rms == pytest.approx(0.25, rel=0.1)
     assert good.classes["measured"].rms_literature == pytest.approx(1.0, rel=0.1)
     assert good.classes["mass"].better > 0.99
-    assert good.moments["hips"] == MomentAccuracy(2.0, 3.0, pytest.approx(0.9))
+    knee = good.joints["knee"]
+    assert (knee.moment_nm, knee.moment_sd_nm, knee.cover, knee.usual_nm) == pytest.approx((2.0, 3.0, 0.9, 4.0))
+    angles = (knee.angle_rad, knee.angle_ik_rad, knee.change_rad, knee.change_ik_rad)
+    assert angles == pytest.approx((0.1, 0.2, 0.05, 0.3))
 
 
 def test_what_an_estimate_at_the_bound_can_attain():
@@ -85,8 +86,9 @@ def test_bars_hold_short_form():
     assert found.classes["mass"].rms < found.classes["mass"].rms_literature
     assert found.classes["CoM"].rms < found.classes["CoM"].rms_literature
     for joint in JOINTS:
-        assert found.moments[joint].cover > 0.92
-        assert found.moments[joint].sd_nm < 2.0 * found.moments[joint].rms_nm
+        assert found.joints[joint].cover > 0.92
+        if joint.startswith(("hip", "lumbar")):
+            assert found.joints[joint].moment_nm < 0.9 * found.joints[joint].usual_nm
 
 
 @pytest.mark.slow
@@ -98,7 +100,7 @@ def test_bars_hold(key):
         assert 0.85 < found.classes[name].ratio < 1.15
         assert found.classes[name].rms < 1.3 * found.classes[name].bound
     for joint in JOINTS:
-        assert found.moments[joint].cover > 0.93
+        assert found.joints[joint].cover > 0.93
 
 
 def test_faults_are_what_they_say(trial):

@@ -3,6 +3,8 @@
 Residuals are judged by OpenSim's published guideline for residual reduction ("Simulation with OpenSim - Best Practices"
 and Hicks et al. 2015, J Biomech Eng 137:020905), which also wants the peak force below 5 % of the largest external
 force. OpenSim judges each axis on its own; here it is the length of the vector, as in `fit.json`, which is stricter.
+Judged are residuals with forces at the motion's bandwidth: what is faster no motion of the model can follow. Those with
+forces at full bandwidth, which OpenSim's tools find, stand beside them.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.forces_used import full_bandwidth
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
 from kinertia.estimation.warnings import CONTRADICTING_COM_M
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
@@ -98,19 +101,41 @@ def _literature(fit: Fit) -> Verdict:
 
 
 def _residuals(trial: TrialFit) -> list[Verdict]:
-    force, moment = (np.linalg.norm(part, axis=1) for part in np.hsplit(trial.residuals["estimate"], 2))
+    force, moment = _lengths(trial.residuals["estimate"])
+    whole = _lengths(trial.full_residuals["estimate"])
+    at, full = f"at the motion's bandwidth ({trial.motion_hz:.3g} Hz)", full_bandwidth(trial.reactions)
     external = float(np.linalg.norm(trial.kinematics.foot_loads[:, :, :3].sum(axis=1), axis=1).max())
     share = float(force.max()) / external
     small: Level = "good" if share <= PEAK_FORCE_SHARE else "against"
     return [
-        _by_guideline(f"{trial.name}: residual force", "N", force, GOOD_FORCE_N, OKAY_FORCE_N),
-        _by_guideline(f"{trial.name}: residual moment", "N m", moment, GOOD_MOMENT_NM, OKAY_MOMENT_NM),
+        _and(
+            _by_guideline(f"{trial.name}: residual force {at}", "N", force, GOOD_FORCE_N, OKAY_FORCE_N),
+            f"with {full} RMS {_rms(whole[0]):.1f} N",
+        ),
+        _and(
+            _by_guideline(f"{trial.name}: residual moment {at}", "N m", moment, GOOD_MOMENT_NM, OKAY_MOMENT_NM),
+            f"with {full} RMS {_rms(whole[1]):.1f} N m",
+        ),
         Verdict(
             small,
             f"{trial.name}: the peak residual force is {100 * share:.1f} % of the peak external force "
             f"({external:.0f} N); at most {100 * PEAK_FORCE_SHARE:g} % is acceptable",
         ),
     ]
+
+
+def _lengths(residual: np.ndarray) -> list[np.ndarray]:
+    """Lengths (w,) of force and moment of a residual (w, 6)."""
+    return [np.linalg.norm(part, axis=1) for part in np.hsplit(residual, 2)]
+
+
+def _rms(size: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(size))))
+
+
+def _and(verdict: Verdict, told: str) -> Verdict:
+    """The same with something to know beside it."""
+    return verdict._replace(sentence=f"{verdict.sentence}; {told}")
 
 
 def _markers(fit: Fit, trial: TrialFit) -> Verdict:
@@ -129,7 +154,7 @@ def _by_guideline(
     what: str, unit: str, size: np.ndarray, good: tuple[float, float], okay: tuple[float, float]
 ) -> Verdict:
     """Verdict on vector lengths (w,) by limits of RMS and peak."""
-    rms, peak = float(np.sqrt(np.mean(np.square(size)))), float(size.max())
+    rms, peak = _rms(size), float(size.max())
     told = f"{what} RMS {rms:.1f} {unit}, peak {peak:.1f} {unit}"
     levels: tuple[tuple[Level, tuple[float, float]], ...] = (("good", good), ("okay", okay))
     for level, limits in levels:

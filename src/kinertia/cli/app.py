@@ -278,11 +278,19 @@ def _report_trial(trial: dict[str, Any]) -> None:
         f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
         f"{markers['final']} (estimate)"
     )
-    table = plain_table("residual at the pelvis, RMS (max)", *_STAGES)
+    hz = {**dict.fromkeys(_STAGES, trial["cutoff_hz"]), "estimate": trial["motion_hz"]}
+    title = "residual at the pelvis, RMS (max),\nforces at the motion's bandwidth"
+    table = plain_table(title, *(f"{stage}\n{hz[stage]:.3g} Hz" for stage in _STAGES))
     for kind, unit in (("force", "N"), ("moment", "Nm")):
         rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
         table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
     out.print(table)
+    names = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
+    full = [f"{trial[f'full_residual_{name}']['estimate']:.1f}" for name in names]
+    out.print(
+        " estimate with forces at full bandwidth (what OpenSim finds on these files):\n"
+        f" force {full[0]} ({full[1]}) N, moment {full[2]} ({full[3]}) N m"
+    )
 
 
 def _bsp_table(fit: Fit) -> Table:

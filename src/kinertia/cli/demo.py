@@ -22,9 +22,11 @@ from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.files import save_fit
+from kinertia.studies.joint_accuracy import JOINTS
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
-from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
+from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.trial.rms import rms
 
 PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
@@ -40,14 +42,38 @@ class Demo:
     Attributes:
         fit: the simultaneous estimate.
         two_level: the two-level estimate from the same files.
-        truth: the BSPs that the files were made with.
+        walk: what the person did, and with which BSPs; from it the files were made.
         subject_file: of the synthetic laboratory.
     """
 
     fit: Fit
     two_level: Fit
-    truth: BodySegmentParameters
+    walk: SyntheticTrial
     subject_file: Path
+
+    @property
+    def truth(self) -> BodySegmentParameters:
+        """The person's BSPs."""
+        return self.walk.bsp
+
+    @cached_property
+    def moment_errors(self) -> dict[str, tuple[float, float]]:
+        """Per joint, RMS error (N m) of joint moments by the usual way (measured motion, literature BSPs, forces as
+        measured) and by the simultaneous estimate.
+        """
+        trial = self.fit.trials[0]
+        at = np.searchsorted(self.walk.time, trial.time - 1e-9)
+        true = inverse_dynamics(self.walk.skeleton, self.walk.bsp, self.walk.motion.cut(at), self.walk.foot_loads[at])
+        expected = pd.DataFrame(true, columns=list(self.walk.skeleton.coordinates))
+        found = {}
+        for joint, begins in JOINTS.items():
+            names = [n for n in expected if n.startswith(begins) and n in trial.moments["estimate"]]
+            before, after = (
+                rms(trial.moments[stage][names].to_numpy() - expected[names].to_numpy())
+                for stage in ("literature", "estimate")
+            )
+            found[joint] = (before, after)
+        return found
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -98,6 +124,6 @@ def run_demo(
             settings = with_settings(wanted, method=method).settings
             fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
             save_fit(fits[-1], results, provenance)
-        demo = Demo(fits[0], fits[1], subject.bsp, folder / "lab" / "subject.toml")
+        demo = Demo(fits[0], fits[1], trial, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

@@ -12,7 +12,7 @@ from kinertia.cli.demo import Demo, run_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
-from kinertia.report.accuracy import HEADINGS, accuracy_rows, angles_sentence, moments_sentence, save_accuracy
+from kinertia.report.accuracy import HEADINGS, JOINT_CAPTION, JOINT_HEADINGS, accuracy_rows, joint_rows, save_accuracy
 from kinertia.report.sensitivity import save_sensitivity
 from kinertia.report.table1 import save_table1, table1_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
@@ -68,6 +68,11 @@ def _report_demo(result: Demo, folder: Path) -> None:
             table.add_row(name, source, f"{bsp.mass_kg[i]:.2f}", gap, *moments)
             name = ""
     out.print(table)
+    joints = plain_table("joint moments, RMS error against the truth (N m)", "usual pipeline", "estimate")
+    for joint, pair in result.moment_errors.items():
+        joints.add_row(joint, *(f"{value:.2f}" for value in pair))
+    out.print(joints)
+    out.print("usual pipeline: measured motion, literature BSPs, forces as measured\n")
     sources = list(bodies)[1:]
     errors = plain_table("RMS error against the truth", "", *sources)
     found = [result.rms_errors(bodies[source]) for source in sources]
@@ -203,12 +208,12 @@ def accuracy(
         found = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
     for scenario in found.values():
         out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
-        shown = plain_table(*HEADINGS)
-        for row in accuracy_rows(scenario):
-            shown.add_row(*row)
-        out.print(shown)
-        out.print(angles_sentence(scenario))
-        out.print(moments_sentence(scenario))
+        for headings, rows in ((JOINT_HEADINGS, joint_rows), (HEADINGS, accuracy_rows)):
+            shown = plain_table(*headings)
+            for row in rows(scenario):
+                shown.add_row(*row)
+            out.print(shown)
+    out.print(JOINT_CAPTION)
     save_accuracy(found, seed, output)
     out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
 

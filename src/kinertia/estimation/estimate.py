@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinertia.estimation.forces_used import forces_used
 from kinertia.estimation.input_checks import check_masses, known, mass_by_force_kg
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
@@ -117,9 +118,14 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         converged=outcome.converged,
         posterior=outcome.posterior,
         warnings=tuple(dict.fromkeys(warnings)),
-        notes=ready.notes,
+        notes=(*ready.notes, *_force_notes(outcome.trials, settings)),
         file=ready.file,
     )
+
+
+def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
+    """Per trial, which ground reactions the joint moments are from."""
+    return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ def read_sto(path: str | Path) -> pd.DataFrame:
     return table
 
 
-def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str) -> None:
+def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str, remark: str = "") -> None:
     """Write a table indexed by time (s) in the form that OpenSim 4 reads.
 
     Args:
@@ -54,6 +54,7 @@ def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str
         table: columns over time, in the units they shall have in the file.
         in_degrees: whether angles in the table are in degrees.
         name: first line of the file.
+        remark: one line of the header for those who read the file, if any; no equals sign, which makes it a key.
     """
     labels = ["time", *map(str, table.columns)]
     values = np.column_stack((table.index.to_numpy(float), table.to_numpy(float))).tolist()
@@ -64,6 +65,7 @@ def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str
         f"nRows={len(table)}",
         f"nColumns={len(labels)}",
         f"inDegrees={'yes' if in_degrees else 'no'}",
+        *filter(None, [remark]),
         "endheader",
         "\t".join(labels),
         *(form % tuple(row) for row in values),

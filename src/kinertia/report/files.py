@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from kinertia.checks.verdict import verdicts
+from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.prepare_osim import centre_offsets
 from kinertia.estimation.result import Fit, TrialFit
@@ -66,24 +67,28 @@ def _write_model(fit: Fit, folder: Path) -> None:
 
 
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
-    names = list(fit.skeleton.coordinates)
-    rotational = fit.skeleton.rotational
-    write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics")
-    write_ground_reactions(folder, trial.reactions, trial.kinematics.window_s, fit.skeleton.feet)
+    names, rotational = fit.skeleton.coordinates, fit.skeleton.rotational
+    motion = f"Motion: {trial.motion_hz:.3g} Hz"
+    forces = f"Ground reactions: {forces_used(trial.reactions, fit.settings, trial.motion_hz).which}. {motion}"
+    write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics", motion)
+    window_s, feet = trial.kinematics.window_s, fit.skeleton.feet
+    write_ground_reactions(folder, trial.reactions, window_s, feet, forces)
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
-    for stage, file in (("estimate", "inverse_dynamics"), ("literature", "inverse_dynamics_literature")):
-        write_sto(folder / f"{file}.sto", _table(trial, loads, trial.moments[stage].to_numpy()), False, file)
-    if trial.moment_sd is not None:
-        write_sto(
-            folder / "inverse_dynamics_sd.sto",
-            _table(trial, loads, trial.moment_sd.to_numpy()),
-            False,
-            "inverse_dynamics_sd",
-        )
+    before = forces_before(trial.reactions, fit.settings)
+    before = f"Ground reactions: {before}, instruments not corrected. Motion: {trial.kinematics.cutoff_hz:.3g} Hz"
+    files = {
+        "inverse_dynamics": (trial.moments["estimate"], forces),
+        "inverse_dynamics_literature": (trial.moments["literature"], before),
+        "inverse_dynamics_sd": (trial.moment_sd, forces),
+    }
+    for file, (values, remark) in files.items():
+        if values is not None:
+            write_sto(folder / f"{file}.sto", _table(trial, loads, values.to_numpy()), False, file, remark)
     stages = {**trial.residuals, "estimate_full": trial.full_residuals["estimate"]}
     columns = [f"{stage}_{name}" for stage in stages for name in _RESIDUALS]
-    residuals = np.hstack(list(stages.values()))
-    write_sto(folder / "residuals.sto", _table(trial, columns, residuals), False, "residuals")
+    residuals = _table(trial, columns, np.hstack(list(stages.values())))
+    remark = f"Ground reactions: of the motion's bandwidth; estimate_full: {forces.partition(': ')[2]}"
+    write_sto(folder / "residuals.sto", residuals, False, "residuals", remark)
 
 
 def _coordinates(fit: Fit, trial: TrialFit) -> pd.DataFrame:

@@ -21,7 +21,7 @@ FORCES_FILE, LOADS_FILE = "ground_reactions.mot", "external_loads.xml"
 
 
 def write_ground_reactions(
-    folder: Path, reactions: GroundReactions, window_s: tuple[float, float], feet: Sequence[str]
+    folder: Path, reactions: GroundReactions, window_s: tuple[float, float], feet: Sequence[str], remark: str = ""
 ) -> None:
     """Write both files.
 
@@ -32,8 +32,9 @@ def write_ground_reactions(
     Args:
         folder: where to.
         reactions: by the motion's clock.
-        window_s: first and last time of the motion; some samples outside are written, too, since splines err at ends.
+        window_s: first and last time of the motion; some samples outside are written, too: splines err at ends.
         feet: bodies that right and left foot's forces act on.
+        remark: a line of the header.
     """
     first, last = np.searchsorted(reactions.time, window_s)
     rows = slice(max(int(first) - _MARGIN, 0), int(last) + _MARGIN)
@@ -44,7 +45,7 @@ def write_ground_reactions(
         for stem, values in (("force_{}_v", force), ("force_{}_p", point), ("torque_{}_", reactions.torque[:, foot])):
             columns |= {f"ground_{stem.format(side)}{axis}": values[rows, k] for k, axis in enumerate("xyz")}
     table = pd.DataFrame(columns, index=pd.Index(reactions.time[rows], name="time"))
-    write_sto(folder / FORCES_FILE, table, False, "ground_reactions")
+    write_sto(folder / FORCES_FILE, table, False, "ground_reactions", remark)
     write_then_rename(folder / LOADS_FILE, _external_loads(feet))
 
 

@@ -16,6 +16,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
@@ -25,7 +26,14 @@ from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, informati
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
-from kinertia.report.time_figures import MOST_EVENTS, MOST_FRAMES, coordinate_figure, moment_figure, residual_figure
+from kinertia.report.time_figures import (
+    MOST_EVENTS,
+    MOST_FRAMES,
+    bandwidths,
+    coordinate_figure,
+    moment_figure,
+    residual_figure,
+)
 from kinertia.report.wording import decimals, fixed, read_in, start_of
 from kinertia.trial.data import runs
 from kinertia.trial.rms import rms_length
@@ -114,6 +122,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
         "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames, start_of(fit))),
         "bands": trial.moment_sd is not None,
+        "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
@@ -125,14 +134,17 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
 
 
 def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
-    """Per trial and stage: RMS and peak of force and of moment."""
+    """Per trial, bandwidth of the forces and stage: RMS and peak of force and of moment."""
     rows = []
     for trial in trials:
-        row: dict[str, Any] = {"name": trial.name, "stages": {}}
-        for stage, values in trial.residuals.items():
-            parts = values[:, :3], values[:, 3:]
-            row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
-        rows.append(row)
+        narrow = f"motion's bandwidth ({bandwidths(trial)})"
+        full = full_bandwidth(trial.reactions).removeprefix("forces ").removeprefix("at ")
+        for k, (bandwidth, found) in enumerate(((narrow, trial.residuals), (full, trial.full_residuals))):
+            row: dict[str, Any] = {"name": "" if k else trial.name, "bandwidth": bandwidth, "stages": {}}
+            for stage, values in found.items():
+                parts = values[:, :3], values[:, 3:]
+                row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
+            rows.append(row)
     return rows
 
 

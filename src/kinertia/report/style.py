@@ -11,6 +11,7 @@ SIDES = {"r": ("right", BLUE), "l": ("left", VERMILION), "": ("", BLACK)}
 STAGES = {
     "literature": {"color": GREY, "dash": "dot", "width": 1.5},
     "corrected": {"color": ORANGE, "dash": "dash", "width": 1.5},
+    "estimate_full": {"color": SKY, "dash": "solid", "width": 1},
     "estimate": {"color": BLUE, "dash": "solid", "width": 2},
 }
 """Line of each stage of the residuals."""

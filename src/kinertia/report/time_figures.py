@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from kinertia.estimation.forces_used import full_bandwidth
 from kinertia.estimation.result import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
@@ -32,25 +33,30 @@ _BAND_SD = 1.96
 
 
 def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> go.Figure:
-    """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage."""
+    """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage, with
+    forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
+    """
     thin, axis = _thin(len(trial.time), most_frames), _time_axis(trial.kinematics)
     marks = _events(trial.kinematics)
+    stages = {
+        stage_name(stage, start, _hz(trial, stage)): (style.STAGES[stage], values)
+        for stage, values in trial.residuals.items()
+    }
+    full = f"estimate, {full_bandwidth(trial.reactions)}"
+    # the first is drawn below the others
+    stages = {full: (style.STAGES["estimate_full"], trial.full_residuals["estimate"]), **stages}
     panels = []
     for k in range(6):
         kind = "Force" if k < 3 else "Moment"
         traces = [
-            {
-                **_curve(trial.time, values[:, k], thin),
-                "name": stage_name(stage, start),
-                "line": style.STAGES[stage],
-            }
-            for stage, values in trial.residuals.items()
+            {**_curve(trial.time, values[:, k], thin), "name": name, "line": line}
+            for name, (line, values) in stages.items()
         ]
         title = f"{kind} {_AXES[k % 3]} (N)" if k < 3 else f"Moment about {_MOMENT_AXES[k - 3]} (N m)"
         panels.append(Panel(title, traces, [*_unused(trial.kinematics, axis), *marks]))
     told = "; ".join(
-        f"{stage_name(stage, start)} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
-        for stage, values in trial.residuals.items()
+        f"{name} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
+        for name, (_, values) in stages.items()
     )
     alt = f"Residual force and moment at the pelvis of {trial.name} over time, RMS: {told}."
     return small_multiples(panels, alt, axis)
@@ -59,9 +65,20 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
 _MOMENT_AXES = ("forward axis", "vertical", "right axis")
 
 
-def stage_name(stage: str, start: Start) -> str:
-    """A stage of `TrialFit.residuals` or `.moments` in words."""
-    return {"literature": start.values, "corrected": f"{start.values}, pelvis corrected"}.get(stage, stage)
+def stage_name(stage: str, start: Start, hz: float | None = None) -> str:
+    """A stage of `TrialFit.residuals` or `.moments` in words, with the bandwidth if it is given."""
+    name = {"literature": start.values, "corrected": f"{start.values}, pelvis corrected"}.get(stage, stage)
+    return name if hz is None else f"{name} ({hz:.3g} Hz)"
+
+
+def bandwidths(trial: TrialFit) -> str:
+    """Of the motion before the estimate and after it."""
+    before, after = (f"{_hz(trial, stage):.3g}" for stage in ("literature", "estimate"))
+    return f"{after} Hz" if before == after else f"{before} Hz, estimate {after} Hz"
+
+
+def _hz(trial: TrialFit, stage: str) -> float:
+    return trial.motion_hz if stage == "estimate" else trial.kinematics.cutoff_hz
 
 
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> go.Figure:

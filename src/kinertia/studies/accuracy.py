@@ -24,7 +24,16 @@ from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProble
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.studies.joint_accuracy import (
+    JOINTS,
+    WITHIN,
+    Before,
+    JointAccuracy,
+    JointErrors,
+    Outcome,
+    joint_accuracy,
+    joint_errors,
+)
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.motions import MOTIONS
@@ -40,16 +49,6 @@ CLASSES = {
 """Columns of `BodySegmentParameters.table`."""
 EVIDENCE = ("measured", "informed", "assumed")
 """Parameters of all kinds by what stands behind their estimate (`identifiability.evidence`)."""
-JOINTS = {
-    "hips": ("hip",),
-    "knees": ("knee",),
-    "ankles": ("ankle", "subtalar"),
-    "back": ("lumbar",),
-    "arms": ("arm", "elbow"),
-}
-"""How the coordinates of each kind of joint begin."""
-WITHIN = 1.959964
-"""Half width of a 95 % interval in deviations."""
 _HELD_SD_M = 1e-4
 _TRIES = 500
 
@@ -69,9 +68,13 @@ class Scenario:
 
 PROOF = {
     "study": Scenario("the study's noise", Faults("study")),
-    "artefact": Scenario("skin motion linear in joint angles", Faults("artefact")),
+    "artefact": Scenario("skin motion linear in joint angles, sound instruments", Faults("artefact")),
     "study_calibration": Scenario("the study's noise, calibration errors", Faults("study", calibration=True)),
     "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
+    "faults": Scenario(
+        "skin motion; left plate 20 mm off, forces 10 ms late, hip centres 10 mm off",
+        Faults("artefact", hips_m=0.010, plate_m=0.020, late_s=0.010),
+    ),
     "walks": Scenario("skin motion, twelve strides at two paces", Faults("artefact"), others=("walk", "fast walk")),
     "session": Scenario(
         "skin motion, calibration errors; squats, arm swings and trunk sway besides the walk",
@@ -100,10 +103,7 @@ class Draw:
         bound: (s, 10) the latter at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's
             own noise model, prior included.
         attainable: per class, chance that an estimate at the bound has a smaller RMS error than the literature.
-        angles_rad: RMS error of the joint angles by inverse kinematics, by the estimate.
-        angle_changes_rad: the same after taking off each angle's mean error: what varies in time.
-        moments: per kind of joint, of the joint moments at all frames: mean square error and mean posterior variance,
-            (N m)^2, and share within the 95 % intervals.
+        joints: per joint.
         converged: of the estimate.
     """
 
@@ -113,9 +113,7 @@ class Draw:
     sd: np.ndarray
     bound: np.ndarray
     attainable: Mapping[str, float]
-    angles_rad: tuple[float, float]
-    angle_changes_rad: tuple[float, float]
-    moments: Mapping[str, tuple[float, float, float]]
+    joints: Mapping[str, JointErrors]
     converged: bool
 
 
@@ -144,26 +142,13 @@ class ClassAccuracy:
 
 
 @dataclass(frozen=True)
-class MomentAccuracy:
-    """Joint moments of one kind of joint: RMS error and RMS posterior deviation (N m), and cover of 95 % intervals."""
-
-    rms_nm: float
-    sd_nm: float
-    cover: float
-
-
-@dataclass(frozen=True)
 class ScenarioAccuracy:
-    """All classes of one scenario, RMS errors of joint angles (rad) by inverse kinematics and by the estimate, with
-    and without each angle's mean error, joint moments, and the share of draws that converged.
-    """
+    """All classes of parameters and all joints of one scenario, and the share of draws that converged."""
 
     title: str
     draws: int
     classes: Mapping[str, ClassAccuracy]
-    angles_rad: tuple[float, float]
-    angle_changes_rad: tuple[float, float]
-    moments: Mapping[str, MomentAccuracy]
+    joints: Mapping[str, JointAccuracy]
     converged: float
 
 
@@ -209,15 +194,8 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
     there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, bandwidth.spacing_s)
     bound = Information(there, seen.repeats).root(range(len(true)))
-    angles = np.flatnonzero(trial.skeleton.rotational)[3:]
     inside = np.flatnonzero(seen.alone[0].dynamic)
-    at = np.searchsorted(trial.time, kinematics.time - 1e-9)
-    truth = trial.motion.cut(at)
-    off = [(q - truth.q)[:, angles] for q in (kinematics.ik.q[kinematics.frames], result.motions[0].q[inside])]
-    found = inverse_dynamics(
-        result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0].at(kinematics.time)
-    )
-    wrong = found - inverse_dynamics(trial.skeleton, person.bsp, truth, trial.foot_loads[at])
+    after = Outcome(result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0])
     return Draw(
         result.bsp.table() - person.bsp.table(),
         prior.mean.table() - person.bsp.table(),
@@ -225,9 +203,7 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         np.linalg.norm(bound, axis=1).reshape(-1, 10),
         attainable(prior, bound, of_noise),
-        (_rms(off[0]), _rms(off[1])),
-        (_rms(off[0] - off[0].mean(axis=0)), _rms(off[1] - off[1].mean(axis=0))),
-        _by_joint(trial.skeleton.coordinates, wrong, result.moment_sd[0]),
+        joint_errors(trial, Before(skeleton, prior.mean, kinematics), after, result.moment_sd[0]),
         result.converged,
     )
 
@@ -235,17 +211,6 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
 def at_truth(seen: Observation, trial: SyntheticTrial) -> Observation:
     """The observation with the trial's true coordinates in place of those of inverse kinematics."""
     return replace(seen, q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)])
-
-
-def _by_joint(coordinates: Sequence[str], errors: np.ndarray, sd: np.ndarray) -> dict[str, tuple[float, float, float]]:
-    """Mean squares and cover of the moments' errors and deviations (w, c), per kind of joint."""
-    found = {}
-    for joint, begins in JOINTS.items():
-        own = [name.startswith(begins) for name in coordinates]
-        error, deviation = errors[:, own], sd[:, own]
-        within = np.abs(error) < WITHIN * deviation
-        found[joint] = (float(np.square(error).mean()), float(np.square(deviation).mean()), float(within.mean()))
-    return found
 
 
 def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
@@ -287,14 +252,8 @@ def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
         chosen = np.where(words == word, 1.0, np.nan) / prior
         if np.isfinite(chosen).any():
             classes[word] = _class(*(part * chosen for part in (errors, before, sd, bound)))
-    angles = [_rms(np.array([getattr(d, kind)[i] for d in draws])) for kind in _ANGLES for i in range(2)]
-    moments = {}
-    for joint in JOINTS:
-        square, variance, cover = np.mean([d.moments[joint] for d in draws], axis=0)
-        moments[joint] = MomentAccuracy(float(np.sqrt(square)), float(np.sqrt(variance)), float(cover))
-    converged = float(np.mean([d.converged for d in draws]))
-    pairs = (angles[0], angles[1]), (angles[2], angles[3])
-    return ScenarioAccuracy(title, len(draws), classes, *pairs, moments, converged)
+    joints = {joint: joint_accuracy([d.joints[joint] for d in draws]) for joint in JOINTS}
+    return ScenarioAccuracy(title, len(draws), classes, joints, float(np.mean([d.converged for d in draws])))
 
 
 def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.ndarray) -> ClassAccuracy:
@@ -313,9 +272,6 @@ def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.nda
         _rms(bound),
         float(np.mean(each < each_before)),
     )
-
-
-_ANGLES = ("angles_rad", "angle_changes_rad")
 
 
 def _rms(values: np.ndarray) -> float:

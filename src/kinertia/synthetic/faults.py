@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +20,6 @@ from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M
 from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
-from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.data import FootLoads, Markers, Trial
@@ -27,7 +27,6 @@ from kinertia.trial.data import FootLoads, Markers, Trial
 CAMERA_SD_M = 0.0005
 WOBBLE_HZ, WOBBLE_DAMPING = 10.0, 0.3
 """Soft tissue of the thigh on its springs: natural frequency and damping ratio (Gruber et al. 1998, J Biomech 31)."""
-_LOADS_HZ = 40.0
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,8 @@ class Faults:
         hips_m: both hip centres are this far forward.
         wobbling: share of the thighs' mass that wobbles on springs.
         gain: relative error of the right foot's plate.
+        plate_m: the left foot's plate reads this far forward.
+        late_s: forces are recorded late by this.
     """
 
     noise: Literal["study", "artefact"]
@@ -51,6 +52,8 @@ class Faults:
     hips_m: float = 0.0
     wobbling: float = 0.0
     gain: float = 0.0
+    plate_m: float = 0.0
+    late_s: float = 0.0
 
 
 def measured(
@@ -62,7 +65,7 @@ def measured(
     Sizes of skin motion are those of the first.
     """
     markers, skeleton = _disturbed(trials, faults, rng), trials[0].skeleton
-    instruments = None
+    instruments = _Instruments.with_faults(faults)
     if faults.calibration:
         skeleton = _misplaced(skeleton, rng)
         instruments = _Instruments.draw(rng)
@@ -77,7 +80,6 @@ def measured(
             loads += _wobbled(trial, faults.wobbling)
         if instruments is not None:
             loads = instruments.read(trial.time, loads)
-        loads[:, 0] *= 1.0 + faults.gain
         found.append(_kinematics(skeleton, trial.time, seen, loads))
     return skeleton, found
 
@@ -127,9 +129,17 @@ class _Instruments:
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         return cls(CLOCK_PRIOR_S.draw(rng), offset, 1.0 + plates[:, 2:3], plates[:, 3])
 
+    @classmethod
+    def with_faults(cls, faults: Faults) -> _Instruments | None:
+        """Those of a laboratory without calibration errors; None where they are sound."""
+        if not (faults.gain or faults.plate_m or faults.late_s):
+            return None
+        offset = np.array([[0.0, 0.0, 0.0], [faults.plate_m, 0.0, 0.0]])
+        return cls(faults.late_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2))
+
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """What they make of true loads (n, 2, 6)."""
-        wrong = smooth(time, loads.reshape(len(time), 12), _LOADS_HZ)(time + self.late_s).reshape(loads.shape)
+        wrong = np.asarray(CubicSpline(time, loads)(time - self.late_s))
         wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
         wrong *= self.gain
         wrong[..., 4] += self.free_moment * wrong[..., 1]

@@ -21,6 +21,9 @@ from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 
+_ROUNDS = 3
+"""Each settles the instruments' priors at what the last left of them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Information:
@@ -44,11 +47,8 @@ class Information:
 
     @cached_property
     def of_prior(self) -> np.ndarray:
-        """(S, S) information of all priors; the instruments may be sound or not."""
-        information = self.problem.prior_terms(self.problem.start_static)[0]
-        places = self.problem.layout.instruments
-        information[places, places] += np.diag(GaussianPriors.of(self.problem.instruments).precision)
-        return information
+        """(S, S) information of all priors but the instruments'."""
+        return self.problem.prior_terms(self.problem.start_static)[0]
 
     def root(self, trials: Iterable[int]) -> np.ndarray:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
@@ -58,9 +58,21 @@ class Information:
         for k, count in zip(chosen, counts, strict=True):
             sd = self.problem.displacement_sd_m[k]
             information = information + as_displaced(self.of_trials[k] / count, layout.locals, sd)
+        information = information + self._of_instruments(information)
         theta = layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
         result: np.ndarray = chain @ root_of_covariance(information)[theta]
+        return result
+
+    def _of_instruments(self, rest: np.ndarray) -> np.ndarray:
+        """(S, S) information of the instruments' priors where the data, of which the rest tells, show them sound."""
+        priors, places = self.problem.instruments, self.problem.layout.instruments
+        found, result = GaussianPriors.of(priors), np.zeros_like(rest)
+        for _ in range(_ROUNDS):
+            result[places, places] = np.diag(found.precision)
+            covariance = np.linalg.inv(rest + result)[places, places]
+            found = found.updated(priors, np.zeros(len(priors)), covariance)
+        result[places, places] = np.diag(found.precision)
         return result
 
     def sd(self, trials: Iterable[int]) -> np.ndarray:

@@ -217,13 +217,7 @@ def _warnings(
         found.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
-    for name, told in posterior.calibration.items():
-        value, sd = float(told["value"]), float(told["prior_sd"])
-        if ":" in name and abs(value) > _NOTABLE * sd:
-            scale, unit = SHOWN_UNIT[str(told["unit"])]
-            found.append(
-                f"{name}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit}); check the instruments"
-            )
+    found += _instrument_warnings(posterior.calibration)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
@@ -240,6 +234,19 @@ def _warnings(
             f"plate or marker is likelier than an odd person"
         )
     return found
+
+
+def _instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) -> list[str]:
+    """One sentence per plate, and one for the clock, with all that is off."""
+    off: dict[str, list[str]] = {}
+    for name, told in calibration.items():
+        instrument, colon, what = name.partition(":")
+        value, sd = float(told["value"]), float(told["prior_sd"])
+        if colon and abs(value) > _NOTABLE * sd:
+            scale, unit = SHOWN_UNIT[str(told["unit"])]
+            said = f"{what}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit})"
+            off.setdefault(instrument, []).append(said)
+    return [f"{instrument}:{','.join(said)}; check the instruments" for instrument, said in off.items()]
 
 
 def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:

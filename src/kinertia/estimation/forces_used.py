@@ -1,0 +1,72 @@
+"""In words: which ground reactions the joint moments of a trial are from, and why."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.settings import Settings
+
+NOTABLE_IMPACT_N = 0.5
+"""RMS below which impacts are not mentioned."""
+
+
+class ForcesUsed(NamedTuple):
+    """Ground reactions of the joint moments.
+
+    Attributes:
+        which: "as measured, ..."; in headers of files, so without an equals sign.
+        why: the rest of the sentence, with its punctuation in front; may be empty.
+    """
+
+    which: str
+    why: str
+
+    @property
+    def sentence(self) -> str:
+        """Both, without a full stop."""
+        return f"the joint moments are from the ground reactions {self.which}{self.why}"
+
+
+def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float) -> ForcesUsed:
+    """What was done to the ground reactions of a trial before they went into joint moments.
+
+    Args:
+        reactions: of the trial's joint moments.
+        settings: as used.
+        motion_hz: bandwidth of the motion.
+    """
+    which, why = _bandwidth(reactions, settings)
+    if reactions.impact_n < NOTABLE_IMPACT_N:
+        return ForcesUsed(which, why)
+    size = f"impacts of {reactions.impact_n:.1f} N (RMS over the trial)"
+    spikes = "spikes into the moments of knee and hip (Bisseling and Hof 2006, J Biomech 39:2438)"
+    faster = f"faster than the motion ({motion_hz:g} Hz)"
+    if settings.force_cutoff_hz == "none":
+        return ForcesUsed(f"{which}, {size} included", f"{why}; they are {faster} and put {spikes}")
+    keep = 'to keep them: force_cutoff_hz = "none" under [settings]'
+    return ForcesUsed(f"{which}, less {size}", f"{why}; they are {faster} and would put {spikes}; {keep}")
+
+
+def forces_before(reactions: GroundReactions, settings: Settings) -> str:
+    """The same of the joint moments before the estimate, of which no impact is taken."""
+    by_user = settings.method == "simultaneous" and not isinstance(settings.force_cutoff_hz, str)
+    return "as measured" if by_user else _bandwidth(reactions, settings).which
+
+
+def full_bandwidth(reactions: GroundReactions) -> str:
+    """What residuals at the bandwidth of these ground reactions are called."""
+    if reactions.cutoff_hz is None:
+        return "forces at full bandwidth"
+    return f"forces up to {reactions.cutoff_hz:.3g} Hz"
+
+
+def _bandwidth(reactions: GroundReactions, settings: Settings) -> ForcesUsed:
+    if reactions.cutoff_hz is None:
+        return ForcesUsed("as measured", "")
+    which = f"low-passed at {reactions.cutoff_hz:.3g} Hz"
+    if settings.method == "two-level":
+        return ForcesUsed(which, ", the bandwidth of the motion")
+    if isinstance(settings.force_cutoff_hz, str):
+        return ForcesUsed(which, ", because the plates are noisy when unloaded")
+    return ForcesUsed(which, ", as force_cutoff_hz says")

@@ -1,0 +1,36 @@
+"""The report says at which bandwidth residuals are, and which forces the joint moments are from."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.report.page import render
+from kinertia.report.time_figures import bandwidths
+from report_page import Elements
+
+
+def test_residuals_are_told_at_both_bandwidths(fit, two_level):
+    for one in (fit, two_level):
+        trial = one.trials[0]
+        told = Elements(render(one)).text
+        assert f"motion's bandwidth ({bandwidths(trial)})" in told
+        for found in (trial.residuals, trial.full_residuals):
+            for part in np.hsplit(found["estimate"], 2):
+                size = np.linalg.norm(part, axis=1)
+                assert f"{np.sqrt(np.mean(size**2)):.1f} ({size.max():.1f})" in told
+        assert "what OpenSim's Inverse Dynamics finds on the delivered files" in told
+
+
+def test_report_says_which_forces_the_moments_are_from(fit, two_level):
+    trial = fit.trials[0]
+    (note,) = [note for note in fit.notes if "joint moments are from" in note]
+    assert note.startswith(f"{trial.name}: ")
+    assert note.partition("ground reactions ")[2] in Elements(render(fit)).text
+    struck = np.zeros_like(trial.reactions.impact)
+    struck[:, 0, 1] = 20.0
+    hit = replace(fit, trials=(replace(trial, reactions=replace(trial.reactions, impact=struck)),))
+    told = Elements(render(hit)).text
+    assert "less impacts of 20.0 N (RMS over the trial)" in told
+    assert "Bisseling and Hof 2006" in told
+    assert 'force_cutoff_hz = "none" under [settings]' in told
+    assert f"low-passed at {two_level.trials[0].motion_hz:.3g} Hz, the bandwidth" in Elements(render(two_level)).text
