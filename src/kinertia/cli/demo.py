@@ -64,10 +64,11 @@ class Demo:
         trial = self.fit.trials[0]
         at = np.searchsorted(self.walk.time, trial.time - 1e-9)
         true = inverse_dynamics(self.walk.skeleton, self.walk.bsp, self.walk.motion.cut(at), self.walk.foot_loads[at])
-        expected = pd.DataFrame(true, columns=list(self.walk.skeleton.coordinates))
+        coordinates = self.walk.skeleton.coordinates
+        expected = pd.DataFrame(true, columns=list(coordinates))
         found = {}
         for joint, begins in JOINTS.items():
-            names = [n for n in expected if n.startswith(begins) and n in trial.moments["estimate"]]
+            names = [n for n in coordinates if n.startswith(begins) and n in trial.moments["estimate"]]
             before, after = (
                 rms(trial.moments[stage][names].to_numpy() - expected[names].to_numpy())
                 for stage in ("literature", "estimate")
