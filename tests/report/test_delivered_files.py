@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_osim_tools import inverse_dynamics_tool
 
 from command_line import fitted
 from kinertia.io.ground_forces import read_forces_with_notes
@@ -14,6 +13,7 @@ from kinertia.io.sto import read_sto
 from kinertia.io.subject_file import read_subject
 from kinertia.report.ground_reactions_file import FORCES_FILE, LOADS_FILE
 from kinertia.trial.data import LOAD_THRESHOLD_N
+from osim_tools import inverse_dynamics_tool
 from walks import fit_arguments
 
 RESIDUAL = 0.02

@@ -11,21 +11,7 @@ from kinertia.io.sto import read_sto, write_sto
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.smoothing import smooth
 from kinertia.trial.data import LOAD_THRESHOLD_N
-
-
-def inverse_dynamics_tool(opensim, model: Path, coordinates: Path, loads: Path, folder: Path) -> pd.DataFrame:
-    tool = opensim.InverseDynamicsTool()
-    tool.setModelFileName(str(model))
-    tool.setCoordinatesFileName(str(coordinates))
-    tool.setExternalLoadsFileName(str(loads))
-    tool.setLowpassCutoffFrequency(-1)
-    forces = opensim.ArrayStr()
-    forces.append("Muscles")
-    tool.setExcludedForces(forces)
-    tool.setResultsDir(str(folder))
-    tool.setOutputGenForceFileName("id.sto")
-    assert tool.run()
-    return read_sto(folder / "id.sto")
+from osim_tools import inverse_dynamics_tool
 
 
 def loads_above_threshold(folder: Path, into: Path) -> Path:
