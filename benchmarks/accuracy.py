@@ -24,7 +24,7 @@ from study_noise import UNIFORM_SD, study_draw, study_section
 from walks import WALKS, data_folder
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "accuracy.md"
-PEOPLE = 60
+PEOPLE = 40
 
 
 def document(sections: dict[str, str]) -> str:
