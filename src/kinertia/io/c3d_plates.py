@@ -92,7 +92,9 @@ def to_ground_plates(
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
             moment[:, p] *= -1
-            notes.append(f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed")
+            notes.append(
+                f"{path.name}: {name} reports a force that points down, the load on the plate; it was reversed"
+            )
         loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
         lost = np.isnan(force[:, p]).any(axis=1) | (loaded & np.isnan(moment[:, p]).any(axis=1))
         if lost.any():
@@ -104,7 +106,7 @@ def to_ground_plates(
         force[:, p], moment[:, p], noise = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
         noises.append(noise)
         if not loaded.any():
-            notes.append(f"{path.name}: {name} never carries {LOAD_THRESHOLD_N:g} N")
+            notes.append(f"{path.name}: {name} never reaches {LOAD_THRESHOLD_N:g} N")
         elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
             notes.append(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
