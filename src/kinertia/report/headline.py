@@ -23,7 +23,7 @@ _LISTED_FAR = 12
 _EVIDENCE = {
     "measured": "measured",
     "informed": "informed by the data",
-    "assumed": "hardly informed by the data, not to be read as this person's own",
+    "assumed": "hardly informed by the data, not to be read as this person's",
 }
 
 
