@@ -205,7 +205,7 @@ def test_unloaded_plate_is_zero(tmp_path):
     assert not recording.plates.force.any()
     assert not recording.plates.moment.any()
     assert recording.notes[-2:] == (
-        "x.c3d: plate 1 reads (30, 15, -20) N when nobody stands on it; this was not subtracted",
+        "x.c3d: plate 1 reads (30, 15, -20) N when unloaded; this was not subtracted",
         "x.c3d: plate 1 never reaches 20 N",
     )
 
@@ -220,8 +220,8 @@ def plates_left_out(tmp_path, plate, **arguments):
 
 def test_plates_that_cannot_be_used_are_left_out(tmp_path):
     assert "force plates (types 5) were left out" in plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
-    assert "its corners are no plate" in plates_left_out(tmp_path, plate_parameters(1e8 * CORNERS))
-    assert "its corners are no plate" in plates_left_out(tmp_path, plate_parameters(0 * CORNERS))
+    assert "its corners do not form a plate" in plates_left_out(tmp_path, plate_parameters(1e8 * CORNERS))
+    assert "its corners do not form a plate" in plates_left_out(tmp_path, plate_parameters(0 * CORNERS))
     words = plates_left_out(tmp_path, plate_parameters(CORNERS), moment_unit="Nm")
     assert "plate 1 was left out, its moments are in Nm while points are in mm" in words
 

@@ -35,7 +35,7 @@ class ModelCheck:
     Attributes:
         name: the model's.
         bsp: of its bodies, as the file has them.
-        segments: the bodies put together by segment, in ISB axes.
+        segments: the bodies combined by segment, in ISB axes.
         literature: "de Leva" and "Dumas" for the same segments; empty where the person is not known. Values that the
             tables cannot give for this model are NaN.
         symmetric: whether left mirrors right.
@@ -67,7 +67,7 @@ class ModelCheck:
         if massless:
             told.append(("without mass", ", ".join(massless)))
         joined = [f"{name}: {' + '.join(own)}" for name, own in self.segments.bodies.items() if len(own) > 1]
-        return [*told, *([("put together", "; ".join(joined))] if joined and self.literature else [])]
+        return [*told, *([("combined", "; ".join(joined))] if joined and self.literature else [])]
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -35,11 +35,11 @@ all segments out, with a motion that they and the forces explain.
 
 [bold]In which order[/]
 
-kinertia demo                 see it work, on a person who does not exist
+kinertia demo                 see it work, on a synthetic person
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
-kinertia crossval subject.toml   do they hold on a trial that was held out?
+kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
 
 Every command says more with --help, and has an example there.
@@ -110,8 +110,8 @@ def fit(
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
     ] = None,
-    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may carry it.")] = None,
-    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may carry it.")] = None,
+    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may contain it.")] = None,
+    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may contain it.")] = None,
     sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
     markers: Annotated[
         str | None,

@@ -64,7 +64,7 @@ def check(
         str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder for the same as a page, check.html.")
+        Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
     force: Force = False,
     quiet: Quiet = False,

@@ -102,7 +102,7 @@ def to_ground_plates(
         offset = np.median(force[~loaded, p], axis=0) if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES else np.zeros(3)
         if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
             told = ", ".join(f"{value:.0f}" for value in offset)
-            notes.append(f"{path.name}: {name} reads ({told}) N when nobody stands on it; this was not subtracted")
+            notes.append(f"{path.name}: {name} reads ({told}) N when unloaded; this was not subtracted")
         force[:, p], moment[:, p], noise = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
         noises.append(noise)
         if not loaded.any():
@@ -125,7 +125,7 @@ def _corner_trouble(corners: FloatArray) -> str:
         and edges.max() < high
     ):
         return ""
-    return f"its corners are no plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
+    return f"its corners do not form a plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
 
 
 def _unit_trouble(file: Any, group: Any, plate: int) -> str:
