@@ -9,12 +9,14 @@ import sys
 import time
 from dataclasses import replace
 from importlib.metadata import version
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from command_line import fitted, run
 from kinertia.checks.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
+from kinertia.cli import app as cli
 from kinertia.cli import terminal
 from walks import fit_arguments
 
@@ -183,6 +185,19 @@ def test_no_failed_check_is_status_0(fit_at_once, tmp_path, monkeypatch):
     assert outcome.status == 0
     assert "caution: so so" in outcome.out
     assert "pass: 1 of 2 checks" in outcome.out
+
+
+def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
+    prior_sd, sd = fit.posterior.prior_sd.copy(), fit.posterior.sd.copy()
+    prior_sd[-1] = sd[-1] = 0.0
+    posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
+    with terminal.out.capture() as captured:
+        cli._report(replace(fit, posterior=posterior, file=SimpleNamespace()))
+    shown = captured.get()
+    assert "literature" not in shown.replace("from the literature", "")
+    assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)
+    assert re.search(r"total mass \(kg\): stated 72\.6, model [\d.]+, estimate [\d.]+", shown)
+    assert len(re.findall(r"^ +sd +kept *$", shown, re.MULTILINE)) == 1
 
 
 def test_quiet_fit_says_nothing(fit_at_once, tmp_path):
