@@ -59,7 +59,7 @@ mirrors right, and the total mass within 0.5 %. It reads the noise from the mark
 
 **How good an estimate could be on this walk.** *At best* is the Cramér-Rao bound of an
 estimate that knows all that none can know: forces count as exact, and the covariance of the noise over time is that of
-the study's sinusoids, so that only what they leave free tells something, seen by cameras of 0.1 mm or even 0.01 mm. The
+the study's sinusoids, so that only what they leave free is information, seen by cameras of 0.1 mm or even 0.01 mm. The
 moments of inertia are then still off by 0.05 kg m2: the trunk hardly turns at 1.14 m/s, so that one
 stride says little about its moments, which dominate the RMS, and they stay near the start. The lines after
 "simultaneous" change one thing each. How the noise is weighted changes the result by a few percent; telling the
@@ -81,8 +81,8 @@ deviations). Priors: plates and clock as in every fit, sound or faulty; hips 10 
 {sections["measured"]}
 
 The total mass agrees with the scale within 1 % also where
-the plates do not: those of the Plug-in Gait walks carry 3.4 and 4.7 % less than the scale says, and the estimate finds
-their gains wrong by so much and says so. A parameter beyond 3 prior deviations is warned of by every fit.
+the plates do not: those of the Plug-in Gait walks correspond to 3.4 and 4.7 % less than the stated mass, and the
+estimate finds their gains wrong by that much and says so. A parameter beyond 3 prior SDs gives a warning in every fit.
 
 ## Pooling
 
@@ -92,25 +92,26 @@ The gait2354 walk, cut in two: differences of the BSPs from the estimate of the 
 
 The halves together give the estimate of the whole, well within its error bars; what is left is what the cut takes away
 (the dynamics of the frames beside it). Most errors of one half come back in the other and count once, so that both
-together say little more than the better half. That takes the calibration of the left plate's free moment: it turns
-the person to the left by some 7 N m per kN of vertical force, which over a whole walk would spin anybody round. Without
+together say little more than the better half. That takes the calibration of the left plate's free moment: it
+adds some 7 N m to the left per kN of vertical force, while the mean vertical moment over whole strides should be near
+zero. Without
 this unknown, the halves together are off by 0.40 deviations (RMS; 1.9 at most), since each half explains the moment by
 another initial rate of turning and by CoMs moved to the side.
 
 ## Error bars
 
 People drawn from the prior (masses, CoMs and inertias with all their correlations, physically possible, given the
-scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laboratory (`kinertia study accuracy`). *Cover*:
-parameters whose truth lies in the 95 % interval, and the standard error over people. *Error / sd*: RMS. *Bound*: the
-Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model. *Better*:
-people for whom the RMS error is below the literature's, and in brackets the share for whom that of an estimate at the
-bound would be. *Measured*, *informed* and *assumed*: parameters of all kinds, in prior deviations. Skin, skeleton and
-instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is told in [error
+scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laboratory (`kinertia study accuracy`).
+*Coverage*: parameters whose truth lies in the 95 % interval, and the standard error over people. *Error / sd*: RMS.
+*Bound*: the Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model.
+*Better*: people for whom the RMS error is below the literature's, and in brackets the share for whom that of an
+estimate at the bound would be. *Measured*, *informed* and *assumed*: parameters of all kinds, in prior SDs. Skin, skeleton
+and instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is explained in [error
 bars](error-bars.md).
 
 {sections["error_bars"]}
 
-In the laboratories that error bars are made for (the first seven) they hold: cover and error / sd are within 92-98 %
+In the laboratories that error bars are made for (the first seven) they hold: coverage and error / sd are within 92-98 %
 and 0.85-1.15 for every class, and errors are at the bound. **Masses better than the literature's in 95 % of people
 cannot be had**: after one walk an estimate at the bound would be better in three quarters, after all motions of
 `kinertia plan` together in 87 %, since the literature, scaled to a person's mass, is already nearly as good, and chance
@@ -129,7 +130,7 @@ times the errors at hips and back under skin motion, and more under the study's 
 once, in whatever trial and at whatever pace, so that the bars hold after twelve strides, too, and errors are hardly
 smaller than after two. Other motions tell more.
 
-What breaks the bars, breaks those of the measured parameters first: an uncalibrated gain of 2 % takes their cover to
+What breaks the bars breaks those of the measured parameters first: an uncalibrated gain of 2 % takes their coverage to
 86 %, uncalibrated hips 15 mm off to 92 %. The wide bars of the others hold whatever happens. Axes
 5 degrees off and wobbling thighs do little in the smooth synthetic walk, which has no impacts.
 

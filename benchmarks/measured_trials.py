@@ -32,7 +32,7 @@ def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
 
 
 def farthest(bsp: pd.DataFrame) -> str:
-    """The parameter that is farthest from the literature's, in prior deviations."""
+    """The parameter that is farthest from the literature's, in prior SDs."""
     away = (bsp["estimate"] - bsp["literature"]) / bsp["prior_sd"]
     worst = away.abs().idxmax()
     return f"{bsp['parameter'][worst]} of {bsp['segment'][worst]} {away[worst]:+.1f}"
@@ -133,7 +133,7 @@ def _worth(runs: dict[str, dict[str, Any]]) -> str:
         words = run["bsp"]["evidence"].value_counts()
         counts = [str(words.get(word, 0)) for word in ("measured", "informed", "assumed")]
         rows.append([WALKS[name], farthest(run["bsp"]), *counts])
-    return table(["walk", "farthest from the literature (prior deviations)", "measured", "informed", "assumed"], rows)
+    return table(["walk", "farthest from the literature (prior SDs)", "measured", "informed", "assumed"], rows)
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from walks import WALKS
 
 
 def measured_walk(name: str) -> dict[str, Any]:
-    """fit.json of a measured walk, its BSP table, and its largest departure from the literature in prior deviations."""
+    """fit.json of a measured walk, its BSP table, and its largest departure from the literature in prior SDs."""
     with tempfile.TemporaryDirectory() as folder:
         run = results(name, Path(folder) / name)
     run["worst"] = farthest(run["bsp"])

@@ -73,7 +73,7 @@ def results(name: str, calibrate: bool, folder: Path) -> dict[str, Any]:
     folder.mkdir()
     subject = folder / f"{name}.toml"
     subject.write_text(subject_file(data_folder(), PEOPLE[name], calibrate))
-    # the exit status says that a verdict is against using the result; the page says which
+    # the exit status says that a check of the result failed; the page says which
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
         kinertia(["fit", str(subject), "-o", str(folder / "out")])
     return {**json.loads((folder / "out" / "fit.json").read_text()), "bsp": pd.read_csv(folder / "out" / "bsp.csv")}
@@ -135,7 +135,7 @@ motion. *Corrected*: the same with pelvis correction. *Estimate*: motion, parame
 
 ## Body segment parameters
 
-Prior deviations (sd) are those of `kinertia.estimation.prior` around the model's own parameters. Each parameter beyond
+Prior SDs (sd) are those of `kinertia.estimation.prior` around the model's own parameters. Each parameter beyond
 three of them has its warning below. Seconds are this machine's.
 
 {estimates}

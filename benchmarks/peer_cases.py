@@ -112,7 +112,7 @@ def fit(case: Case, name: str) -> tuple[Result, Path]:
     out, result = case.folder / name, Result()
     arguments = ["fit", case.markers, "--forces", case.forces, "--loads", case.loads, "--model", case.model]
     arguments += ["--mass", case.mass_kg, *case.fits[name], "--quiet", "-o", out]
-    # the exit status says that a verdict is against using the result; the page shows the numbers
+    # the exit status says that a check of the result failed; the page shows the numbers
     with timed(result), contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
         kinertia([str(argument) for argument in arguments])
     result.moments[0] = read_sto(out / "inverse_dynamics.sto")

@@ -70,7 +70,9 @@ class Settings(Table):
     method: Literal["simultaneous", "two-level"] = Field(
         default="simultaneous", description='estimator: "simultaneous" or "two-level" (the study\'s)'
     )
-    bsp: Literal["dumas", "deleva"] = Field(default="dumas", description='first guess: "dumas" or "deleva"')
+    bsp: Literal["dumas", "deleva"] = Field(
+        default="dumas", description='literature table to start from: "dumas" or "deleva"'
+    )
     symmetry: bool = Field(
         default=True, description="two-level only; true: left mirrors right, 49 parameters; false: 84"
     )

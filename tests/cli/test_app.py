@@ -9,12 +9,14 @@ import sys
 import time
 from dataclasses import replace
 from importlib.metadata import version
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from command_line import fitted, run
-from kinertia.checks.verdict import OKAY_FORCE_N, OKAY_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
+from kinertia.checks.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
+from kinertia.cli import app as cli
 from kinertia.cli import terminal
 from walks import fit_arguments
 
@@ -33,9 +35,14 @@ def test_help_reads_like_a_manual():
     assert max(map(len, shown.out.splitlines())) <= 80
     steps = [text.index(f"kinertia {command} ") for command in ("demo", "init", "check", "fit")]
     assert steps == sorted(steps)
-    for status in ("0 done", "1 done, but a verdict is against", "2 a mistake", "130 interrupted"):
+    for status in (
+        "0 done",
+        "1 done, but a check failed",
+        "2 an error in files or options, reported in one line",
+        "130 interrupted",
+    ):
         assert status in text
-    for limit in (*OKAY_FORCE_N, *OKAY_MOMENT_NM, 100 * PEAK_FORCE_SHARE):  # the manual says what the verdicts do
+    for limit in (*CAUTION_FORCE_N, *CAUTION_MOMENT_NM, 100 * PEAK_FORCE_SHARE):  # the manual says what the verdicts do
         assert f" {limit:g} " in text
     assert "no such option" in run("fit", "--nonsense").err.lower()
 
@@ -160,24 +167,37 @@ def fit_at_once(monkeypatch, short_fit, person):
     return fit
 
 
-def test_a_verdict_against_is_status_1_and_the_results_are_there(fit_at_once, tmp_path):
+def test_a_failed_check_is_status_1_and_the_results_are_there(fit_at_once, tmp_path):
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 1
-    assert "against: the estimate did not converge" in outcome.out
+    assert "fail: the estimate did not converge" in outcome.out
     assert json.loads((tmp_path / "out" / "fit.json").read_text())["converged"] is False
     assert "assumed: " not in outcome.out
     loud = fit_at_once("-o", tmp_path / "out", "--verbose")
     assert "assumed: marker set: Plug-in Gait" in loud.out
     assert "early: seconds: read 0.2" in " ".join(loud.out.split())
-    assert loud.out.count("good: ") > outcome.out.count("good: ")
+    assert loud.out.count("pass: ") > outcome.out.count("pass: ")
 
 
-def test_nothing_against_is_status_0(fit_at_once, tmp_path, monkeypatch):
-    monkeypatch.setattr("kinertia.cli.app.verdicts", lambda fit: [Verdict("okay", "so so"), Verdict("good", "fine")])
+def test_no_failed_check_is_status_0(fit_at_once, tmp_path, monkeypatch):
+    monkeypatch.setattr("kinertia.cli.app.verdicts", lambda fit: [Verdict("caution", "so so"), Verdict("pass", "fine")])
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 0
-    assert "okay: so so" in outcome.out
-    assert "good: 1 of 2 verdicts" in outcome.out
+    assert "caution: so so" in outcome.out
+    assert "pass: 1 of 2 checks" in outcome.out
+
+
+def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
+    prior_sd, sd = fit.posterior.prior_sd.copy(), fit.posterior.sd.copy()
+    prior_sd[-1] = sd[-1] = 0.0
+    posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
+    with terminal.out.capture() as captured:
+        cli._report(replace(fit, posterior=posterior, file=SimpleNamespace()))
+    shown = captured.get()
+    assert "literature" not in shown.replace("from the literature", "")
+    assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)
+    assert re.search(r"total mass \(kg\): stated 72\.6, model [\d.]+, estimate [\d.]+", shown)
+    assert len(re.findall(r"^ +sd +kept *$", shown, re.MULTILINE)) == 1
 
 
 def test_quiet_fit_says_nothing(fit_at_once, tmp_path):

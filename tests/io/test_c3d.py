@@ -189,7 +189,7 @@ def test_load_on_the_plate_is_reversed(tmp_path):
     )
     recording = read_c3d(path)
     expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-    assert "plate 1 tells a force that points down, the load on the plate; it was reversed" in recording.notes[-1]
+    assert "plate 1 reports a force that points down, the load on the plate; it was reversed" in recording.notes[-1]
 
 
 def test_unloaded_plate_is_zero(tmp_path):
@@ -205,8 +205,8 @@ def test_unloaded_plate_is_zero(tmp_path):
     assert not recording.plates.force.any()
     assert not recording.plates.moment.any()
     assert recording.notes[-2:] == (
-        "x.c3d: plate 1 reads (30, 15, -20) N when nobody stands on it; this was not subtracted",
-        "x.c3d: plate 1 never carries 20 N",
+        "x.c3d: plate 1 reads (30, 15, -20) N when unloaded; this was not subtracted",
+        "x.c3d: plate 1 never reaches 20 N",
     )
 
 
@@ -220,8 +220,8 @@ def plates_left_out(tmp_path, plate, **arguments):
 
 def test_plates_that_cannot_be_used_are_left_out(tmp_path):
     assert "force plates (types 5) were left out" in plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
-    assert "its corners are no plate" in plates_left_out(tmp_path, plate_parameters(1e8 * CORNERS))
-    assert "its corners are no plate" in plates_left_out(tmp_path, plate_parameters(0 * CORNERS))
+    assert "its corners do not form a plate" in plates_left_out(tmp_path, plate_parameters(1e8 * CORNERS))
+    assert "its corners do not form a plate" in plates_left_out(tmp_path, plate_parameters(0 * CORNERS))
     words = plates_left_out(tmp_path, plate_parameters(CORNERS), moment_unit="Nm")
     assert "plate 1 was left out, its moments are in Nm while points are in mm" in words
 
@@ -268,10 +268,10 @@ def test_contradicted_vertical_axis_is_noted(tmp_path):
     points, labels = standing()
     parameters = {"POINT": {"Y_SCREEN": ["+Y"]}, "FORCE_PLATFORM": plate_parameters(CORNERS)}
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters))
-    assert "POINT:Y_SCREEN says +Y is up but the plates' forces say +Z; +Z was believed" in recording.notes[0]
+    assert "POINT:Y_SCREEN says +Y is up but the plates' forces say +Z; +Z was used" in recording.notes[0]
     expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters={"POINT": {"Y_SCREEN": ["+Y"]}}))
-    assert "the markers' extents say +Z; +Z was believed" in recording.notes[0]
+    assert "the markers' extents say +Z; +Z was used" in recording.notes[0]
 
 
 def test_arms_spread_wider_than_tall_do_not_turn_the_lab(tmp_path):
@@ -294,7 +294,7 @@ def test_labels(tmp_path):
     assert np.isnan(toe[3]).all()
     np.testing.assert_allclose(toe[0] * 1000, points[0, 2][[0, 2, 1]] * [1, 1, -1], atol=1e-3)
     for words in (
-        "several subjects; 'Ann:' was taken off the labels, Bob keep theirs",
+        "several subjects; 'Ann:' was removed from the labels, Bob keep theirs",
         "3 model outputs among the points were left out (Ann:RKneeAngles, LHipForce, Listed)",
         "2 unnamed points were left out",
         "repeated labels, the first with data was kept: RTOE",

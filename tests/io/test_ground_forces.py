@@ -136,7 +136,7 @@ def test_load_below_threshold_is_zero(write):
     plates, notes = read_forces_with_notes(write(group))
     assert not plates.force.any()
     assert not plates.moment.any()
-    assert notes == ("grf.mot: a never carries 20 N",)
+    assert notes == ("grf.mot: a never reaches 20 N",)
 
 
 def test_without_torque_the_free_moment_is_zero(write, write_xml):

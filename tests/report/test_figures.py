@@ -122,7 +122,7 @@ def test_markers_are_sorted_and_gaps_drawn(fit):
     figure = marker_figure(trial, wandering=(trial.kinematics.ik.labels[0],))
     final = next(t for t in figure.data if t.name == "estimate")
     assert (np.diff(final.x) <= 1e-6).all()
-    assert sum("counts less" in label for label in final.y) == 1
+    assert sum("down-weighted" in label for label in final.y) == 1
     np.testing.assert_allclose(sorted(final.x), sorted(1e3 * rms_by_marker(trial.marker_errors_m["final"])), rtol=1e-5)
 
     kinematics = trial.kinematics

@@ -59,7 +59,7 @@ def test_examples_run(found, folder, workshop):
             program, *arguments = shlex.split(command)
             assert program == "kinertia"
             outcome = run(*arguments)
-            expected = 1 if "\nagainst: " in shown else 0
+            expected = 1 if "\nfail: " in shown else 0
             assert outcome.status == expected, f"{command}\n{outcome.out}\n{outcome.err}"
             missing = difference(shown, outcome.out)
             assert missing is None, f"{command}\nshown on the page:\n{missing}\nreally:\n{outcome.out}"

@@ -35,17 +35,17 @@ class ModelCheck:
     Attributes:
         name: the model's.
         bsp: of its bodies, as the file has them.
-        segments: the bodies put together by segment, in ISB axes.
+        segments: the bodies combined by segment, in ISB axes.
         literature: "de Leva" and "Dumas" for the same segments; empty where the person is not known. Values that the
             tables cannot give for this model are NaN.
         symmetric: whether left mirrors right.
-        verdicts: what speaks for and against simulating with this model.
+        verdicts: whether one can simulate with this model.
         left_out: checks that were not made, and why; one sentence each.
 
     Examples:
         >>> subject = kinertia.walking_subject()
         >>> check = kinertia.check_model(subject.skeleton, subject.literature, 72.6, 1.803, "male")
-        >>> any(verdict.level == "against" for verdict in check.verdicts)
+        >>> any(verdict.level == "fail" for verdict in check.verdicts)
         False
     """
 
@@ -67,7 +67,7 @@ class ModelCheck:
         if massless:
             told.append(("without mass", ", ".join(massless)))
         joined = [f"{name}: {' + '.join(own)}" for name, own in self.segments.bodies.items() if len(own) > 1]
-        return [*told, *([("put together", "; ".join(joined))] if joined and self.literature else [])]
+        return [*told, *([("combined", "; ".join(joined))] if joined and self.literature else [])]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -126,9 +126,9 @@ def check_model(
         if not _has_arms(segments):
             left_out.append("the model has no arms: only the mass of its torso was compared, with torso and arms")
     if mass_kg is None:
-        left_out.append("the total mass was compared with nothing; give --mass")
+        left_out.append("the total mass was not compared; give --mass")
     if segments.unknown:
-        left_out.append(f"bodies of unknown segment, compared with nothing: {', '.join(segments.unknown)}")
+        left_out.append(f"bodies of unknown segment, not compared: {', '.join(segments.unknown)}")
     odd = _sides(bsp)
     found = [
         *_possible(bsp),
@@ -148,7 +148,7 @@ def _markers(skeleton: Skeleton) -> list[Verdict]:
     if skeleton.markers:
         return []
     advice = "kinertia fit refuses it; scale the model with OpenSim's Scale tool, which places them"
-    return [Verdict("okay", f"no markers in the model: {advice}")]
+    return [Verdict("caution", f"no markers in the model: {advice}")]
 
 
 def _has_arms(segments: ModelSegments) -> bool:
@@ -199,9 +199,9 @@ def _outliers(
         if far:
             told = ", ".join(_against_literature(k, row[k], low[k], high[k]) for k in far)
             found.setdefault(told, []).append(name)
-    return [Verdict("okay", f"unlike the literature: {', '.join(names)}: {told}") for told, names in found.items()] or [
-        Verdict("good", f"every segment is within {_OUTLYING_SD:g} deviations of what the literature says of people")
-    ]
+    return [
+        Verdict("caution", f"unlike the literature: {', '.join(names)}: {told}") for told, names in found.items()
+    ] or [Verdict("pass", f"every segment is within {_OUTLYING_SD:g} SDs of the literature")]
 
 
 def _against_literature(k: int, value: float, low: float, high: float) -> str:
@@ -218,19 +218,19 @@ def _against_literature(k: int, value: float, low: float, high: float) -> str:
 def _possible(bsp: BodySegmentParameters) -> list[Verdict]:
     impossible = impossible_segments(bsp)
     found = [
-        Verdict("against", f"physically impossible: {sentence.rstrip('.')}")
+        Verdict("fail", f"physically impossible: {sentence.rstrip('.')}")
         for sentence in bsp.inconsistencies()
         if sentence.split(": ", 1)[0] in impossible
     ]
     if not found:
-        found.append(Verdict("good", "every body is physically possible"))
+        found.append(Verdict("pass", "every body is physically possible"))
     at_fault = {sentence.split(": ", 1)[0] for sentence in bsp.inconsistencies()}
     thin = [name for name, mass in zip(bsp.segments, bsp.mass_kg, strict=True) if mass > 0 and name in at_fault]
     thin = [name for name in thin if name not in impossible]
     if thin:
         found.append(
             Verdict(
-                "okay",
+                "caution",
                 f"without thickness (two moments of inertia add up to the third exactly): {', '.join(thin)}; rounded "
                 f"inertias do that",
             )
@@ -247,7 +247,7 @@ def _sizes(bsp: BodySegmentParameters) -> list[Verdict]:
             told = f"{name}: {mass:g} kg with moments of inertia up to {inertia.diagonal().max():g} kg m2"
             found.append(
                 Verdict(
-                    "against" if mass >= _NEGLIGIBLE_KG else "okay",
+                    "fail" if mass >= _NEGLIGIBLE_KG else "caution",
                     f"{told} would have to be {2 * radius:.1f} m wide or long; the inertia is a placeholder or in "
                     f"another unit",
                 )
@@ -261,8 +261,8 @@ def _total(total_kg: float, mass_kg: float | None) -> list[Verdict]:
     off = total_kg / mass_kg - 1
     told = f"the bodies weigh {total_kg:.1f} kg together, the person {mass_kg:.1f} kg ({100 * off:+.1f} %)"
     if abs(off) <= FORCE_MASS_TOLERANCE:
-        return [Verdict("good", told)]
-    return [Verdict("against" if abs(off) > CONTRADICTING_MASS else "okay", f"{told}; scale the model's masses")]
+        return [Verdict("pass", told)]
+    return [Verdict("fail" if abs(off) > CONTRADICTING_MASS else "caution", f"{told}; scale the model's masses")]
 
 
 def _placeholders(bsp: BodySegmentParameters) -> list[Verdict]:
@@ -278,16 +278,16 @@ def _placeholders(bsp: BodySegmentParameters) -> list[Verdict]:
             rounded.append(name)
     found = []
     if equal:
-        found.append(Verdict("okay", f"three equal moments of inertia, as placeholders have: {', '.join(equal)}"))
+        found.append(Verdict("caution", f"three equal moments of inertia, as placeholders have: {', '.join(equal)}"))
     if rounded:
-        found.append(Verdict("okay", f"moments of inertia rounded to two digits or less: {', '.join(rounded)}"))
+        found.append(Verdict("caution", f"moments of inertia rounded to two digits or less: {', '.join(rounded)}"))
     return found
 
 
 def _symmetry(odd: list[str]) -> Verdict:
     if odd:
-        return Verdict("okay", f"left and right differ: {'; '.join(odd)}")
-    return Verdict("good", "left and right mirror each other")
+        return Verdict("caution", f"left and right differ: {'; '.join(odd)}")
+    return Verdict("pass", "left and right mirror each other")
 
 
 def _sides(bsp: BodySegmentParameters) -> list[str]:
@@ -321,9 +321,9 @@ def _arms_in_torso(segments: ModelSegments) -> list[Verdict]:
         return []
     return [
         Verdict(
-            "okay",
-            f"the torso seems to carry the arms' inertia still, though the arms are bodies of their own: its moment "
-            f"about the long axis is {100 * ratio:.0f} % of the other two (literature: 25 to 32 %); known of the "
-            f"models of Hamner (2010) and Rajagopal (2016)",
+            "caution",
+            f"the torso still seems to include the arms' inertia, although the arms are separate bodies: its moment "
+            f"about the long axis is {100 * ratio:.0f} % of the other two (literature: 25 to 32 %); a known problem "
+            f"of the models of Hamner (2010) and Rajagopal (2016)",
         )
     ]

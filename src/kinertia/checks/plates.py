@@ -56,7 +56,7 @@ class PlateCheck:
     def stood_on(self) -> str:
         """Which foot when, in words; of many contacts their number."""
         if not self.contacts:
-            return "nobody"
+            return "none"
         told = []
         for foot in dict.fromkeys(contact.foot for contact in self.contacts):
             spans = [(contact.start_s, contact.end_s) for contact in self.contacts if contact.foot == foot]
@@ -149,7 +149,7 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     if standing:
         span, over = end - start, "the whole time"
     elif not strides and not steps and end - start >= _LONG_WINDOW_S:
-        span, over = end - start, "the whole window, in which nobody steps"
+        span, over = end - start, "the whole window, without a step"
     elif fitting:
         span, over = max(fitting), "whole strides"
     elif stepping:

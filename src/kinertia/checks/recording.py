@@ -65,7 +65,7 @@ class RecordingCheck:
         windows: stretches in which every foot on the ground stands on a plate, longest first.
         mass: by the vertical force, or None.
         scale_kg: body mass as given or as the file tells, or None.
-        verdicts: what speaks for and against a fit with this recording.
+        verdicts: whether a fit can use this recording.
         notes: assumptions made while reading and sorting the loads.
 
     Examples:
@@ -98,7 +98,7 @@ class RecordingCheck:
             ("frames", f"{len(markers.time)}{rate}{markers.time[-1]:.3f} s" if rate else "1"),
             ("in the file", axes),
             ("the person", self.travel.sentence()),
-            ("labels", f"{len(markers.labels)}, {len(match.others)} of them not of the set"),
+            ("labels", f"{len(markers.labels)}, {len(match.others)} not in the marker set"),
             ("marker set", named if had else "none known"),
         ]
         if missing and had:
@@ -203,20 +203,20 @@ def _match(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerS
 
 def _axes(markers: Markers) -> list[Verdict]:
     trouble = axes_trouble(extent_m(markers))
-    return [Verdict("against", trouble)] if trouble else []
+    return [Verdict("fail", trouble)] if trouble else []
 
 
 def _labels(match: MarkerSetMatch) -> list[Verdict]:
     had = match.n_labels - len(match.missing)
     if match.fits:
-        return [Verdict("good", f"{had} of the {match.n_labels} labels of the marker set {match.name} are there")]
+        return [Verdict("pass", f"{had} of the {match.n_labels} labels of the marker set {match.name} are present")]
     if match.of_model:
-        return [Verdict("against", f"no label of the model {match.name} is in the file; expected its markers' names")]
-    nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are there"
+        return [Verdict("fail", f"no label of the model {match.name} is in the file; expected its markers' names")]
+    nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are present"
     nearest = nearest if had else "no preset shares a label with the file"
     return [
         Verdict(
-            "against",
+            "fail",
             f"no marker set fits ({nearest}), so it is unknown which markers are on which foot; write a marker set as "
             f"TOML and name it with --markers",
         )
@@ -228,8 +228,8 @@ def _never(seen: Sequence[Visibility], known: bool) -> list[Verdict]:
     never = [one.label for one in seen if one.share == 0.0]
     if not never:
         return []
-    told = f"in no frame: {_some(never)}; label them, or remove them from the file if they were not worn"
-    return [Verdict("against" if known else "okay", told)]
+    told = f"visible in no frame: {_some(never)}; label them, or remove them from the file if they were not worn"
+    return [Verdict("fail" if known else "caution", told)]
 
 
 def _gaps(markers: Markers) -> list[Verdict]:
@@ -244,10 +244,10 @@ def _gaps(markers: Markers) -> list[Verdict]:
     where = f"from {markers.time[0]:.3f} to {markers.time[-1]:.3f} s"
     found = []
     if rare:
-        found.append(Verdict("okay", f"seen in less than half of the frames {where}: {_some(rare)}"))
+        found.append(Verdict("caution", f"seen in less than half of the frames {where}: {_some(rare)}"))
     if long:
-        found.append(Verdict("okay", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {_some(long)}"))
-    return found or [Verdict("good", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
+        found.append(Verdict("caution", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {_some(long)}"))
+    return found or [Verdict("pass", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
 
 
 def _some(names: Sequence[str]) -> str:
@@ -268,7 +268,7 @@ def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | N
     ]
     found = []
     if bare:
-        found.append(Verdict("against", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
+        found.append(Verdict("fail", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
     return (feet if all(feet.values()) else None), found
 
 
@@ -276,7 +276,7 @@ def _facing(markers: Markers, marker_set: MarkerSet, moves: Travel) -> list[Verd
     try:
         rotation, _ = facing(markers, marker_set)
     except MarkerSetError as error:
-        return [Verdict("against", str(error))]
+        return [Verdict("fail", str(error))]
     if moves.kind != "walks":
         return []
     angle = np.radians(moves.direction_deg)
@@ -285,7 +285,7 @@ def _facing(markers: Markers, marker_set: MarkerSet, moves: Travel) -> list[Verd
         return []
     return [
         Verdict(
-            "okay", "by the pelvis markers the person walks backwards; if not so, left and right labels are swapped"
+            "caution", "by the pelvis markers the person walks backwards; if not so, left and right labels are swapped"
         )
     ]
 
@@ -295,8 +295,8 @@ def _static(recording: Recording, marker_set: MarkerSet) -> list[Verdict]:
     try:
         build_gait27(recording, marker_set, 1.7, "male")
     except KinertiaError as error:
-        return [Verdict("against", f"no model can be built from this static trial: {error}")]
-    return [Verdict("good", "the person stands still, with all landmarks that the model needs: a static trial")]
+        return [Verdict("fail", f"no model can be built from this static trial: {error}")]
+    return [Verdict("pass", "the person stands still, with all landmarks that the model needs: a static trial")]
 
 
 def _trial(
@@ -305,35 +305,35 @@ def _trial(
     """The loads sorted by foot, notes, and whether all ground contact is known somewhere."""
     if recording.plates is None:
         told = "no forces: a fit needs them; name the force file too, or a C3D file with plates"
-        return None, recording.notes, [] if standing else [Verdict("okay", told)]
+        return None, recording.notes, [] if standing else [Verdict("caution", told)]
     if feet is None:
         return None, recording.notes, []
     try:
         trial = build_trial(recording, feet, window_s)
     except KinertiaError as error:
         problem = error.problem if isinstance(error, TrialError) else str(error)
-        return None, recording.notes, [] if standing else [Verdict("against", problem)]
+        return None, recording.notes, [] if standing else [Verdict("fail", problem)]
     return trial, trial.notes, [] if standing else [_measured(trial, window_s is not None)]
 
 
 def _measured(trial: Trial, by_user: bool) -> Verdict:
     start, end = trial.windows()[0]
     frames = len(trial.markers.cut(start, end).time)
-    what = "the window given by the user goes" if by_user else "every foot on the ground stands on a plate"
+    what = "the user's window goes" if by_user else "every foot on the ground stands on a plate"
     told = f"{what} from {start:.3f} to {end:.3f} s ({frames} frames)"
     if frames < FEWEST_FRAMES:
-        return Verdict("against", f"{told}; a fit needs at least {FEWEST_FRAMES} frames")
-    return Verdict("good", told)
+        return Verdict("fail", f"{told}; a fit needs at least {FEWEST_FRAMES} frames")
+    return Verdict("pass", told)
 
 
 def _pressure(plates: Sequence[PlateCheck]) -> list[Verdict]:
     known = [plate for plate in plates if plate.outside_share is not None]
     off = [(plate, plate.outside_share) for plate in known if (plate.outside_share or 0.0) > OFF_PLATE_SHARE]
     if known and not off:
-        return [Verdict("good", "the centres of pressure lie on the plates")]
+        return [Verdict("pass", "the centres of pressure lie on the plates")]
     return [
         Verdict(
-            "against" if share > 0.5 else "okay",
+            "fail" if share > 0.5 else "caution",
             f"{plate.name}: the centre of pressure is off the plate in {100 * share:.0f} % of the loaded samples, by "
             f"up to {100 * plate.outside_m:.0f} cm; check the plate's corners, origin and units",
         )
@@ -350,7 +350,7 @@ def _turning(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
     if not worn or not seen.any():
         return []
     found = mean_turning(trial.loads, markers.time[seen], pelvis[seen].mean(axis=1))
-    return [] if found is None else [Verdict("okay" if found.contradicts else "good", found.sentence())]
+    return [] if found is None else [Verdict("caution" if found.contradicts else "pass", found.sentence())]
 
 
 def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
@@ -358,14 +358,14 @@ def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
         return []
     off = mass.mass_kg / scale_kg - 1
     told = (
-        f"the vertical force carries {mass.mass_kg:.1f} kg (mean over {mass.over}), the scale says {scale_kg:.1f} kg "
-        f"({100 * off:+.1f} %)"
+        f"the vertical force corresponds to {mass.mass_kg:.1f} kg (mean over {mass.over}); "
+        f"stated mass {scale_kg:.1f} kg ({100 * off:+.1f} %)"
     )
     if abs(off) <= FORCE_MASS_TOLERANCE:
-        return [Verdict("good", told)]
+        return [Verdict("pass", told)]
     return [
         Verdict(
-            "against" if abs(off) > CONTRADICTING_MASS else "okay",
+            "fail" if abs(off) > CONTRADICTING_MASS else "caution",
             f"{told}; check the mass, and the gain and zero of the plates",
         )
     ]

@@ -22,27 +22,27 @@ from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_seg
 if TYPE_CHECKING:
     from kinertia.estimation.result import Fit, TrialFit
 
-Level = Literal["good", "okay", "against"]
+Level = Literal["pass", "caution", "fail"]
 
-GOOD_FORCE_N, OKAY_FORCE_N = (5.0, 10.0), (10.0, 25.0)
+PASS_FORCE_N, CAUTION_FORCE_N = (5.0, 10.0), (10.0, 25.0)
 """Residual force: largest RMS, largest peak."""
-GOOD_MOMENT_NM, OKAY_MOMENT_NM = (30.0, 50.0), (50.0, 75.0)
+PASS_MOMENT_NM, CAUTION_MOMENT_NM = (30.0, 50.0), (50.0, 75.0)
 """Residual moment: largest RMS, largest peak."""
 PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 
-GOOD_MARKERS_M, OKAY_MARKERS_M = 0.012, 0.020
+PASS_MARKERS_M, CAUTION_MARKERS_M = 0.012, 0.020
 """RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 
 _NAMED = 4
 
 
 class Verdict(NamedTuple):
-    """One judgement: "good", "okay" or "against" using the numbers, and why, in one sentence.
+    """One judgement: "pass", "caution" or "fail", and why, in one sentence.
 
     Examples:
         >>> kinertia.verdicts(fit)[0]
-        Verdict(level='good', sentence='the estimate converged')
+        Verdict(level='pass', sentence='the estimate converged')
     """
 
     level: Level
@@ -50,9 +50,7 @@ class Verdict(NamedTuple):
 
 
 def verdicts(fit: Fit) -> list[Verdict]:
-    """What speaks for and against using a fit: convergence, physics, the literature, residuals and markers of every
-    trial.
-    """
+    """Can a fit be used? Convergence, physics, the literature, residuals and markers of every trial."""
     found = [_convergence(fit), _physics(fit.estimate), _literature(fit)]
     for trial in fit.trials:
         found += [*_residuals(trial), _markers(fit, trial)]
@@ -60,44 +58,45 @@ def verdicts(fit: Fit) -> list[Verdict]:
 
 
 def stands_against(found: Iterable[Verdict]) -> bool:
-    """Whether any verdict is against: exit status 1."""
-    return any(verdict.level == "against" for verdict in found)
+    """Whether any check failed: exit status 1."""
+    return any(verdict.level == "fail" for verdict in found)
 
 
 def _convergence(fit: Fit) -> Verdict:
     if fit.converged:
-        return Verdict("good", "the estimate converged")
-    return Verdict("against", "the estimate did not converge: the best step is reported")
+        return Verdict("pass", "the estimate converged")
+    return Verdict("fail", "the estimate did not converge: the best step is reported")
 
 
 def _physics(bsp: BodySegmentParameters) -> Verdict:
     impossible = impossible_segments(bsp)
     if not impossible:
-        return Verdict("good", "every segment is physically possible")
+        return Verdict("pass", "every segment is physically possible")
     named = ", ".join(impossible[:_NAMED]) + (f" and {len(impossible) - _NAMED} more" if impossible[_NAMED:] else "")
-    return Verdict("against", f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({named})")
+    return Verdict("fail", f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({named})")
 
 
 def _literature(fit: Fit) -> Verdict:
-    """The estimate against what it was expected to be near: by prior deviations where there are any."""
+    """The estimate against what it was expected to be near: in prior SDs where there are any."""
     change = fit.estimate.table() - fit.literature.table()
     if fit.posterior is None:
         moved = np.linalg.norm(change[:, 1:4], axis=1)
         worst = int(np.argmax(moved))
         far = int((moved > CONTRADICTING_COM_M).sum())
-        what = f"centres of mass more than {CONTRADICTING_COM_M * 1e3:g} mm"
-        told = f"{fit.estimate.segments[worst]}: {moved[worst] * 1e3:.0f} mm"
+        kind, limit = ("centre of mass", "centres of mass"), f"{CONTRADICTING_COM_M * 1e3:g} mm"
+        farthest = f"{fit.estimate.segments[worst]}, {moved[worst] * 1e3:.0f} mm"
     else:
         away = np.abs(change) / np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
         row, column = np.unravel_index(int(np.argmax(away)), away.shape)
         far = int((away > CONTRADICTION_SD).sum())
-        what = f"parameters more than {CONTRADICTION_SD:g} prior deviations"
-        told = f"{PARAMETERS[column]} of {fit.estimate.segments[row]}: {away[row, column]:.1f}"
-    source = "the literature" if fit.file is None else "the model's own"
-    said = f"{what} from {source}: {far or 'none'} (farthest, {told})"
+        kind, limit = ("parameter", "parameters"), f"{CONTRADICTION_SD:g} prior SDs"
+        farthest = f"{PARAMETERS[column]} of {fit.estimate.segments[row]}, {away[row, column]:.1f}"
+    source = "the literature" if fit.file is None else "the model's own values"
+    count = f"{far or 'no'} {kind[far > 1]} {'lie' if far > 1 else 'lies'}"
+    said = f"{count} more than {limit} from {source} (farthest: {farthest})"
     if not far:
-        return Verdict("good", said)
-    return Verdict("against", f"{said}: the data contradict the model")
+        return Verdict("pass", said)
+    return Verdict("fail", f"{said}: the data contradict the model")
 
 
 def _residuals(trial: TrialFit) -> list[Verdict]:
@@ -106,14 +105,14 @@ def _residuals(trial: TrialFit) -> list[Verdict]:
     at, full = f"at the motion's bandwidth ({trial.motion_hz:.3g} Hz)", full_bandwidth(trial.reactions)
     external = float(np.linalg.norm(trial.kinematics.foot_loads[:, :, :3].sum(axis=1), axis=1).max())
     share = float(force.max()) / external
-    small: Level = "good" if share <= PEAK_FORCE_SHARE else "against"
+    small: Level = "pass" if share <= PEAK_FORCE_SHARE else "fail"
     return [
         _and(
-            _by_guideline(f"{trial.name}: residual force {at}", "N", force, GOOD_FORCE_N, OKAY_FORCE_N),
+            _by_guideline(f"{trial.name}: residual force {at}", "N", force, PASS_FORCE_N, CAUTION_FORCE_N),
             f"with {full} RMS {_rms(whole[0]):.1f} N",
         ),
         _and(
-            _by_guideline(f"{trial.name}: residual moment {at}", "N m", moment, GOOD_MOMENT_NM, OKAY_MOMENT_NM),
+            _by_guideline(f"{trial.name}: residual moment {at}", "N m", moment, PASS_MOMENT_NM, CAUTION_MOMENT_NM),
             f"with {full} RMS {_rms(whole[1]):.1f} N m",
         ),
         Verdict(
@@ -142,23 +141,27 @@ def _markers(fit: Fit, trial: TrialFit) -> Verdict:
     """How far the model's markers are from the measured ones, at the motion that the forces go with."""
     rms = float(np.sqrt(np.nanmean(np.square(trial.marker_errors_m["final"]))))
     told = f"{trial.name}: model and measured markers are {rms * 1e3:.1f} mm apart (RMS)"
-    if rms <= GOOD_MARKERS_M:
-        return Verdict("good", f"{told}; at most {GOOD_MARKERS_M * 1e3:g} mm is good")
-    if rms <= OKAY_MARKERS_M:
-        return Verdict("okay", f"{told}; at most {OKAY_MARKERS_M * 1e3:g} mm is okay by OpenSim's guideline")
+    if rms <= PASS_MARKERS_M:
+        return Verdict("pass", f"{told}; well within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm)")
+    if rms <= CAUTION_MARKERS_M:
+        return Verdict("caution", f"{told}; within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm), marginally")
     advice = "" if fit.file is None else "; let markers and joint centres move (--calibrate)"
-    return Verdict("against", f"{told}, beyond OpenSim's guideline ({OKAY_MARKERS_M * 1e3:g} mm){advice}")
+    return Verdict("fail", f"{told}, beyond OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm){advice}")
 
 
 def _by_guideline(
-    what: str, unit: str, size: np.ndarray, good: tuple[float, float], okay: tuple[float, float]
+    what: str, unit: str, size: np.ndarray, passing: tuple[float, float], marginal: tuple[float, float]
 ) -> Verdict:
     """Verdict on vector lengths (w,) by limits of RMS and peak."""
     rms, peak = _rms(size), float(size.max())
     told = f"{what} RMS {rms:.1f} {unit}, peak {peak:.1f} {unit}"
-    levels: tuple[tuple[Level, tuple[float, float]], ...] = (("good", good), ("okay", okay))
-    for level, limits in levels:
+    levels: tuple[tuple[Level, str, tuple[float, float]], ...] = (
+        ("pass", "well within", passing),
+        ("caution", "marginally within", marginal),
+    )
+    for level, where, limits in levels:
         if rms <= limits[0] and peak <= limits[1]:
-            at_most = f"at most {limits[0]:g} and {limits[1]:g} {unit}"
-            return Verdict(level, f"{told}: {level} by OpenSim's guideline ({at_most})")
-    return Verdict("against", f"{told}: beyond OpenSim's guideline (okay up to {okay[0]:g} and {okay[1]:g} {unit})")
+            return Verdict(
+                level, f"{told}: {where} OpenSim's guideline (at most {limits[0]:g} and {limits[1]:g} {unit})"
+            )
+    return Verdict("fail", f"{told}: beyond OpenSim's guideline (at most {marginal[0]:g} and {marginal[1]:g} {unit})")

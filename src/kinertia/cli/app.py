@@ -35,11 +35,11 @@ all segments out, with a motion that they and the forces explain.
 
 [bold]In which order[/]
 
-kinertia demo                 see it work, on a person who does not exist
+kinertia demo                 see it work, on a synthetic person
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
-kinertia crossval subject.toml   do they hold on a trial that was held out?
+kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
 
 Every command says more with --help, and has an example there.
@@ -53,12 +53,12 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 [bold]Exit status[/]
 
   0  done
-  1  done, but a verdict is against using the result. Of fit: not converged;
-     physically impossible segments; segments that contradict the literature;
-     residuals beyond OpenSim's guideline (force 10 N RMS, 25 N peak, 5 % of
-     the largest external force; moment 50 N m RMS, 75 N m peak).
-     Of check: something that a fit or a simulation cannot rest on.
-  2  a mistake in files or options, told in one line
+  1  done, but a check failed. In fit: not converged; physically impossible
+     segments; segments that contradict the literature; markers or residuals
+     beyond OpenSim's guideline (markers 20 mm RMS; force 10 N RMS, 25 N peak,
+     5 % of the largest external force; moment 50 N m RMS, 75 N m peak).
+     In check: something that a fit or a simulation cannot rest on.
+  2  an error in files or options, reported in one line
 130  interrupted; nothing half-written is left
 
 Results go to standard output, progress and errors to standard error.
@@ -77,7 +77,7 @@ app = typer.Typer(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; a user's mistake is one line and exit status 2."""
+    """Run the command line; a user's error is one line and exit status 2."""
     try:
         app(args=arguments, prog_name="kinertia")
     except KinertiaError as error:
@@ -110,8 +110,8 @@ def fit(
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
     ] = None,
-    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may carry it.")] = None,
-    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may carry it.")] = None,
+    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may contain it.")] = None,
+    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may contain it.")] = None,
     sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
     markers: Annotated[
         str | None,
@@ -130,7 +130,7 @@ def fit(
 ) -> None:
     """Estimate body segment parameters from gait.
 
-    Exit status 1 if the estimate is there but a verdict is against using it
+    Exit status 1 if there is an estimate but a check of it failed
     (see kinertia --help).
 
     [bold]Examples[/]
@@ -244,24 +244,26 @@ def _report(fit: Fit) -> None:
     person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
     out.print(f"\n{subject['name']}: {person}; method {told['method']}; {fit.notes[0]}")
     for trial in told["trials"]:
-        _report_trial(trial)
+        _report_trial(trial, _before(fit))
     out.print(_bsp_table(fit))
     if fit.posterior is not None:
         out.print(
-            "** measured by the data, * informed by them, no mark: they say little, the first guess decides; "
-            "sd: error bar\n"
+            "** measured by the data, * informed by them, no mark: little information; the value is essentially the "
+            "prior; sd: error bar\n"
         )
-    out.print("total mass (kg): " + ", ".join(f"{source} {value:.1f}" for source, value in mass.items()) + "\n")
+    named = {"measured": "stated", "literature": _before(fit)}
+    masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
+    out.print(f"total mass (kg): {masses}\n")
     for warning in fit.warnings:
         out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
 
 
 def _report_verdicts(judged: Sequence[Verdict], fit: Fit, verbose: bool) -> None:
-    """The verdicts, of which the good ones and the assumptions are details."""
-    show_verdicts(verdict for verdict in judged if verbose or verdict.level != "good")
+    """The verdicts, of which the passed ones and the assumptions are details."""
+    show_verdicts(verdict for verdict in judged if verbose or verdict.level != "pass")
     if not verbose:
-        good = sum(verdict.level == "good" for verdict in judged)
-        out.print(f"good: {good} of {len(judged)} verdicts (--verbose shows them)")
+        passed = sum(verdict.level == "pass" for verdict in judged)
+        out.print(f"pass: {passed} of {len(judged)} checks (--verbose shows them)")
         return
     for note in fit.notes:
         out.print(f"assumed: {note}")
@@ -270,7 +272,12 @@ def _report_verdicts(judged: Sequence[Verdict], fit: Fit, verbose: bool) -> None
         out.print(f"{trial.name}: seconds: {spent}")
 
 
-def _report_trial(trial: dict[str, Any]) -> None:
+def _before(fit: Fit) -> str:
+    """What the parameters before the estimate are called: an OpenSim model brings its own."""
+    return "literature" if fit.file is None else "model"
+
+
+def _report_trial(trial: dict[str, Any], before: str) -> None:
     first, last = trial["window_s"]
     markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
     out.print(
@@ -280,13 +287,14 @@ def _report_trial(trial: dict[str, Any]) -> None:
     )
     hz = {**dict.fromkeys(_STAGES, trial["cutoff_hz"]), "estimate": trial["motion_hz"]}
     title = "residual at the pelvis, RMS (max),\nforces at the motion's bandwidth"
-    table = plain_table(title, *(f"{stage}\n{hz[stage]:.3g} Hz" for stage in _STAGES))
+    names = {stage: before if stage == "literature" else stage for stage in _STAGES}
+    table = plain_table(title, *(f"{name}\n{hz[stage]:.3g} Hz" for stage, name in names.items()))
     for kind, unit in (("force", "N"), ("moment", "Nm")):
         rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
         table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
     out.print(table)
-    names = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
-    full = [f"{trial[f'full_residual_{name}']['estimate']:.1f}" for name in names]
+    sizes = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
+    full = [f"{trial[f'full_residual_{size}']['estimate']:.1f}" for size in sizes]
     out.print(
         " estimate with forces at full bandwidth (what OpenSim finds on these files):\n"
         f" force {full[0]} ({full[1]}) N, moment {full[2]} ({full[3]}) N m"
@@ -299,8 +307,7 @@ def _bsp_table(fit: Fit) -> Table:
     for i, segment in enumerate(fit.literature.segments):
         if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
             continue
-        before = "literature" if fit.file is None else "model"
-        for source, bsp in ((before, fit.literature), ("estimate", fit.estimate)):
+        for source, bsp in ((_before(fit), fit.literature), ("estimate", fit.estimate)):
             com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
             cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
@@ -310,7 +317,9 @@ def _bsp_table(fit: Fit) -> Table:
                 ]
             table.add_row(segment, source, *cells)
             segment = ""
-        if fit.posterior is not None:
+        if fit.posterior is not None and not fit.posterior.prior_sd[i].any():
+            table.add_row("", "sd", "kept")
+        elif fit.posterior is not None:
             sd = fit.posterior.sd[i]
             table.add_row(
                 "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])

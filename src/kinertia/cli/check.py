@@ -64,7 +64,7 @@ def check(
         str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder for the same as a page, check.html.")
+        Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -74,13 +74,12 @@ def check(
 
     Measured: rates, units, axes; markers and gaps; force plates and which foot
     is on them; the stretch in which all ground contact is measured; the
-    vertical force against body mass; over whole strides, whether the ground
-    turns the person to one side, as it does where a plate's vertical moment is
-    wrong.
+    vertical force against body mass; the mean vertical
+    moment over whole strides, which should be near zero.
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.
-    Exit status 1 if a verdict is against: no fit, or no simulation.
+    Exit status 1 if a check failed: no fit or no simulation can rest on it.
 
     [bold]Examples[/]
 
@@ -259,7 +258,7 @@ def _show_recording(title: str, found: RecordingCheck, verbose: bool) -> None:
         if not verbose and len(shown) > _LISTED:
             out.print(f"and {len(shown) - _LISTED} more markers with gaps (--verbose lists them)")
     if found.plates:
-        plates = plain_table("plate", "", "peak\n(N)", "off plate\n(% of load)")
+        plates = plain_table("plate", "foot on plate", "peak\n(N)", "off plate\n(% of load)")
         plates.padding = (0, 1)
         for plate in found.plates:
             off = "-" if plate.outside_share is None else f"{100 * plate.outside_share:.0f}"

@@ -52,7 +52,7 @@ def plan(
         counts = {" + ".join(names): found.counts(names) for names in found.sd}
         told = json.dumps({"kinertia": VERSION, "recordings": counts}, indent=2)
         (work / "plan.json").write_text(told + "\n", encoding="utf-8")
-    out.print(f"predicted deviation of every parameter in {output / 'plan.csv'}, counts in plan.json")
+    out.print(f"predicted sd of every parameter in {output / 'plan.csv'}, counts in plan.json")
 
 
 def _report_plan(found: Plan) -> None:
@@ -88,20 +88,20 @@ def crossval(
         ready = prepare_subject(wanted, progress)
         bandwidth = Bandwidth.of(ready.kinematics, wanted.settings.cutoff_hz)
         found = cross_validate(ready, bandwidth, progress)
-    _report_crossval(found)
+    _report_crossval(found, "literature" if ready.file is None else "model")
     with complete_folder(output) as work:
         told = json.dumps({"kinertia": VERSION, "held_out": [asdict(held) for held in found]}, indent=2)
         (work / "crossval.json").write_text(told + "\n", encoding="utf-8")
     out.print(f"results in {output / 'crossval.json'}")
 
 
-def _report_crossval(found: tuple[HeldOut, ...]) -> None:
+def _report_crossval(found: tuple[HeldOut, ...], before: str) -> None:
     table = plain_table("held out", "", "objective", "force\n(N)", "moment\n(N m)", "markers\n(mm)")
     for held in found:
-        for source, told in (("literature", held.literature), ("others", held.estimate)):
+        for source, told in ((before, held.literature), ("others", held.estimate)):
             cells = (f"{told.objective:.0f}", f"{told.force_rms_n:.1f}", f"{told.moment_rms_nm:.1f}")
             table.add_row(held.trial, source, *cells, f"{told.marker_rms_m * 1e3:.1f}")
-    out.print("\nMotion and calibration estimated with frozen BSPs: the literature's, and those from the other trials.")
+    out.print(f"\nMotion and calibration estimated with frozen BSPs: the {before}'s, and those from the other trials.")
     out.print(table)
     better = sum(held.estimate.objective < held.literature.objective for held in found)
     out.print(f"the BSPs from the other trials explain {better} of {len(found)} held-out trials better")

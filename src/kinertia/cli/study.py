@@ -28,8 +28,8 @@ Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per cor
 def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
     """Show what Kinertia does; needs no files.
 
-    A synthetic person walks through a synthetic laboratory; the files it leaves are estimated from, and the estimate is
-    compared with the truth.
+    A synthetic person walks through a synthetic laboratory; Kinertia then estimates from its files and compares the
+    estimate with the truth.
 
     [bold]Example[/]
 

@@ -16,7 +16,7 @@ from kinertia.checks.verdict import Verdict
 # names of files and trials may contain what rich takes for markup
 out = Console(markup=False, emoji=False, highlight=False)
 err = Console(markup=False, emoji=False, highlight=False, stderr=True)
-_COLOURS = {"good": "green", "okay": "yellow", "against": "bold red"}
+_COLOURS = {"pass": "green", "caution": "yellow", "fail": "bold red"}
 
 
 def be_quiet(quiet: bool) -> bool:
@@ -26,7 +26,7 @@ def be_quiet(quiet: bool) -> bool:
 
 
 def show_error(message: str) -> None:
-    """One line for one mistake."""
+    """One line for one error."""
     text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
     err.print(text, soft_wrap=True)
 

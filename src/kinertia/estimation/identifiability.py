@@ -3,7 +3,7 @@
 Ground reactions see only combinations of the parameters, the base parameters: mass on the axis of a joint may be
 counted to either of the segments that it connects, and no motion tells (Gautier and Khalil 1990, IEEE T-RA 6:368).
 Which combinations those are follows from the root regressor over random motions; which ones a recorded motion shows,
-from the regressor over its frames, with columns in prior deviations of the parameters and rows in deviations of the
+from the regressor over its frames, with columns in prior SDs of the parameters and rows in deviations of the
 noise.
 """
 
@@ -51,9 +51,9 @@ class Combination:
 
     Attributes:
         words: what changes together, largest share first.
-        gain: prior deviation of the combination over the deviation with which these frames would show it, were the
+        gain: prior SD of the combination over the deviation with which these frames would show it, were the
             motion known exactly.
-        weights: "segment.parameter" -> share, in prior deviations; their squares add to one.
+        weights: "segment.parameter" -> share, in prior SDs; their squares add to one.
     """
 
     words: str
@@ -91,7 +91,7 @@ def base_parameters(
 
     Args:
         skeleton, bsp: the model.
-        prior_sd: (s, 10) prior deviations of the parameters, in the order of `BodySegmentParameters.table`.
+        prior_sd: (s, 10) prior SDs of the parameters, in the order of `BodySegmentParameters.table`.
         motions: frames whose ground contact is measured, one entry per trial.
         root_sd: per trial (6,) deviations of the root load: N, N m.
     """

@@ -147,13 +147,13 @@ def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
     if by_force_kg[heaviest] > (1 + CONTRADICTING_MASS) * by_force_kg[lightest]:
         raise TrialError(
             heaviest,
-            f"the vertical force carries {by_force_kg[heaviest]:.1f} kg, in '{lightest}' "
+            f"the vertical force corresponds to {by_force_kg[heaviest]:.1f} kg, in '{lightest}' "
             f"{by_force_kg[lightest]:.1f} kg; pool only trials of one person, with the same plates",
         )
     for name, by_force in by_force_kg.items():
         if abs(by_force - mass_kg) > CONTRADICTING_MASS * mass_kg:
             raise TrialError(
                 name,
-                f"the vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg; correct the mass, or "
-                f"the gain and zero of the plates",
+                f"the vertical force corresponds to {by_force:.1f} kg; stated mass {mass_kg:.1f} kg; correct the mass, "
+                f"or the gain and zero of the plates",
             )

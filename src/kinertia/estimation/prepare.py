@@ -184,7 +184,7 @@ def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
     for side in "rl":
         label = marker_set.landmarks[f"asis_{side}"][0]
         if label not in recording.markers.labels:
-            raise TrialError(recording.name, f"the marker {label} is missing; it tells which way the person faces")
+            raise TrialError(recording.name, f"the marker {label} is missing; it shows which way the person faces")
     present = set(recording.markers.labels)
     feet = {side: [label for label in labels if label in present] for side, labels in marker_set.foot_labels().items()}
     for side, labels in feet.items():

@@ -65,7 +65,7 @@ def prepare_osim(
     own, factor = at_mass(model.bsp, known(subject.mass_kg))
     prior, held = parted(skeleton, own)
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
-    freedom = Freedom(centres, MARKER_SD_M if calibrate else None, held, "the model's own")
+    freedom = Freedom(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
 
     kinematics, seconds = [], []
     for k, trial in enumerate(trials):

@@ -108,7 +108,7 @@ class BspPrior:
 
     @property
     def sd(self) -> np.ndarray:
-        """(s, 10) prior deviations, in the table's order and units."""
+        """(s, 10) prior SDs, in the table's order and units."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 10)
 
     def given_scale(self) -> tuple[np.ndarray, np.ndarray]:

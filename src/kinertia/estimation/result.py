@@ -55,7 +55,7 @@ class FitPictures(Protocol):
         """Body segment parameters before and after, with intervals where there are any."""
 
     def information(self) -> Figure | None:
-        """What the data told about each parameter; None after two-level."""
+        """What the data say about each parameter; None after two-level."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,13 +43,13 @@ def fit_warnings(
         by_force = mass_from_force_kg(literature, trial)
         if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
             found.append(
-                f"{trial.name}: the mean vertical force carries {by_force:.1f} kg, the scale says {mass_kg:.1f} kg "
+                f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {mass_kg:.1f} kg "
                 f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
             )
     total = estimate.total_mass_kg
     if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
         found.append(
-            f"the estimated total mass is {total:.1f} kg, the scale says {mass_kg:.1f} kg "
+            f"the estimated total mass is {total:.1f} kg; stated mass {mass_kg:.1f} kg "
             f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
         )
     moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
@@ -63,7 +63,7 @@ def fit_warnings(
 
 
 def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
-    """Trials whose ground reactions turn the person ever further to one side, and why that may be."""
+    """Trials whose mean vertical moment over whole strides is not near zero, and why that may be."""
     means = {k.trial.name: mean_turning(k.trial.loads, k.time, skeleton.root.centre(k.motion.q)) for k in trials}
     return [f"{name}: {mean.sentence()}" for name, mean in means.items() if mean is not None and mean.contradicts]
 
@@ -81,7 +81,7 @@ def two_level_warnings(result: TwoLevelResult) -> list[str]:
         names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
         found.append(
             f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
-            f"({', '.join(names)}): it explains the forces, but skin-motion noise decides single parameters; "
+            f"({', '.join(names)}): it explains the forces, but skin motion decides single parameters; "
             f"do not use them as this person's"
         )
     return found

@@ -194,10 +194,10 @@ def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[st
     if not prefixes:
         return labels, []
     subject = prefixes.most_common(1)[0][0]
-    notes = [f"{path.name}: the prefix '{subject}:' was taken off the labels"]
+    notes = [f"{path.name}: the prefix '{subject}:' was removed from the labels"]
     if len(prefixes) > 1:
         others = ", ".join(name for name in prefixes if name != subject)
-        notes = [f"{path.name}: several subjects; '{subject}:' was taken off the labels, {others} keep theirs"]
+        notes = [f"{path.name}: several subjects; '{subject}:' was removed from the labels, {others} keep theirs"]
     return [label.removeprefix(subject + ":") for label in labels], notes
 
 
@@ -224,7 +224,7 @@ def _to_ground(
     if told_up is None:
         notes.append(f"{path.name}: no vertical axis given (POINT:Y_SCREEN); {up} was found from {why}")
     elif told_up != found_up:
-        notes.append(f"{path.name}: POINT:Y_SCREEN says {told} is up but {why} say {up}; {up} was believed")
+        notes.append(f"{path.name}: POINT:Y_SCREEN says {told} is up but {why} say {up}; {up} was used")
     if up != "+Y":
         notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
     return _rotation(*found_up), up, notes

@@ -92,7 +92,9 @@ def to_ground_plates(
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
             moment[:, p] *= -1
-            notes.append(f"{path.name}: {name} tells a force that points down, the load on the plate; it was reversed")
+            notes.append(
+                f"{path.name}: {name} reports a force that points down, the load on the plate; it was reversed"
+            )
         loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
         lost = np.isnan(force[:, p]).any(axis=1) | (loaded & np.isnan(moment[:, p]).any(axis=1))
         if lost.any():
@@ -100,11 +102,11 @@ def to_ground_plates(
         offset = np.median(force[~loaded, p], axis=0) if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES else np.zeros(3)
         if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
             told = ", ".join(f"{value:.0f}" for value in offset)
-            notes.append(f"{path.name}: {name} reads ({told}) N when nobody stands on it; this was not subtracted")
+            notes.append(f"{path.name}: {name} reads ({told}) N when unloaded; this was not subtracted")
         force[:, p], moment[:, p], noise = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
         noises.append(noise)
         if not loaded.any():
-            notes.append(f"{path.name}: {name} never carries {LOAD_THRESHOLD_N:g} N")
+            notes.append(f"{path.name}: {name} never reaches {LOAD_THRESHOLD_N:g} N")
         elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
             notes.append(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
@@ -123,7 +125,7 @@ def _corner_trouble(corners: FloatArray) -> str:
         and edges.max() < high
     ):
         return ""
-    return f"its corners are no plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
+    return f"its corners do not form a plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
 
 
 def _unit_trouble(file: Any, group: Any, plate: int) -> str:

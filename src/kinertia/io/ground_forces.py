@@ -136,7 +136,7 @@ def _remarks(path: Path, loads: PlateLoads, groups: Sequence[_Columns]) -> list[
     still = [group.name for group in groups if group.torque is None]
     notes = []
     if idle:
-        notes.append(f"{path.name}: {', '.join(idle)} never carries {LOAD_THRESHOLD_N:g} N")
+        notes.append(f"{path.name}: {', '.join(idle)} never reaches {LOAD_THRESHOLD_N:g} N")
     if still:
         notes.append(f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero")
     return notes

@@ -45,7 +45,7 @@ def init_subject(folder: str | Path) -> str:
     chosen = matched_by_name([trial for trial in trials if trial not in c3d], forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
-        text += [f"# Left out (another subject's, another static trial, or there as C3D too): {', '.join(others)}."]
+        text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
     guessed = static is not None and not STATIC_NAME.search(static.stem)
     note = " (the shortest recording)" if guessed else ""

@@ -13,7 +13,7 @@ from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.studies.accuracy import ClassAccuracy, ScenarioAccuracy
 
-HEADINGS = ("", "95 % cover", "error / sd", "RMS error", "bound", "literature", "better (at best)")
+HEADINGS = ("", "95 % coverage", "error / sd", "RMS error", "bound", "literature", "better (at best)")
 _SHOWN = {
     "mass": (1.0, "kg", ".2f"),
     "CoM": (1e3, "mm", ".1f"),
@@ -38,10 +38,10 @@ def _better(found: ClassAccuracy) -> str:
     return told if np.isnan(found.attainable) else f"{told} ({100 * found.attainable:.0f} %)"
 
 
-JOINT_HEADINGS = ("", "N m", "usual", "ratio", "sd (cover)", "deg", "IK", "varying", "IK")
+JOINT_HEADINGS = ("", "N m", "usual", "ratio", "sd (coverage)", "deg", "IK", "varying", "IK")
 JOINT_CAPTION = (
     "RMS errors of joint moments (N m) and joint angles (degrees) of the estimate. usual: inverse kinematics, "
-    "literature BSPs, forces as measured, the best of 6, 10 and 12 Hz per joint; sd (cover): deviation told, and how "
+    "literature BSPs, forces as measured, the best of 6, 10 and 12 Hz per joint; sd (coverage): sd reported, and how "
     "often the truth lies in the 95 % interval; varying: without each angle's constant error."
 )
 """What stands under a table of `joint_rows`."""

@@ -1,4 +1,4 @@
-"""Figures of body segment parameters: intervals before and after, and what the data told about each."""
+"""Figures of body segment parameters: intervals before and after, and what the data say about each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kinertia.report.panels import Panel, base_layout, compact, small_multiples
 from kinertia.report.wording import decimals, fixed, read_in, start_of
 
 DEPARTURE_SD = 2.0
-"""Estimates further from where they started than this many prior deviations are pointed out."""
+"""Estimates further from where they started than this many prior SDs are pointed out."""
 NAMES = (
     "mass",
     "CoM forward",
@@ -42,7 +42,7 @@ def segment_name(segment: str) -> str:
 
 
 def departures(fit: Fit) -> np.ndarray | None:
-    """(s, 10) estimate minus start in prior deviations, 0 where held; None after two-level, which has none."""
+    """(s, 10) estimate minus start in prior SDs, 0 where held; None after two-level, which has none."""
     if fit.posterior is None:
         return None
     result: np.ndarray | None = (fit.estimate.table() - fit.literature.table()) / _scale(fit.posterior)
@@ -50,12 +50,12 @@ def departures(fit: Fit) -> np.ndarray | None:
 
 
 def _scale(posterior: Posterior) -> np.ndarray:
-    """(s, 10) prior deviations; infinite where a parameter is held."""
+    """(s, 10) prior SDs; infinite where a parameter is held."""
     return np.where(posterior.prior_sd > 0, posterior.prior_sd, np.inf)
 
 
 def estimated_rows(fit: Fit) -> np.ndarray:
-    """Rows of the segments that were estimated; those with a prior deviation of 0 stay as the model has them."""
+    """Rows of the segments that were estimated; those with a prior SD of 0 stay as the model has them."""
     if fit.posterior is None:
         return np.arange(len(fit.estimate.segments))
     return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
@@ -64,7 +64,7 @@ def estimated_rows(fit: Fit) -> np.ndarray:
 def bsp_figure(fit: Fit) -> go.Figure:
     """Estimate against start (literature, or OpenSim model): a panel per parameter, a row per segment.
 
-    With error bars everything is in prior deviations, so that feet can be read beside the trunk; without (two-level),
+    With error bars everything is in prior SDs, so that feet can be read beside the trunk; without (two-level),
     it is the difference in the parameter's unit. Segments that are held are left out.
     """
     away, posterior, start = departures(fit), fit.posterior, start_of(fit)
@@ -80,12 +80,12 @@ def bsp_figure(fit: Fit) -> go.Figure:
         panels = [_panel(fit, posterior, shown, k, rows) for k in range(len(PARAMETERS))]
         away, half = away[shown], (_INTERVAL_SD * posterior.sd / _scale(posterior))[shown]
         reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
-        title = {"text": f"prior deviations from {start.of}", "font": {"size": 11}, "standoff": 2}
+        title = {"text": f"prior SDs from {start.of}", "font": {"size": 11}, "standoff": 2}
         axis = {"range": [-reach, reach], "title": title, "nticks": 7}
         far = int((np.abs(away) > DEPARTURE_SD).sum())
         alt = (
             f"95 % intervals of every body segment parameter before and after the estimate; {far} of "
-            f"{int((posterior.prior_sd > 0).sum())} estimates lie more than {DEPARTURE_SD:g} prior deviations from "
+            f"{int((posterior.prior_sd > 0).sum())} estimates lie more than {DEPARTURE_SD:g} prior SDs from "
             f"{start.of}."
         )
     return small_multiples(panels, alt, axis, row_px=230, left_px=112, linked=away is not None)
@@ -116,7 +116,7 @@ def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict
     traces = [prior]
     for chosen, name, colour, symbol in (
         (~far, "estimate, 95 %", style.BLUE, "circle"),
-        (far, f"estimate beyond {DEPARTURE_SD:g} deviations", style.VERMILION, "diamond"),
+        (far, f"estimate beyond {DEPARTURE_SD:g} prior SDs", style.VERMILION, "diamond"),
     ):
         if chosen.any():
             traces.append(
@@ -163,7 +163,7 @@ def information_figure(fit: Fit) -> go.Figure | None:
     segments = [segment_name(fit.estimate.segments[i]) for i in shown]
     best = np.unravel_index(int(np.nanargmax(told)), told.shape)
     alt = (
-        f"Map of what the data told about each parameter, in percent; most about {NAMES[best[1]]} of "
+        f"Map of what the data say about each parameter, in percent; most about {NAMES[best[1]]} of "
         f"{segments[best[0]]}, {told[best]:.0f} %; median {np.nanmedian(told):.0f} %."
     )
     heat = {

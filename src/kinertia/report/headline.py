@@ -1,7 +1,7 @@
 """The report's first part: a fit in words, for somebody who reads nothing else.
 
 Whether numbers can be used is judged in `kinertia.checks.verdict`; here that is put beside how far the motion was
-changed to get there, what the data told about the body, and where the estimate leaves what it started from.
+changed to get there, what the data say about the body, and where the estimate leaves what it started from.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Words:
         judgements: `kinertia.checks.verdict.verdicts`.
         motion: how far the motion was changed.
         knowledge: what the data could and could not tell about the body segment parameters.
-        departures: estimates more than two prior deviations from what they started from.
+        departures: estimates more than two prior SDs from what they started from.
     """
 
     level: Level
@@ -52,12 +52,12 @@ def words(fit: Fit) -> Words:
     """The verdict on a fit."""
     judgements = tuple(verdicts(fit))
     levels = [judgement.level for judgement in judgements]
-    level: Level = next(one for one in ("against", "okay", "good") if one in levels)
-    against = levels.count("against")
+    level: Level = next(one for one in ("fail", "caution", "pass") if one in levels)
+    failed = levels.count("fail")
     headline = {
-        "good": "The checks are passed: forces, motion and model agree. What that shows of the body stands below.",
-        "okay": "Usable with care: every check is passed, but not all of them well.",
-        "against": f"Do not use these numbers as they are: {against} of {len(levels)} checks speak against them.",
+        "pass": "All checks passed: forces, motion and model agree. What this says about the body is below.",
+        "caution": "Usable with care: all checks passed, some only marginally.",
+        "fail": f"Do not use these numbers as they are: {failed} of {len(levels)} checks failed.",
     }[level]
     if fit.warnings:
         headline += f" Read the warning{'s' if len(fit.warnings) > 1 else ''}."
@@ -86,15 +86,15 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
     if fit.posterior is None:
         return (
             "the two-level method has no error bars: it cannot tell which parameters the data show and which they do "
-            "not. Small residuals alone prove nothing about single parameters; the simultaneous method tells",
+            "not. Small residuals alone prove nothing about single parameters; the simultaneous method does tell",
         )
     posterior = fit.posterior
     told = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
     counts = {word: told.count(word) for word in _EVIDENCE}
     found = [
-        f"of {len(told)} parameters the data measured {counts['measured']} (information above {100 * MEASURED:g} %) "
-        f"and informed {counts['informed']}; {counts['assumed']} are hardly informed by the data (below "
-        f'{100 * INFORMED:g} %; "assumed" in the table): most of what they say is from {start_of(fit).of}'
+        f"of {len(told)} parameters {counts['measured']} are measured (information above {100 * MEASURED:g} %) "
+        f"and {counts['informed']} informed by the data; {counts['assumed']} are hardly informed (below "
+        f'{100 * INFORMED:g} %; "assumed" in the table): their values are essentially {start_of(fit).whose}'
     ]
     masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
@@ -104,8 +104,8 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
         found.append(kept)
     if never := posterior.base.never:
         found.append(
-            f"{hidden_combinations(fit)} combinations no motion ever shows, such as {never[0]}: all stand "
-            "with the table"
+            f"{hidden_combinations(fit)} combinations cannot be seen in any motion, such as {never[0]}: all are "
+            "listed above the table"
         )
     return tuple(found)
 
@@ -145,8 +145,8 @@ def _departures(fit: Fit) -> tuple[str, ...]:
         (unit, factor), digits = read_in(k), decimals(k, scale[i, k])
         told.append(
             f"{NAMES[k]} of {segment_name(fit.estimate.segments[i])}: {fixed(factor * after[i, k], digits)} {unit}; "
-            f"{start.word} {fixed(factor * before[i, k], digits)}; {away[i, k]:+.1f} deviations apart"
+            f"{start.word} {fixed(factor * before[i, k], digits)}; {away[i, k]:+.1f} prior SDs apart"
         )
     if len(far) > _LISTED_FAR:
-        told.append(f"and {len(far) - _LISTED_FAR} more: sort the table by deviations to see them")
+        told.append(f"and {len(far) - _LISTED_FAR} more: sort the table by prior SDs to see them")
     return tuple(told)

@@ -17,12 +17,12 @@ _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}
 def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> go.Figure:
     """RMS distance (mm) between every measured and modelled marker over the window; the farthest on top.
 
-    `wandering` names the markers that the estimate trusts less.
+    `wandering` names the markers that drift and are down-weighted.
     """
     labels = trial.kinematics.ik.labels
     found = {stage: 1e3 * rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
     order = np.argsort(-np.nan_to_num(found["final"], nan=-1.0))
-    names = [plain(labels[k]) + (" (counts less)" if labels[k] in wandering else "") for k in order]
+    names = [plain(labels[k]) + (" (down-weighted)" if labels[k] in wandering else "") for k in order]
     traces = [
         {
             "type": "scatter",

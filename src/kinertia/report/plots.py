@@ -56,7 +56,7 @@ class FitPlots:
         return bsp_figure(self.fit)
 
     def information(self) -> go.Figure | None:
-        """What the data told about each parameter; None after two-level."""
+        """What the data say about each parameter; None after two-level."""
         return information_figure(self.fit)
 
     def _trial(self, name: str | None) -> TrialFit:

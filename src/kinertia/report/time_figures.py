@@ -217,10 +217,10 @@ def _events(kinematics: Kinematics, sides: Sequence[str] = ()) -> list[dict[str,
     shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
     if len(shown) > MOST_EVENTS:
         return []
-    return [_upright(event) for event in shown if not sides or event.side in sides]
+    return [_vertical_line(event) for event in shown if not sides or event.side in sides]
 
 
-def _upright(event: GaitEvent) -> dict[str, Any]:
+def _vertical_line(event: GaitEvent) -> dict[str, Any]:
     dash = "solid" if event.kind == "heel strike" else "dash"
     line = {"color": style.faded(style.SIDES[event.side][1], 0.6), "width": 1, "dash": dash}
     return {"type": "line", "x0": event.time_s, "x1": event.time_s, "y0": 0, "y1": 1, "yref": "domain", "line": line}

@@ -20,16 +20,18 @@ class Start:
     Attributes:
         word: in headings and legends.
         of: in sentences.
+        whose: "the literature's" or the model's.
         values: of the stage of residuals and moments.
     """
 
     word: str
     of: str
+    whose: str
     values: str
 
 
-LITERATURE = Start("literature", "the literature", "literature values")
-MODEL = Start("model", "the model", "the model's own values")
+LITERATURE = Start("literature", "the literature", "the literature's", "literature values")
+MODEL = Start("model", "the model", "the model's", "the model's own values")
 
 
 def start_of(fit: Fit) -> Start:

@@ -38,7 +38,7 @@ _SEED = 1
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Predicted deviations.
+    """Predicted standard deviations.
 
     Attributes:
         segments: names.
@@ -102,7 +102,7 @@ def plan_measured(
     cutoff_hz: float | Literal["gcv"],
     freedom: Freedom = GAIT27_FREEDOM,
 ) -> Plan:
-    """Predicted deviations from measured trials of one person, whose names must differ; as `fit_simultaneous`."""
+    """Predicted standard deviations from measured trials of one person with different names; as `fit_simultaneous`."""
     bandwidth = Bandwidth.of(trials, cutoff_hz)
     used = used_skeleton(skeleton, trials, freedom)
 
@@ -126,7 +126,7 @@ def plan_measured(
 
 
 def plan_synthetic() -> Plan:
-    """Predicted deviations from the package's motions, each 5 s."""
+    """Predicted standard deviations from the package's motions, each 5 s."""
     subject = walking_subject()
     prior = literature_prior(subject.literature)
     person = replace(subject, bsp=prior.mean)

@@ -161,7 +161,7 @@ def _force_table(plates: PlateLoads) -> pd.DataFrame:
 def _subject_text(kind: str) -> str:
     forces = 'forces = "walk_grf.mot"\n' if kind == "trc" else ""
     return (
-        "# A person who does not exist, measured by a laboratory that does not exist.\n"
+        "# A synthetic person, measured in a synthetic laboratory.\n"
         f'[subject]\nname = "synthetic walker"\nsex = {json.dumps(SEX)}\nmass_kg = {MASS_KG}\nheight_m = {HEIGHT_M}\n\n'
         f'[model]\nstatic = "static.{kind}"\n\n[[trial]]\nmarkers = "walk.{kind}"\n{forces}'
     )

@@ -48,20 +48,20 @@ class Turning:
 
     def sentence(self) -> str:
         """What was found and, where it contradicts gait, what to do."""
-        mean = f"over whole strides ({self.start_s:.2f} to {self.end_s:.2f} s)"
+        mean = f"the mean vertical moment over whole strides ({self.start_s:.2f} to {self.end_s:.2f} s)"
         if not self.contradicts:
-            return f"{mean} the ground does not turn the person (mean vertical moment {self.moment_nm:+.1f} N m)"
+            return f"{mean} is near zero, as it should be ({self.moment_nm:+.1f} N m)"
         right, left = self.free_nm
         told = (
-            f"{mean} the ground turns the person to the {'left' if self.moment_nm > 0 else 'right'} with "
-            f"{abs(self.moment_nm):.1f} N m on average (expected within {self.allowed_nm:.1f}, or one would spin)"
+            f"{mean} is {abs(self.moment_nm):.1f} N m to the {'left' if self.moment_nm > 0 else 'right'}; it should "
+            f"be near zero (within {self.allowed_nm:.1f})"
         )
         if (right + left) / self.moment_nm < 0.5:
             return f"{told}; check the places and axes of the plates, and that nothing else was touched"
-        same = "turn to the same side" if right * left > 0 else "do not cancel"
+        same = "have the same sign" if right * left > 0 else "do not cancel"
         return (
-            f"{told}; the free moments under the feet {same} (right {right:+.1f}, left {left:+.1f} N m, expected "
-            f"opposite): check zero, sign and calibration of the plates' vertical moments, and export them again"
+            f"{told}; the free moments under the feet {same} (right {right:+.1f}, left {left:+.1f} N m, opposite "
+            f"signs expected): check zero, sign and calibration of the plates' vertical moments, and export them again"
         )
 
 

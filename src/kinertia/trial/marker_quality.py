@@ -11,7 +11,7 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
 STANDING_RANGE_M = 0.03
 """In a standing trial the median marker stays within this (5th to 95th percentile)."""
 _LEAST_WALK_M = 0.5
-"""Less way than this is movement on the spot."""
+"""Less way than this is no net travel."""
 _UPRIGHT_SHARE = 0.7
 _PLAUSIBLE_EXTENT_M = (0.3, 2.8)
 
@@ -36,7 +36,7 @@ class Travel:
     """Where the person goes, in ground axes.
 
     Attributes:
-        kind: "stands still", "moves on the spot" or "walks".
+        kind: "stands still", "no net travel" or "walks".
         distance_m: covered while markers are seen.
         speed_m_s: mean, 0 unless walking.
         direction_deg: about the vertical from +X towards -Z, so that 90 is along -Z; NaN unless walking.
@@ -49,6 +49,8 @@ class Travel:
 
     def sentence(self) -> str:
         """In words: "walks along +X (12 degrees off), 2.1 m at 1.30 m/s"."""
+        if self.kind == "no net travel":
+            return "no net travel (treadmill or in place)"
         if self.kind != "walks":
             return self.kind
         quarter = round(self.direction_deg / 90)
@@ -89,7 +91,7 @@ def travel(markers: Markers) -> Travel:
     speed = float(np.hypot(velocity[0], velocity[2]))
     distance = float(speed * np.ptp(markers.time[shown.any(axis=1)]))
     if distance < _LEAST_WALK_M:
-        return Travel("moves on the spot", distance, 0.0, np.nan)
+        return Travel("no net travel", distance, 0.0, np.nan)
     return Travel("walks", distance, speed, float(np.degrees(np.arctan2(-velocity[2], velocity[0]))))
 
 

@@ -129,7 +129,9 @@ def test_a_wandering_marker_is_named(trial):
         at = trial.markers.labels.index("R.Bicep")
         positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
 
-    assert any("wandering markers" in w and "R.Bicep (" in w for w in fitted(trial, disturb=wander).warnings)
+    assert any(
+        "drifting markers, down-weighted" in w and "R.Bicep (" in w for w in fitted(trial, disturb=wander).warnings
+    )
 
 
 def test_a_marker_attached_anew_between_trials_is_named(trial):
@@ -142,7 +144,7 @@ def test_a_marker_attached_anew_between_trials_is_named(trial):
         outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
     assert len(outcome.warnings) == 2, outcome.warnings  # of two trials, either may be the odd one
     for said in outcome.warnings:
-        assert "attached anew" in said
+        assert "reattached" in said
         assert "R.Thigh.Front (" in said
         assert said.count(" mm)") == 1, said
     places = [skeleton.markers[skeleton.labels.index("R.Thigh.Front")].position[1] for skeleton in outcome.skeletons]

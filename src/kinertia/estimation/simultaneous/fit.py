@@ -42,7 +42,7 @@ _STAYING_SD_M = 1e-6
 _NOTABLE = 2.0
 _DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
-"""A parameter this many prior deviations from the literature contradicts the model."""
+"""A parameter this many prior SDs from the literature contradicts the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +221,7 @@ def _warnings(
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
-            found.append(f"{kinematics.trial.name}: wandering markers, which count accordingly less: {listed}")
+            found.append(f"{kinematics.trial.name}: drifting markers, down-weighted: {listed}")
     found += _attached_anew(result, trials)
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
     far = [
@@ -230,8 +230,8 @@ def _warnings(
     ]
     if far:
         found.append(
-            f"the data contradict the model: {', '.join(far)} prior deviations from {freedom.source}; a wrong joint, "
-            f"plate or marker is likelier than an odd person"
+            f"the data contradict the model: {', '.join(far)} prior SDs from {freedom.source}; a wrong joint, "
+            f"plate or marker is more likely than an unusual body"
         )
     return found
 
@@ -263,7 +263,7 @@ def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> 
             listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in far)
             found.append(
                 f"{kinematics.trial.name}: markers sit elsewhere in their segments than in the other trials: {listed}; "
-                f"skin moves up to some {_DISPLACED_M * 1e3:.0f} mm; correct their labels, or fit trials before and "
-                "after they were attached anew separately"
+                f"skin moves up to some {_DISPLACED_M * 1e3:.0f} mm; correct their labels, or fit the trials "
+                "before and after they were reattached separately"
             )
     return found

@@ -45,7 +45,7 @@ class MarkerNoise:
     Attributes:
         sd_m: per label, deviation of one coordinate in one frame, m.
         correlation_s: time over which errors are alike.
-        wandering: labels whose deviation is more than three times the usual; they count accordingly less.
+        wandering: labels whose deviation is more than three times the usual; they drift and are down-weighted.
         repeats: in how many strides of all trials together they are alike (`repetition`); 1: they never come back.
         displacement_sd_m: per label, deviation of its displacement in this trial (`displacement`), m; 0 for one trial.
     """
