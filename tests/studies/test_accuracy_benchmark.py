@@ -41,6 +41,7 @@ def test_page():
             "pooling": pooling_section(values, sds),
             "speed": speed_section([timing]),
             "people": "2",
+            "moments": "",
             "error_bars": "| mass (kg) |",
         }
     )
