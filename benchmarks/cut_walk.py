@@ -52,9 +52,10 @@ CUTS = (
     Cut("subject_a_static.c3d", "static.c3d", 140, 159),
     Cut("subject_a_walk.c3d", "walk.c3d", 152, 515),
 )
-"""Of the static trial 20 frames from its middle. Of the walk all: the fit is of 2.76 to 3.58 s, where all ground contact
-is measured, but calibration, smoothing and the search for ground contact use the steps around it, too. With 0.3 s on
-either side body segment parameters move by up to 0.4 of their error bars; so, by 0.01 (the static trial's frames).
+"""Of the static trial 20 frames from its middle. Of the walk all: the fit is of 2.76 to 3.58 s, where all ground
+contact is measured, but calibration, smoothing and the search for ground contact use the steps around it, too. With
+only 0.3 s on either side, body segment parameters move by up to 0.4 of their error bars; as it is, by 0.01, which is
+the static trial's doing.
 """
 
 

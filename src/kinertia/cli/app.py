@@ -34,6 +34,7 @@ all segments out, with a motion that they and the forces explain.
 [bold]In which order[/]
 
 kinertia demo                 see it work, on a person who does not exist
+kinertia demo --measured      see it work on a measured walk
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
