@@ -88,6 +88,17 @@ def measured_walk() -> Path:
     return FILES
 
 
+@pytest.fixture(scope="session")
+def measured_file(request, measured_walk):
+    """Path of a measured file by its name in `shared_data`, which only those need that are not in the package."""
+
+    def find(name: str) -> Path:
+        of_package = name.removeprefix("pig_c3d/subject_a_")
+        return measured_walk / of_package if of_package != name else request.getfixturevalue("shared_data") / name
+
+    return find
+
+
 @dataclass(frozen=True)
 class MeasuredDemo:
     """A finished `kinertia demo --measured`: its folder, what the terminal showed, and the fit behind it."""
