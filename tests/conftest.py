@@ -1,6 +1,6 @@
 """Fixtures shared by the tests."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest import mock
 
@@ -8,10 +8,12 @@ import pytest
 from hypothesis import settings
 
 import osim_models
-from command_line import fitted
+from command_line import Outcome, fitted, run
 from kinertia.cli.demo import Demo, run_demo
+from kinertia.cli.measured_demo import FILES, run_measured_demo
 from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
+from kinertia.estimation.result import Fit
 from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
 from quick_two_level import given_back
@@ -80,6 +82,48 @@ def demo_run(tmp_path_factory) -> tuple[Demo, Path]:
         return run_demo(folder), folder
 
 
+@pytest.fixture(scope="session")
+def measured_walk() -> Path:
+    """Folder of the measured walk that is part of the package: `static.c3d`, `walk.c3d`, `subject.toml`."""
+    return FILES
+
+
+@pytest.fixture(scope="session")
+def measured_file(request, measured_walk):
+    """Path of a measured file by its name in `shared_data`, which only those need that are not in the package."""
+
+    def find(name: str) -> Path:
+        of_package = name.removeprefix("pig_c3d/subject_a_")
+        return measured_walk / of_package if of_package != name else request.getfixturevalue("shared_data") / name
+
+    return find
+
+
+@dataclass(frozen=True)
+class MeasuredDemo:
+    """A finished `kinertia demo --measured`: its folder, what the terminal showed, and the fit behind it."""
+
+    folder: Path
+    outcome: Outcome
+    fit: Fit
+
+
+@pytest.fixture(scope="session")
+def measured_demo(tmp_path_factory) -> MeasuredDemo:
+    """Outcome of `kinertia demo --measured`; run once."""
+    folder = tmp_path_factory.mktemp("measured") / "out"
+    fits = []
+
+    def kept(*arguments):
+        fits.append(run_measured_demo(*arguments))
+        return fits[-1]
+
+    with mock.patch("kinertia.cli.study.run_measured_demo", kept):
+        outcome = run("demo", "--measured", "-o", folder)
+    assert outcome.status in (0, 1), outcome.err
+    return MeasuredDemo(folder, outcome, fits[0])
+
+
 @pytest.fixture
 def few_evaluations(monkeypatch):
     """Stops the estimate early: enough for tests of everything around it."""
@@ -87,9 +131,9 @@ def few_evaluations(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def short_fit(shared_data):
+def short_fit(measured_walk):
     """A two-level `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
-    walk, static = (read_recording(shared_data / "pig_c3d" / f"subject_a_{kind}.c3d") for kind in ("walk", "static"))
+    walk, static = (read_recording(measured_walk / f"{kind}.c3d") for kind in ("walk", "static"))
     inputs = [
         TrialInput(replace(walk, name=name), window, 0.25)
         for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))

@@ -118,12 +118,12 @@ def test_progress_tells_the_time_left_of_the_stage(monkeypatch):
 
 
 @pytest.fixture
-def person(tmp_path, shared_data):
+def person(tmp_path, measured_walk):
     """A folder with the two C3D files of one person."""
     folder = tmp_path / "anna [b]"
     folder.mkdir()
     for kind in ("walk", "static"):
-        shutil.copyfile(shared_data / "pig_c3d" / f"subject_a_{kind}.c3d", folder / f"{kind}.c3d")
+        shutil.copyfile(measured_walk / f"{kind}.c3d", folder / f"{kind}.c3d")
     return folder
 
 

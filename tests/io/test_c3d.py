@@ -78,8 +78,8 @@ WALKS = ["pig_c3d/subject_a_walk", "pig_c3d/subject_b_walk", "c3d_variety/ist", 
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_centre_of_pressure_lies_within_the_corners(shared_data, name):
-    plates = read_c3d(shared_data / f"{name}.c3d").plates
+def test_centre_of_pressure_lies_within_the_corners(measured_file, name):
+    plates = read_c3d(measured_file(f"{name}.c3d")).plates
     for p in range(len(plates.names)):
         _, point, free_moment = centres_of_pressure(plates, p)
         low, high = plates.corners[p].min(axis=0), plates.corners[p].max(axis=0)
@@ -93,8 +93,8 @@ FEET = {"plate 1": "L", "plate 2": "R"}
 
 
 @pytest.mark.parametrize("subject", "ab")
-def test_centre_of_pressure_runs_under_the_stance_foot(shared_data, subject):
-    recording = read_c3d(shared_data / "pig_c3d" / f"subject_{subject}_walk.c3d")
+def test_centre_of_pressure_runs_under_the_stance_foot(measured_file, subject):
+    recording = read_c3d(measured_file(f"pig_c3d/subject_{subject}_walk.c3d"))
     for p, name in enumerate(recording.plates.names):
         side = FEET[name] if subject == "a" else {"L": "R", "R": "L"}[FEET[name]]
         time, point, _ = centres_of_pressure(recording.plates, p, 200.0)
@@ -106,8 +106,8 @@ def test_centre_of_pressure_runs_under_the_stance_foot(shared_data, subject):
 
 
 @pytest.mark.parametrize("subject", "ab")
-def test_force_on_the_person_brakes_then_drives(shared_data, subject):
-    recording = read_c3d(shared_data / "pig_c3d" / f"subject_{subject}_walk.c3d")
+def test_force_on_the_person_brakes_then_drives(measured_file, subject):
+    recording = read_c3d(measured_file(f"pig_c3d/subject_{subject}_walk.c3d"))
     pelvis = recording.markers.select(["LASI"]).positions[:, 0]
     forward = pelvis[-1] - pelvis[0]
     for p in range(2):
@@ -119,8 +119,8 @@ def test_force_on_the_person_brakes_then_drives(shared_data, subject):
 
 
 @pytest.mark.parametrize(("subject", "mass_kg", "height_m"), [("a", 41.5, 1.61), ("b", 47.5, 1.505)])
-def test_static_trials_weigh_the_subject(shared_data, subject, mass_kg, height_m):
-    recording = read_c3d(shared_data / "pig_c3d" / f"subject_{subject}_static.c3d")
+def test_static_trials_weigh_the_subject(measured_file, subject, mass_kg, height_m):
+    recording = read_c3d(measured_file(f"pig_c3d/subject_{subject}_static.c3d"))
     mean = recording.plates.force[:, :, 1].sum(axis=1).mean() / GRAVITY
     assert mean == pytest.approx(mass_kg, rel=0.05)
     assert recording.mass_kg == mass_kg

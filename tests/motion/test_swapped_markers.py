@@ -46,17 +46,17 @@ SWAPS = {
 
 
 @pytest.fixture(scope="module")
-def walk(shared_data):
+def walk(measured_file):
     known = {}
 
     def read(name):
         if name not in known:
             static_path, walk_path, height = WALKS[name]
-            static = read_recording(shared_data / static_path)
+            static = read_recording(measured_file(static_path))
             labels = static.markers.labels
             marker_set = read_marker_set(SUBJECT4) if name.startswith("subject4") else choose_marker_set(labels)
             skeleton = build_gait27(static, marker_set, height, "male").skeleton.free(ARM_ROTATIONS)
-            known[name] = skeleton, sampled(read_recording(shared_data / walk_path).markers)
+            known[name] = skeleton, sampled(read_recording(measured_file(walk_path)).markers)
         return known[name]
 
     return read

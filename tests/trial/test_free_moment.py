@@ -171,13 +171,13 @@ MEASURED = {
 
 
 @pytest.mark.parametrize("name", MEASURED)
-def test_measured_trials(shared_data, name):
+def test_measured_trials(measured_file, name):
     """Of the measured walks only two hold a whole stride."""
     forces, level = MEASURED[name]
-    recording = read_recording(shared_data / name, None if forces is None else shared_data / forces)
+    recording = read_recording(measured_file(name), None if forces is None else measured_file(forces))
     own = None
     if "subject4" in name:
-        own = markers_of_model(read_osim(shared_data / "subject4" / "addbiomechanics_scaled.osim"))
+        own = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
     assert [v.level for v in verdicts(recording, own)] == ([] if level is None else [level])
 
 

@@ -248,10 +248,10 @@ REAL = {
 
 
 @pytest.fixture(scope="module")
-def real(shared_data):
+def real(measured_file):
     def read(name):
         files, feet, window = REAL[name]
-        return read_recording(*(shared_data / file for file in files)), feet, window
+        return read_recording(*(measured_file(file) for file in files)), feet, window
 
     return read
 

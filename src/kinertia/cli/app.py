@@ -8,24 +8,22 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
-from rich.text import Text
 
-from kinertia.checks.verdict import Verdict, stands_against, verdicts
+from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.check import check
+from kinertia.cli.fit_report import report_fit, report_verdicts
 from kinertia.cli.options import Force, Output, Quiet, Verbose, results_folder
 from kinertia.cli.plan import crossval, plan
 from kinertia.cli.study import demo, study
-from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
+from kinertia.cli.terminal import out, show_error, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.from_files import fit_subject
-from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, provenance_of
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_from_options, with_settings
-from kinertia.report.files import save_fit, summary
+from kinertia.report.files import save_fit
 
 # typer keeps these line ends: at most 78 columns
 _MANUAL = """Body segment parameters from gait.
@@ -36,6 +34,7 @@ all segments out, with a motion that they and the forces explain.
 [bold]In which order[/]
 
 kinertia demo                 see it work, on a synthetic person
+kinertia demo --measured      see it work, on a measured walk
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
@@ -63,8 +62,6 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 
 Results go to standard output, progress and errors to standard error.
 """
-_MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
-_STAGES = ("literature", "corrected", "estimate")
 
 app = typer.Typer(
     name="kinertia",
@@ -159,8 +156,8 @@ def fit(
     result = _run(wanted)
     folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
     judged = verdicts(result)
-    _report(result)
-    _report_verdicts(judged, result, verbose)
+    report_fit(result)
+    report_verdicts(judged, result, verbose)
     out.print(f"results in {folder}", soft_wrap=True)
     raise typer.Exit(int(stands_against(judged)))
 
@@ -235,96 +232,6 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
 def _run(wanted: SubjectFile) -> Fit:
     with shown_progress() as progress:
         return fit_subject(wanted, progress)
-
-
-def _report(fit: Fit) -> None:
-    told = summary(fit)
-    subject, mass = told["subject"], told["total_mass_kg"]
-    height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
-    person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
-    out.print(f"\n{subject['name']}: {person}; method {told['method']}; {fit.notes[0]}")
-    for trial in told["trials"]:
-        _report_trial(trial, _before(fit))
-    out.print(_bsp_table(fit))
-    if fit.posterior is not None:
-        out.print(
-            "** measured by the data, * informed by them, no mark: little information; the value is essentially the "
-            "prior; sd: error bar\n"
-        )
-    named = {"measured": "stated", "literature": _before(fit)}
-    masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
-    out.print(f"total mass (kg): {masses}\n")
-    for warning in fit.warnings:
-        out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
-
-
-def _report_verdicts(judged: Sequence[Verdict], fit: Fit, verbose: bool) -> None:
-    """The verdicts, of which the passed ones and the assumptions are details."""
-    show_verdicts(verdict for verdict in judged if verbose or verdict.level != "pass")
-    if not verbose:
-        passed = sum(verdict.level == "pass" for verdict in judged)
-        out.print(f"pass: {passed} of {len(judged)} checks (--verbose shows them)")
-        return
-    for note in fit.notes:
-        out.print(f"assumed: {note}")
-    for trial in fit.trials:
-        spent = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in trial.seconds.items())
-        out.print(f"{trial.name}: seconds: {spent}")
-
-
-def _before(fit: Fit) -> str:
-    """What the parameters before the estimate are called: an OpenSim model brings its own."""
-    return "literature" if fit.file is None else "model"
-
-
-def _report_trial(trial: dict[str, Any], before: str) -> None:
-    first, last = trial["window_s"]
-    markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
-    out.print(
-        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used, {trial['n_dynamic_frames']} of "
-        f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
-        f"{markers['final']} (estimate)"
-    )
-    hz = {**dict.fromkeys(_STAGES, trial["cutoff_hz"]), "estimate": trial["motion_hz"]}
-    title = "residual at the pelvis, RMS (max),\nforces at the motion's bandwidth"
-    names = {stage: before if stage == "literature" else stage for stage in _STAGES}
-    table = plain_table(title, *(f"{name}\n{hz[stage]:.3g} Hz" for stage, name in names.items()))
-    for kind, unit in (("force", "N"), ("moment", "Nm")):
-        rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
-        table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
-    out.print(table)
-    sizes = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
-    full = [f"{trial[f'full_residual_{size}']['estimate']:.1f}" for size in sizes]
-    out.print(
-        " estimate with forces at full bandwidth (what OpenSim finds on these files):\n"
-        f" force {full[0]} ({full[1]}) N, moment {full[2]} ({full[3]}) N m"
-    )
-
-
-def _bsp_table(fit: Fit) -> Table:
-    """Two rows per segment, three with error bars; where left mirrors right, the right side stands for both."""
-    table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
-    for i, segment in enumerate(fit.literature.segments):
-        if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
-            continue
-        for source, bsp in ((_before(fit), fit.literature), ("estimate", fit.estimate)):
-            com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
-            inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
-            cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
-            if source == "estimate" and fit.posterior is not None:
-                cells = [
-                    cell + _MARKS[evidence(a)] for cell, a in zip(cells, fit.posterior.information[i], strict=False)
-                ]
-            table.add_row(segment, source, *cells)
-            segment = ""
-        if fit.posterior is not None and not fit.posterior.prior_sd[i].any():
-            table.add_row("", "sd", "kept")
-        elif fit.posterior is not None:
-            sd = fit.posterior.sd[i]
-            table.add_row(
-                "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
-            )
-    return table
 
 
 for _entry in (demo, init, check, fit, crossval, plan):

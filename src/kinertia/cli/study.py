@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import numpy as np
 import typer
 
+from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.demo import Demo, run_demo
+from kinertia.cli.fit_report import report_fit, report_verdicts
+from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
@@ -25,20 +28,55 @@ Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whateve
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
 
 
-def demo(output: Output = Path("out"), force: Force = False, quiet: Quiet = False) -> None:
+def demo(
+    measured: Annotated[
+        bool, typer.Option("--measured", help="Fit a measured walk, which comes with Kinertia, instead.")
+    ] = False,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
     """Show what Kinertia does; needs no files.
 
     A synthetic person walks through a synthetic laboratory; Kinertia then estimates from its files and compares the
     estimate with the truth.
 
-    [bold]Example[/]
+    With --measured it is a real person in a real laboratory: results, report
+    and exit status are those of kinertia fit. Nobody knows the truth.
+
+    [bold]Examples[/]
 
     kinertia demo -o out
+
+    kinertia demo --measured -o out
     """
     results_folder(output, force)
+    if measured:
+        _measured_demo(output)
     with shown_progress() as progress:
         result = run_demo(output, progress=progress)
     _report_demo(result, output)
+
+
+def _measured_demo(folder: Path) -> NoReturn:
+    with shown_progress() as progress:
+        fit = run_measured_demo(folder, progress)
+    judged = verdicts(fit)
+    out.print(
+        "\nA measured walk, of which nobody knows the truth: a patient of a gait laboratory, with cerebral palsy, who "
+        "walked over two force plates with the markers of Plug-in Gait. From "
+        "https://github.com/mitkof6/opensim_automated_pipeline, copyright 2021 Dimitar Stanev, Apache License 2.0; "
+        "README.txt beside the files says what was cut."
+    )
+    report_fit(fit)
+    report_verdicts(judged, fit, verbose=False, elsewhere="report.html has them all")
+    lab = folder / "lab"
+    out.print(
+        f"results in {folder}, the laboratory's files in {lab}\n"
+        f"to see what the files are like: kinertia check {lab / 'subject.toml'}",
+        soft_wrap=True,
+    )
+    raise typer.Exit(int(stands_against(judged)))
 
 
 def _report_demo(result: Demo, folder: Path) -> None:

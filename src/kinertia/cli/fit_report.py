@@ -1,0 +1,111 @@
+"""What a fit says on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from kinertia.checks.verdict import Verdict
+from kinertia.cli.terminal import out, plain_table, show_verdicts
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.result import Fit
+from kinertia.report.files import summary
+
+_MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
+_STAGES = ("literature", "corrected", "estimate")
+
+
+def report_fit(fit: Fit) -> None:
+    """Who and how, residuals of every trial, the table of segments, masses and warnings."""
+    told = summary(fit)
+    subject, mass = told["subject"], told["total_mass_kg"]
+    height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
+    person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
+    out.print(f"\n{subject['name']}: {person}; method {told['method']}; {fit.notes[0]}")
+    for trial in told["trials"]:
+        _report_trial(trial, _before(fit))
+    out.print(_bsp_table(fit))
+    if fit.posterior is not None:
+        out.print(
+            "** measured by the data, * informed by them, no mark: little information; the value is essentially the "
+            "prior; sd: error bar\n"
+        )
+    named = {"measured": "stated", "literature": _before(fit)}
+    masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
+    out.print(f"total mass (kg): {masses}\n")
+    for warning in fit.warnings:
+        out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
+
+
+def report_verdicts(
+    judged: Sequence[Verdict], fit: Fit, verbose: bool, elsewhere: str = "--verbose shows them"
+) -> None:
+    """The verdicts, of which the passed ones and the assumptions are details; `elsewhere` says where to find these."""
+    show_verdicts(verdict for verdict in judged if verbose or verdict.level != "pass")
+    if not verbose:
+        passed = sum(verdict.level == "pass" for verdict in judged)
+        out.print(f"pass: {passed} of {len(judged)} checks ({elsewhere})")
+        return
+    for note in fit.notes:
+        out.print(f"assumed: {note}")
+    for trial in fit.trials:
+        spent = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in trial.seconds.items())
+        out.print(f"{trial.name}: seconds: {spent}")
+
+
+def _before(fit: Fit) -> str:
+    """What the parameters before the estimate are called: an OpenSim model brings its own."""
+    return "literature" if fit.file is None else "model"
+
+
+def _report_trial(trial: dict[str, Any], before: str) -> None:
+    first, last = trial["window_s"]
+    markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
+    out.print(
+        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used, {trial['n_dynamic_frames']} of "
+        f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
+        f"{markers['final']} (estimate)"
+    )
+    hz = {**dict.fromkeys(_STAGES, trial["cutoff_hz"]), "estimate": trial["motion_hz"]}
+    title = "residual at the pelvis, RMS (max),\nforces at the motion's bandwidth"
+    names = {stage: before if stage == "literature" else stage for stage in _STAGES}
+    table = plain_table(title, *(f"{name}\n{hz[stage]:.3g} Hz" for stage, name in names.items()))
+    for kind, unit in (("force", "N"), ("moment", "Nm")):
+        rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
+        table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
+    out.print(table)
+    sizes = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
+    full = [f"{trial[f'full_residual_{size}']['estimate']:.1f}" for size in sizes]
+    out.print(
+        " estimate with forces at full bandwidth (what OpenSim finds on these files):\n"
+        f" force {full[0]} ({full[1]}) N, moment {full[2]} ({full[3]}) N m"
+    )
+
+
+def _bsp_table(fit: Fit) -> Table:
+    """Two rows per segment, three with error bars; where left mirrors right, the right side stands for both."""
+    table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
+    for i, segment in enumerate(fit.literature.segments):
+        if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
+            continue
+        for source, bsp in ((_before(fit), fit.literature), ("estimate", fit.estimate)):
+            com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
+            inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
+            cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
+            if source == "estimate" and fit.posterior is not None:
+                cells = [
+                    cell + _MARKS[evidence(a)] for cell, a in zip(cells, fit.posterior.information[i], strict=False)
+                ]
+            table.add_row(segment, source, *cells)
+            segment = ""
+        if fit.posterior is not None and not fit.posterior.prior_sd[i].any():
+            table.add_row("", "sd", "kept")
+        elif fit.posterior is not None:
+            sd = fit.posterior.sd[i]
+            table.add_row(
+                "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
+            )
+    return table
