@@ -106,8 +106,8 @@ scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laborator
 *Bound*: the Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model.
 *Better*: people for whom the RMS error is below the literature's, and in brackets the share for whom that of an
 estimate at the bound would be. *Measured*, *informed* and *assumed*: parameters of all kinds, in prior SDs.
-Skin, skeleton and instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is explained in [error
-bars](error-bars.md).
+Skin, skeleton and instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar
+means is explained in [error bars](error-bars.md).
 
 {sections["error_bars"]}
 
