@@ -80,7 +80,7 @@ def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
         assert f" {rms:.1f} ({top:.1f}) {'N m' if unit == 'Nm' else 'N'}" in text.partition("full bandwidth")[2]
     assert f"{trial['cutoff_hz']:.3g} Hz {trial['cutoff_hz']:.3g} Hz {trial['motion_hz']:.3g} Hz" in text
     assert (
-        f"measured {mass['measured']:.1f}, literature {mass['literature']:.1f}, estimate {mass['estimate']:.1f}" in text
+        f"stated {mass['measured']:.1f}, literature {mass['literature']:.1f}, estimate {mass['estimate']:.1f}" in text
     )
     assert "…" not in text
     for warning in fit.summary["warnings"]:

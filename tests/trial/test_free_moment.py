@@ -186,5 +186,5 @@ def test_a_fit_warns(fit_of, name, warned):
     told = [w for w in fit_of(name).summary["warnings"] if "it should be near zero" in w]
     assert len(told) == int(warned)
     if warned:
-        assert told[0].startswith("subject01_walk1: over whole strides")
+        assert told[0].startswith("subject01_walk1: the mean vertical moment over whole strides")
         assert "the free moments under the feet have the same sign (right +1.0, left +2.5 N m" in told[0]

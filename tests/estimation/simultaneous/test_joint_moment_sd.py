@@ -8,7 +8,7 @@ from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, mo
 from kinertia.estimation.simultaneous.normal_equations import reduced
 from kinertia.estimation.simultaneous.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.solver import _deviations, _eliminated, _step, root_of_covariance
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from small_problem import SWITCH_S, curved_problem, point, small_problem
 from study_bound import dense_band
@@ -36,7 +36,7 @@ def moments(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: 
 
 def prior_information(problem, static: np.ndarray) -> np.ndarray:
     information, places = problem.prior_terms(static)[0], problem.layout.instruments
-    information[places, places] += np.diag(GaussianPriors.of(problem.instruments).precision)
+    information[places, places] += GaussianPrior.of(problem.instruments).precision
     return information
 
 
@@ -116,7 +116,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials, 0.1)
     rng = np.random.default_rng(0)
     here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
-    here = here.under(GaussianPriors.of(pair.instruments), pair.layout.instruments)
+    here = here.under(GaussianPrior.of(pair.instruments), pair.layout.instruments)
     chains, information, right = dense_pair(pair, here)
     covariance = inverse(information)
     found, moment_sd = _deviations(pair, here)

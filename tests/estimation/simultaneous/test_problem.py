@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.problem import MapProblem, Point
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.log_cholesky import nearest_consistent
 from small_problem import curved_problem, point, residuals, small_problem
 from study_bound import dense_band
@@ -117,7 +117,7 @@ def test_prior_information_is_the_derivative_of_its_gradient(problem):
     """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
     static = problem.start_static
     here = problem.at(Point(problem.beginning.coefficients, static, problem.beginning.displaced))
-    instruments, places = GaussianPriors.of(problem.instruments), problem.layout.instruments
+    instruments, places = GaussianPrior.of(problem.instruments), problem.layout.instruments
 
     def under(static):
         at = replace(here, point=replace(here.point, static=static))

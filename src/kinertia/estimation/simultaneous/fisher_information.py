@@ -17,7 +17,7 @@ from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.normal_equations import reduced
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import root_of_covariance
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 
@@ -67,12 +67,12 @@ class Information:
     def _of_instruments(self, rest: np.ndarray) -> np.ndarray:
         """(S, S) information of the instruments' priors where the data, of which the rest tells, show them sound."""
         priors, places = self.problem.instruments, self.problem.layout.instruments
-        found, result = GaussianPriors.of(priors), np.zeros_like(rest)
+        found, result = GaussianPrior.of(priors), np.zeros_like(rest)
         for _ in range(_ROUNDS):
-            result[places, places] = np.diag(found.precision)
+            result[places, places] = found.precision
             covariance = np.linalg.inv(rest + result)[places, places]
             found = found.updated(priors, np.zeros(len(priors)), covariance)
-        result[places, places] = np.diag(found.precision)
+        result[places, places] = found.precision
         return result
 
     def sd(self, trials: Iterable[int]) -> np.ndarray:

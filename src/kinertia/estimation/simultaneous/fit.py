@@ -33,7 +33,7 @@ PLATE_PRIOR = {
 and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
 scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
 the vertical force at 0.3 m, and ten times that (no source)."""
-FLOOR_PRIOR = {"x": SoundOrFaulty(0.0005, 0.006, FAULTY_SHARE), "z": SoundOrFaulty(0.0005, 0.006, FAULTY_SHARE)}
+FLOOR_PRIOR = {"x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE), "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE)}
 """Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
 """Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""

@@ -17,7 +17,7 @@ from kinertia.estimation.simultaneous.marker_terms import marker_terms
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, assemble
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors, SoundOrFaulty
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     dynamic_jacobian,
@@ -170,12 +170,12 @@ class Linearised:
     right: np.ndarray
     cost: float
 
-    def under(self, instruments: GaussianPriors, places: slice) -> Linearised:
-        """The same with these Gaussians for the instruments, which stand at these places of the static unknowns."""
+    def under(self, instruments: GaussianPrior, places: slice) -> Linearised:
+        """The same with this Gaussian for the instruments, which stand at these places of the static unknowns."""
         values = self.point.static[places]
         information, right = self.information.copy(), self.right.copy()
-        information[places, places] += np.diag(instruments.precision)
-        right[places] += instruments.pull - instruments.precision * values
+        information[places, places] += instruments.precision
+        right[places] += instruments.pull - instruments.precision @ values
         return replace(self, information=information, right=right, cost=self.cost + instruments.cost(values))
 
 

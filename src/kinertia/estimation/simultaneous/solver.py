@@ -2,11 +2,11 @@
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
-how far they are from these in each of several trials (`displacement`), what is wrong with each plate
-(`instruments.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
+how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate
+(`plates.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
 deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are Gaussians
 that change with what the data say of them (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives
-analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_band`); its Schur
+analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur
 complement is the information on them, and its inverse their covariance.
 """
 
@@ -23,7 +23,7 @@ from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
 from kinertia.estimation.simultaneous.normal_equations import Reduced, reduced
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPriors
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.model.skeleton import Skeleton
@@ -89,7 +89,7 @@ def estimate_simultaneous(
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
-    instruments = GaussianPriors.of(problem.instruments)
+    instruments = GaussianPrior.of(problem.instruments)
     here = problem.at(problem.beginning)
     begin, damping, iterations, converged = here.cost, _FIRST_DAMPING, 0, False
     scale = np.zeros(problem.layout.size)
@@ -111,10 +111,8 @@ def estimate_simultaneous(
     return _result(problem, here.point, covariance, moment_sd, converged, iterations, (begin, under.cost))
 
 
-def _judged(
-    problem: MapProblem, here: Linearised, eliminated: Eliminated, instruments: GaussianPriors
-) -> GaussianPriors:
-    """Gaussians for the instruments that fit what the data say of them at this point."""
+def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instruments: GaussianPrior) -> GaussianPrior:
+    """The Gaussian for the instruments that fits what the data say of them at this point."""
     places = problem.layout.instruments
     under = here.under(instruments, places)
     information = under.information + sum(each.information for each in eliminated.displaced)
