@@ -16,6 +16,7 @@ from rich.console import Console
 
 from command_line import fitted, run
 from kinertia.checks.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
+from kinertia.cli.fit_report import report_fit
 from kinertia.cli import app as cli
 from kinertia.cli import terminal
 from walks import fit_arguments
@@ -192,7 +193,7 @@ def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
     prior_sd[-1] = sd[-1] = 0.0
     posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
     with terminal.out.capture() as captured:
-        cli._report(replace(fit, posterior=posterior, file=SimpleNamespace()))
+        report_fit(replace(fit, posterior=posterior, file=SimpleNamespace()))
     shown = captured.get()
     assert "literature" not in shown.replace("from the literature", "")
     assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)
