@@ -319,9 +319,11 @@ At heel strike the ground reaction rises within a few hundredths of a second. Th
 but markers on skin do not show that, and what they show of it the filter of the motion takes away. Inverse dynamics
 sees a fast force without the acceleration that goes with it and puts the difference into the joint moments, most at the
 knee and the hip, less at the ankle, where little mass lies below the joint (Bisseling and Hof 2006, Journal of
-Biomechanics 39:2438). Both programs use forces faster than their motion, so both show it. A spike that is over 60 ms
-after heel strike is therefore not a moment of muscles: do not read peak moments or loading rates from it. Low-passing
-the forces like the motion removes the spike, and flattens the true moments with it.
+Biomechanics 39:2438). OpenSim's pipeline takes the forces as measured and shows it. Kinertia takes off what of the sum
+of both feet's forces is faster than its motion, where that is more than 1 % of body weight, and keeps what one foot
+passes to the other; `force_cutoff_hz = "none"` in the subject file keeps everything. A spike that is over 60 ms after
+heel strike is not a moment of muscles: do not read peak moments or loading rates from it. Low-passing the forces like
+the motion removes the spike, and flattens the true moments with it.
 """
 
 

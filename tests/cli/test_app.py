@@ -16,9 +16,8 @@ from rich.console import Console
 
 from command_line import fitted, run
 from kinertia.checks.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
-from kinertia.cli.fit_report import report_fit
-from kinertia.cli import app as cli
 from kinertia.cli import terminal
+from kinertia.cli.fit_report import report_fit
 from walks import fit_arguments
 
 

@@ -6,8 +6,8 @@ how far they are from these in each of several trials (`marker_offsets`), what i
 (`plates.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
 deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are Gaussians
 that change with what the data say of them (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives
-analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur
-complement is the information on them, and its inverse their covariance.
+analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its
+Schur complement is the information on them, and its inverse their covariance.
 """
 
 from __future__ import annotations
