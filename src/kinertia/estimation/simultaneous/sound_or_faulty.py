@@ -101,7 +101,8 @@ class GaussianPrior:
 
 def _components(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
     """Variances (n, k) and chances (n,) of the likeliest ways to be sound or faulty: all, or those of few faults."""
-    variances, chances = [], []
+    variances: list[np.ndarray] = []
+    chances: list[float] = []
     uncertain = [i for i, prior in enumerate(priors) if prior.faulty_share > 0.0]
     sound = np.array([prior.sound_sd for prior in priors])
     faulty = np.array([prior.faulty_sd for prior in priors])
