@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import binary_propagation
 
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, nearest_samples
 
 LONGEST_TAIL_S = 0.03
@@ -49,8 +50,7 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     stands_out = force[:, 1] > max(offset_n + _ABOVE_NOISE * noise_n, _LEAST_TAIL_N)
     near = np.abs(time - time[nearest]) <= LONGEST_TAIL_S
     tail = binary_propagation(loaded, mask=loaded | (stands_out & near)) & ~loaded
-    point = np.zeros_like(force)
-    point[:, 0], point[:, 2] = moment[nearest, 2] / force[nearest, 1], -moment[nearest, 0] / force[nearest, 1]
+    point = centre_of_pressure(np.concatenate([force, moment], axis=1)[nearest])
     moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))
     return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n)
 
