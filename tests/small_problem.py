@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
@@ -20,6 +19,7 @@ from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
+from pinocchio_model import axis_forces, pinocchio_model
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
@@ -133,11 +133,9 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
         loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])
         loads[i, foot, 4] += free_moment * loads[i, foot, 1]
         loads[i, foot] *= 1.0 + gain
-    reaction = np.einsum("nij,ni->nj", pose.jacobian[:, :, :6], loads.sum(axis=1))
-    loaded = skeleton.model_with(problem.bsp(static))
-    data = loaded.createData()
-    axes = zip(*skeleton.map.motion(q, qd, qdd), strict=True)
-    left = np.array([pin.rnea(loaded, data, *rows)[:6] for rows in axes]) - reaction
+    forces = axis_forces(pinocchio_model(skeleton, problem.bsp(static)), skeleton.map.motion(q, qd, qdd))
+    load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
+    left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
     moved = (coefficients - problem.bases[k].fit(trial.q)) / COEFFICIENT_SD
     return np.concatenate([errors, left[trial.dynamic].ravel(), moved.ravel()])

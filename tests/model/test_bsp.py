@@ -2,13 +2,13 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pandas as pd
-import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, combine
+from pinocchio_model import pin
 
 STUDY_SEGMENTS = (
     *("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "thigh_l", "shank_l", "foot_l"),

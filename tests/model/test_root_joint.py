@@ -65,24 +65,24 @@ def test_axes_and_centre_are_those_of_the_motion(root, q):
             np.testing.assert_allclose(fixed, np.tile(centre[row], (2, 1)), atol=1e-9)
 
 
-def test_a_load_and_its_generalised_forces_do_the_same_work(root, q):
+def test_a_load_about_the_centre_does_the_same_work(root, q):
     rng = np.random.default_rng(1)
     load, rates = rng.normal(size=(9, 6)), rng.normal(size=(9, 6))
-    tau = root.generalised(q, load)
-    np.testing.assert_allclose(root.load(q, tau), load, atol=1e-9)
+    about = root.about_centre(q, load)
     velocity = rates[:, :3] @ (root.rotation @ root.slides).T
     omega = np.einsum("nij,nj->ni", root.axes(q), rates[:, 3:])
-    work = (load[:, :3] * velocity + load[:, 3:] * omega).sum(axis=1)
-    np.testing.assert_allclose((tau * rates).sum(axis=1), work)
+    work = (about[:, :3] * velocity + about[:, 3:] * omega).sum(axis=1)
+    at_origin = velocity - np.cross(omega, root.centre(q))
+    np.testing.assert_allclose((load[:, :3] * at_origin + load[:, 3:] * omega).sum(axis=1), work)
 
 
-def test_derivative_of_the_ground_load(root, q):
-    wrench = np.random.default_rng(2).normal(size=(9, 6))
-    found = root.ground_load_derivative(q, wrench)
+def test_what_the_centre_adds_to_a_load_when_it_moves(root, q):
+    load = np.random.default_rng(2).normal(size=(9, 6))
+    found = root.centre_moves(load)
     h = 1e-6
-    for k in range(6):
-        ahead, behind = (root.ground_load_to_generalised(q + s * h * np.eye(6)[k], wrench) for s in (1, -1))
-        np.testing.assert_allclose(found[:, :, k], (ahead - behind) / (2 * h), atol=1e-7)
+    for k in range(3):
+        ahead, behind = (root.about_centre(q + s * h * np.eye(6)[k], load) for s in (1, -1))
+        np.testing.assert_allclose(-found[:, :, k], ((ahead - behind) / (2 * h))[:, 3:], atol=1e-7)
 
 
 def test_the_twin_of_an_orientation_is_turned_back(root, q):

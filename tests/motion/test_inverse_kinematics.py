@@ -11,7 +11,7 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import build_gait27
-from kinertia.motion.inverse_kinematics import _STEP_TOLERANCE, ancestor_of, normal_equations, solve_ik
+from kinertia.motion.inverse_kinematics import _STEP_TOLERANCE, normal_equations, solve_ik
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim
 
@@ -64,7 +64,7 @@ def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
     q = random_coordinates(skeleton, 3)
     measured = without(noisy(markers_of(skeleton, q), 0.02), ["R.Heel", "Top.Head"], slice(1, 2)).positions
     pose = skeleton.pose(q + 0.05)
-    normal, gradient, cost = normal_equations(skeleton, ancestor_of(skeleton), measured, pose)
+    normal, gradient, cost = normal_equations(skeleton, measured, pose)
     jacobian = marker_jacobian(skeleton, pose, skeleton.marker_positions(pose))
     difference = measured - skeleton.marker_positions(pose)
     for k in range(3):

@@ -212,7 +212,8 @@ def _step(
 
 def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
     """(n, m, 3, c): velocity of every marker, at these positions (n, m, 3) m, for each coordinate at unit rate."""
-    linear, angular = pose.jacobian[:, None, :3], pose.jacobian[:, None, 3:]
+    columns = pose.axes.transpose(0, 2, 1)
+    linear, angular = columns[:, None, :3], columns[:, None, 3:]
     turning = np.cross(angular, positions[..., None], axis=2)
     by_axes = (linear + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
     return skeleton.map.to_coordinates(by_axes, pose.slopes)

@@ -194,9 +194,9 @@ def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, Bo
     """
     mass = dict(zip(own.segments, own.mass_kg, strict=True))
     groups: dict[int, list[str]] = {}
-    carriers, _ = skeleton.placement_of_parameters(own.segments)
-    for name, carrier in zip(own.segments, carriers.tolist(), strict=True):
-        groups.setdefault(carrier, []).append(name)
+    carrier_of = dict(zip(skeleton.segments, skeleton.tree.carrier.tolist(), strict=True))
+    for name in own.segments:
+        groups.setdefault(carrier_of[name], []).append(name)
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
     chosen = {max(names, key=mass.__getitem__) for names in heavy}
     estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))

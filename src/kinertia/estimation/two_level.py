@@ -130,7 +130,7 @@ class TwoLevelResult:
 
 def correct_pelvis(skeleton: Skeleton, bsp: BodySegmentParameters, window: Window) -> Motion:
     """Inner level: the motion with the pelvis that equation (2) asks for, nearest to the measured pelvis."""
-    acceleration, _ = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
+    acceleration = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
     position, velocity = window.integration.track(acceleration, window.motion.q[:, :6])
     return window.motion.with_root(position, velocity, acceleration)
 
@@ -239,8 +239,9 @@ def _minimise_freely(
 def _radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:
     first = windows[0]
     one = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
-    _, mass = consistent_root_acceleration(skeleton, bsp, one, first.wrench[:1])
-    return float(np.sqrt(np.trace(mass[0, 3:, 3:]) / 3 / mass[0, 0, 0]))
+    mass = root_derivatives(skeleton, bsp, one, first.wrench[:1]).qdd[0]
+    about_axes = skeleton.root.axes(one.q)[0].T @ mass[3:, 3:]
+    return float(np.sqrt(np.trace(about_axes) / 3 / np.linalg.norm(mass[:3, 0])))
 
 
 @dataclass(frozen=True)
@@ -279,7 +280,7 @@ class TwoLevelProblem:
         if not self.correct:
             uncorrected: np.ndarray = root_regressor(self.skeleton, bsp.segments, window.motion) @ change
             return uncorrected
-        acceleration, _ = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
+        acceleration = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
         measured = window.motion
         balanced = measured.with_root(measured.q[:, :6], measured.qd[:, :6], acceleration)
         at_balance = root_derivatives(self.skeleton, bsp, balanced, window.wrench)

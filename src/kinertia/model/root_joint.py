@@ -53,46 +53,14 @@ class Root:
         about_3 = c2 * (c1 * third + s1 * np.cross(first, third)) + s2 * along * first
         return np.stack([np.broadcast_to(first, about_2.shape), about_2, about_3], axis=-1)
 
-    def load(self, q: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """Generalised forces (n, 6) or (n, 6, k) as force and moment about the centre, ground axes."""
-        columns = tau if tau.ndim == 3 else tau[..., None]
-        moment = np.linalg.solve(self.axes(q).transpose(0, 2, 1), columns[:, 3:])
-        load = np.concatenate([self._slides @ columns[:, :3], moment], axis=1)
-        return load if tau.ndim == 3 else load[..., 0]
-
-    def generalised(self, q: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """The inverse of `load`, (n, 6)."""
-        turned = np.einsum("nij,ni->nj", self.axes(q), load[:, 3:])
-        return np.concatenate([load[:, :3] @ self._slides, turned], axis=1)
-
-    def ground_load(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-        """Sum of ground reactions (n, 6: force, moment about the ground origin) taken about the centre."""
-        force, moment = wrench[:, :3], wrench[:, 3:]
+    def about_centre(self, q: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Load (n, 6: force, moment about the ground origin) taken about the centre."""
+        force, moment = load[:, :3], load[:, 3:]
         return np.concatenate([force, moment - np.cross(self.centre(q), force)], axis=1)
 
-    def ground_load_to_generalised(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-        """Generalised force (n, 6) of ground reactions (n, 6: force, moment about the ground origin)."""
-        return self.generalised(q, self.ground_load(q, wrench))
-
-    def ground_load_derivative(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-        """(n, 6, 6) derivative of `ground_load_to_generalised` by the root coordinates."""
-        axes = self.axes(q)
-        moment = self.ground_load(q, wrench)[:, 3:]
-        result = np.zeros((len(q), 6, 6))
-        for i, direction in enumerate(self._slides.T):
-            result[:, 3:, i] = -np.einsum("nij,ni->nj", axes, np.cross(direction, wrench[:, :3]))
-        result[:, 3:, 3:] = self.turning(axes, moment)
-        return result
-
-    @staticmethod
-    def turning(axes: np.ndarray, moment: np.ndarray) -> np.ndarray:
-        """(n, 3, 3) derivative of axes^T moment by the three angles at constant moment: each turns those after it."""
-        result = np.zeros((len(axes), 3, 3))
-        for later in range(3):
-            for earlier in range(later):
-                turned = np.cross(axes[:, :, earlier], axes[:, :, later])
-                result[:, later, earlier] = np.einsum("ni,ni->n", turned, moment)
-        return result
+    def centre_moves(self, load: np.ndarray) -> np.ndarray:
+        """(n, 3, 3) d x force of a load (n, 6), one column for each direction d that a translation moves the centre."""
+        return np.stack([np.cross(direction, load[:, :3]) for direction in self._slides.T], axis=-1)
 
     def coordinates(self, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
         """(n, 6) root coordinates that place the root segment at these rotations (n, 3, 3) and translations (n, 3)."""

@@ -1,13 +1,13 @@
-"""`Skeleton`: segments, joints, coordinates and markers, as a Pinocchio model.
+"""`Skeleton`: segments, joints, coordinates and markers, and the kinematic tree they are.
 
 A joint places its child segment in its parent by a constant placement followed by a list of single axes, each a
 rotation about or a translation along a fixed direction. Every axis follows one coordinate and
-becomes one 1-DOF Pinocchio joint, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are
+becomes one axis of the tree, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are
 constants: they are folded into the placements, which is how a calibrated joint-centre offset (a coordinate that
 does not move in time) or an arm rotation that no marker shows enters the model.
 
 In the 27-DOF model an axis is its coordinate. In an OpenSim model it may be a function of it, and several may follow
-the same one: `Skeleton.map` goes from coordinates to axes and back. Pinocchio sees axes only.
+the same one: `Skeleton.map` goes from coordinates to axes and back. The tree (`KinematicTree`) knows axes only.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from kinertia.model.axis_functions import AxisFunction
-from kinertia.model.bsp import BodySegmentParameters, inertia_of, second_moments
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_map import CoordinateMap
+from kinertia.model.kinematic_tree import KinematicTree, poses
+from kinertia.model.moved_parameters import moved_parameters
 from kinertia.model.root_joint import Root
 
 GRAVITY_M_S2 = 9.80665
@@ -71,25 +73,25 @@ class Marker:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where everything is at n frames, from one Pinocchio pass per frame.
+    """Where everything is at n frames.
 
     Attributes:
         rotation: (n, s, 3, 3) segment frames in ground.
         translation: (n, s, 3) m, segment origins in ground.
-        jacobian: (n, 6, a): column j is the spatial velocity in ground axes, at the ground origin, that axis j at
-            unit rate gives to what it moves: linear first, then angular.
+        axes: (n, a, 6) the spatial velocity in ground axes, at the ground origin, that each axis at unit rate gives to
+            what it moves: linear first, then angular.
         slopes: (n, a) derivatives of the axes by their coordinates; None where axes are coordinates.
     """
 
     rotation: np.ndarray
     translation: np.ndarray
-    jacobian: np.ndarray
+    axes: np.ndarray
     slopes: np.ndarray | None
 
     def cut(self, frames: slice | np.ndarray) -> Pose:
         """The pose at these frames."""
         slopes = None if self.slopes is None else self.slopes[frames]
-        return Pose(self.rotation[frames], self.translation[frames], self.jacobian[frames], slopes)
+        return Pose(self.rotation[frames], self.translation[frames], self.axes[frames], slopes)
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class Skeleton:
         gravity_m_s2: downward, along -y.
         feet: the segments that the ground acts on, right and left.
         start: coordinates from which inverse kinematics starts elsewhere than from zero (rad or m).
-        carried: parameters of segments that are given once and for all; `model_with` adds others to them.
+        carried: parameters of segments that are given once and for all; `bodies` adds others to them.
 
     Examples:
         >>> skeleton = kinertia.walking_subject().skeleton
@@ -150,7 +152,7 @@ class Skeleton:
 
     @cached_property
     def map(self) -> CoordinateMap:
-        """From the coordinates to the axes of the Pinocchio model."""
+        """From the coordinates to the axes of the tree."""
         moving = [axis for axis in self._axes if axis.coordinate not in self.locked]
         followed, functions = [axis.coordinate for axis in moving], [axis.function for axis in moving]
         return CoordinateMap.of(self.coordinates, followed, functions)
@@ -199,39 +201,54 @@ class Skeleton:
             raise KeyError(f"no such coordinate in {self.name}: {', '.join(sorted(unknown))}")
 
     @cached_property
-    def _built(self) -> tuple[pin.Model, dict[str, int], dict[str, pin.SE3]]:
-        """Pinocchio model without masses, the joint that carries each segment, and each segment's place in it."""
-        model = pin.Model()
-        model.gravity.linear = np.array([0.0, -self.gravity_m_s2, 0.0])
-        carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
+    def tree(self) -> KinematicTree:
+        """The moving axes and the segments as arrays; locked axes are part of the places."""
+        parents, kinds, directions, places = [], [], [], []
+        carrier, offset = {"ground": -1}, {"ground": np.eye(4)}
         for joint in self.joints:
             parent = carrier[joint.parent]
-            place = offset[joint.parent] * pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
+            place = offset[joint.parent] @ placed(joint.rotation, joint.translation)
             for axis in joint.axes:
                 if axis.coordinate in self.locked:
-                    place = place * placed_by(axis, self.locked[axis.coordinate])
+                    place = place @ placed_by(axis, self.locked[axis.coordinate])
                     continue
-                parent = model.addJoint(parent, _pinocchio_joint(axis), place, f"{axis.coordinate}:{model.njoints}")
-                place = pin.SE3.Identity()
-            far = pin.SE3(np.asarray(joint.child_rotation), np.asarray(joint.child_translation))
-            carrier[joint.child], offset[joint.child] = parent, place * far.inverse()
-        return model, carrier, offset
-
-    @property
-    def model(self) -> pin.Model:
-        """The Pinocchio model, without masses."""
-        return self._built[0]
+                parents.append(parent)
+                kinds.append(axis.kind == "translation")
+                directions.append(axis.direction)
+                places.append(place)
+                parent, place = len(parents) - 1, np.eye(4)
+            carrier[joint.child] = parent
+            offset[joint.child] = place @ inverse(placed(joint.child_rotation, joint.child_translation))
+        at = np.array(places).reshape(-1, 4, 4)
+        segments = np.array([offset[segment] for segment in self.segments])
+        return KinematicTree(
+            np.array(parents, dtype=np.int64),
+            np.array(kinds, dtype=np.bool_),
+            np.array(directions, dtype=float).reshape(-1, 3),
+            np.ascontiguousarray(at[:, :3, :3]),
+            np.ascontiguousarray(at[:, :3, 3]),
+            np.array([carrier[segment] for segment in self.segments], dtype=np.int64),
+            np.ascontiguousarray(segments[:, :3, :3]),
+            np.ascontiguousarray(segments[:, :3, 3]),
+        )
 
     @cached_property
     def support(self) -> np.ndarray:
         """(s, a) True where axis a moves segment s."""
-        model, carrier, _ = self._built
-        moves = np.zeros((len(self.segments), model.nv), dtype=bool)
-        for i, segment in enumerate(self.segments):
-            for joint in model.supports[carrier[segment]]:
-                if joint > 0:
-                    moves[i, joint - 1] = True
-        return moves
+        carrier = self.tree.carrier
+        carried = np.vstack([self.above.T, np.zeros((1, len(self.above)), dtype=bool)])
+        result: np.ndarray = carried[carrier]  # the last row is that of segments which no axis carries
+        return result
+
+    @cached_property
+    def above(self) -> np.ndarray:
+        """(a, a) True where axis i is axis j or moves it (parents come first, so this is upper triangular)."""
+        count = len(self.tree.parent)
+        above = np.eye(count, dtype=bool)
+        for j, parent in enumerate(self.tree.parent):
+            if parent >= 0:
+                above[:, j] |= above[:, parent]
+        return above
 
     @cached_property
     def marker_segments(self) -> np.ndarray:
@@ -250,22 +267,8 @@ class Skeleton:
         return tuple(marker.label for marker in self.markers)
 
     def pose(self, q: np.ndarray) -> Pose:
-        """Segment frames and Jacobian at the coordinates q (n, c)."""
-        model, carrier, offset = self._built
-        data = model.createData()
-        at = self.map.axes(q)
-        n, s = len(q), len(self.segments)
-        # these arrays are Pinocchio's own memory: every pass fills them anew
-        frames = [data.oMi[carrier[segment]] for segment in self.segments]
-        turns, places, columns = [f.rotation for f in frames], [f.translation for f in frames], data.J
-        rotation, translation, jacobian = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty((n, 6, model.nv))
-        for k in range(n):
-            pin.computeJointJacobians(model, data, at[k])
-            rotation[k], translation[k], jacobian[k] = turns, places, columns
-        turned = np.array([offset[segment].rotation for segment in self.segments])
-        moved = np.array([offset[segment].translation for segment in self.segments])
-        translation += (rotation @ moved[..., None])[..., 0]
-        return Pose(rotation @ turned, translation, jacobian, self.map.slopes(q))
+        """Segment frames and axes at the coordinates q (n, c)."""
+        return Pose(*poses(self.tree, np.ascontiguousarray(self.map.axes(q), dtype=float)), self.map.slopes(q))
 
     def marker_positions(self, pose: Pose) -> np.ndarray:
         """(n, m, 3) m, model markers in ground at this pose."""
@@ -273,93 +276,42 @@ class Skeleton:
         result: np.ndarray = turned[..., 0] + pose.translation[:, self.marker_segments]
         return result
 
-    def model_with(self, bsp: BodySegmentParameters) -> pin.Model:
-        """A Pinocchio model that carries these body segment parameters, and those of `carried`."""
-        model = self.model.copy()
-        total = np.zeros((model.njoints, 10))
+    def bodies(self, bsp: BodySegmentParameters) -> np.ndarray:
+        """(a, 10) dynamic parameters of all that each axis itself bears, in its frame: these and those of `carried`."""
+        total = np.zeros((len(self.tree.parent), 10))
         for part in (bsp, self.carried):
             if part is not None:
-                joints, place = self.placement_of_parameters(part.segments)
-                np.add.at(total, joints, (place @ part.dynamic_parameters().reshape(-1, 10, 1))[..., 0])
-        for j, parameters in enumerate(total):
-            if parameters[0] != 0.0:  # Pinocchio would divide by it
-                model.inertias[j] = pin.Inertia.FromDynamicParameters(parameters)
-        return model
-
-    def placement_of_parameters(self, segments: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Joint index (s,) that carries each segment, and (s, 10, 10) its dynamic parameters in that joint's frame.
-
-        Linear, so it also serves the regressor: Y_segment = Y_joint @ this.
-        """
-        rows = [self.segments.index(segment) for segment in segments]
-        joints, place = self._parameter_places
-        return joints[rows], place[rows]
+                rows = np.array([self.segments.index(segment) for segment in part.segments])
+                carrier = self.tree.carrier[rows]
+                own = (self._parameter_places[rows] @ part.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
+                np.add.at(total, carrier[carrier >= 0], own[carrier >= 0])
+        return total
 
     @cached_property
-    def _parameter_places(self) -> tuple[np.ndarray, np.ndarray]:
-        _, carrier, offset = self._built
-        joints = np.array([carrier[segment] for segment in self.segments], dtype=int)
-        return joints, _moved_parameters([offset[segment] for segment in self.segments])
+    def _parameter_places(self) -> np.ndarray:
+        """(s, 10, 10) dynamic parameters of each segment to those in its carrier's frame."""
+        tree = self.tree
+        return moved_parameters(np.array([*map(placed, tree.segment_rotation, tree.segment_translation)]))
 
 
-def placed_by(axis: Axis, value: float) -> pin.SE3:
-    """Where an axis puts what follows it when its coordinate has this value (rad or m)."""
+def placed(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
+    """(4, 4) homogeneous transform of a frame at this place."""
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = rotation, translation
+    return result
+
+
+def inverse(place: np.ndarray) -> np.ndarray:
+    """The transform back."""
+    rotation = place[:3, :3].T
+    return placed(rotation, -rotation @ place[:3, 3])
+
+
+def placed_by(axis: Axis, value: float) -> np.ndarray:
+    """(4, 4) where an axis puts what follows it when its coordinate has this value (rad or m)."""
     direction = np.array(axis.direction)
     if axis.function is not None:
         value = float(axis.function(np.array([value]))[0])
     if axis.kind == "translation":
-        return pin.SE3(np.eye(3), direction * value)
-    return pin.SE3(pin.exp3(direction * value), np.zeros(3))
-
-
-_ALIGNED = {
-    ("rotation", (1.0, 0.0, 0.0)): pin.JointModelRX,
-    ("rotation", (0.0, 1.0, 0.0)): pin.JointModelRY,
-    ("rotation", (0.0, 0.0, 1.0)): pin.JointModelRZ,
-    ("translation", (1.0, 0.0, 0.0)): pin.JointModelPX,
-    ("translation", (0.0, 1.0, 0.0)): pin.JointModelPY,
-    ("translation", (0.0, 0.0, 1.0)): pin.JointModelPZ,
-}
-
-
-def _pinocchio_joint(axis: Axis) -> pin.JointModel:
-    aligned = _ALIGNED.get((axis.kind, axis.direction))
-    if aligned is not None:
-        return aligned()
-    unaligned = pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
-    return unaligned(*axis.direction)
-
-
-def _moved_parameters(places: Sequence[pin.SE3]) -> np.ndarray:
-    """(s, 10, 10) linear maps of dynamic parameters from frames to the one in which they stand at these places.
-
-    The pseudo-inertia of a body moves as J' = T J T^T (Wensing, Kim and Slotine 2018); the parameters are linear in J.
-    """
-    transform = np.array([place.homogeneous for place in places])[:, None]
-    moved = transform @ _PSEUDO @ transform.transpose(0, 1, 3, 2)
-    return _from_pseudo(moved).transpose(0, 2, 1)
-
-
-def _unit_pseudo() -> np.ndarray:
-    """(10, 4, 4) pseudo-inertias of dynamic parameters that are one each (mass, first moments, xx xy yy xz yz zz)."""
-    pseudo = np.zeros((10, 4, 4))
-    pseudo[0, 3, 3] = 1.0
-    for axis in range(3):
-        pseudo[1 + axis, axis, 3] = pseudo[1 + axis, 3, axis] = 1.0
-    for k, (i, j) in enumerate(_INERTIA, start=4):
-        inertia = np.zeros((3, 3))
-        inertia[i, j] = inertia[j, i] = 1.0
-        pseudo[k, :3, :3] = second_moments(inertia)
-    return pseudo
-
-
-def _from_pseudo(pseudo: np.ndarray) -> np.ndarray:
-    """(..., 10) dynamic parameters of pseudo-inertias (..., 4, 4)."""
-    inertia = inertia_of(pseudo[..., :3, :3])
-    rows, columns = zip(*_INERTIA, strict=True)
-    return np.concatenate([pseudo[..., 3, 3:], pseudo[..., :3, 3], inertia[..., rows, columns]], axis=-1)
-
-
-_INERTIA = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Order of the inertia among Pinocchio's dynamic parameters."""
-_PSEUDO = _unit_pseudo()
+        return placed(np.eye(3), direction * value)
+    return placed(Rotation.from_rotvec(direction * value).as_matrix(), np.zeros(3))

@@ -1,24 +1,25 @@
 """Root equations of motion, their regressor and derivatives, and inverse dynamics of all joints.
 
 The root is the pelvis: three translations, then three rotations (`kinertia.model.root_joint`), the free coordinates f;
-all others, p, are prescribed. Of the equations of motion the root rows are
+all others, p, are prescribed. The root equations of motion, taken as force and moment about the pelvis origin in ground
+axes, are
 
-    (1)  P = M_f q_f'' + M_p q_p'' + V(q, q') + G(q) - F      F: generalised force of the ground reactions
+    (1)  P = M_f q_f'' + M_p q_p'' + V(q, q') + G(q) - F      F: the ground reactions
     (2)  q_f''* = M_f^-1 (F - M_p q_p'' - V - G)              the root acceleration that makes P zero
 
-The residual is P: force (N) in ground axes, moment (N m) about the pelvis origin in ground axes.
+The residual is P: force (N) and moment (N m). The loads of the bodies come from `kinertia.motion.rigid_body`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.rigid_body import axis_forces, regressor, root_load
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,34 @@ class RootDerivatives:
     qdd: np.ndarray
 
 
-def _axes(skeleton: Skeleton, motion: Motion) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Place, rate and acceleration of all axes, frame by frame."""
-    return zip(*skeleton.map.motion(motion.q, motion.qd, motion.qdd), strict=True)
+@dataclass(frozen=True)
+class RootLoad:
+    """Load of the whole body about a point, ground axes, and its derivatives by all coordinates.
+
+    Attributes:
+        load: (n, 6) N and N m.
+        q, qd, qdd: (n, 6, c) by the coordinates and their rates; the point stays.
+    """
+
+    load: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+
+
+def axis_motion(skeleton: Skeleton, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, rates and accelerations of all axes, each (n, a), as the compiled functions take them."""
+    x, v, a = skeleton.map.motion(motion.q, motion.qd, motion.qdd)
+    return np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
+
+
+def root_terms(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, about: np.ndarray) -> RootLoad:
+    """Load of the body about the points (n, 3) m, and its derivatives by all coordinates and their rates."""
+    bodies = skeleton.bodies(bsp)
+    state = axis_motion(skeleton, motion)
+    load, by = root_load(skeleton.tree, skeleton.gravity_m_s2, bodies, *state, np.ascontiguousarray(about))
+    parts = skeleton.map.derivatives_to_coordinates((by[0], by[1], by[2]), motion.q, motion.qd, motion.qdd)
+    return RootLoad(load, *parts)
 
 
 def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
@@ -74,57 +100,38 @@ def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wre
         motion: coordinates and derivatives.
         wrench: (n, 6) sum over both feet: force (N), moment about the ground origin (N m).
     """
-    model = skeleton.model_with(bsp)
-    data = model.createData()
-    tau = np.array([pin.rnea(model, data, x, v, a)[:6] for x, v, a in _axes(skeleton, motion)])
-    result: np.ndarray = skeleton.root.load(motion.q, tau) - skeleton.root.ground_load(motion.q, wrench)
-    return result
+    state = axis_motion(skeleton, motion)
+    _, load = axis_forces(skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state)
+    return skeleton.root.about_centre(motion.q, load - wrench)
 
 
 def consistent_root_acceleration(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Root acceleration (n, 6) that zeroes P at the given state, equation (2), and the mass matrices M_ff (n, 6, 6)."""
-    model = skeleton.model_with(bsp)
-    data = model.createData()
-    mass = np.array([pin.crba(model, data, x)[:6, :6] for x in skeleton.map.axes(motion.q)])
-    mass = np.triu(mass) + np.triu(mass, 1).transpose(0, 2, 1)
-    load = residual(skeleton, bsp, motion, wrench)
-    generalised = skeleton.root.generalised(motion.q, load)
-    return motion.qdd[:, :6] - np.linalg.solve(mass, generalised[..., None])[..., 0], mass
+) -> np.ndarray:
+    """Root acceleration (n, 6) that zeroes P at the given state, equation (2)."""
+    left = residual(skeleton, bsp, motion, wrench)
+    mass = root_derivatives(skeleton, bsp, motion, wrench).qdd
+    result: np.ndarray = motion.qdd[:, :6] - np.linalg.solve(mass, left[..., None])[..., 0]
+    return result
 
 
 def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) -> np.ndarray:
     """Y (n, 6, 10 s) with P = Y phi - ground load, phi the dynamic parameters of `segments` in their own frames."""
-    model, data = skeleton.model, skeleton.model.createData()
-    joints, place = skeleton.placement_of_parameters(segments)
-    columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
-    rows = _axes(skeleton, motion)
-    tau = np.array([pin.computeJointTorqueRegressor(model, data, x, v, a)[:6, columns] for x, v, a in rows])
-    by_segment = tau.reshape(len(tau), 6, len(joints), 1, 10) @ place
-    return skeleton.root.load(motion.q, by_segment.reshape(len(tau), 6, -1))
+    about = skeleton.root.centre(motion.q)
+    every = regressor(skeleton.tree, skeleton.gravity_m_s2, *axis_motion(skeleton, motion), about)
+    rows = [skeleton.segments.index(segment) for segment in segments]
+    chosen = every if rows == list(range(len(skeleton.segments))) else every[:, :, rows]
+    return chosen.reshape(len(chosen), 6, 10 * len(rows))
 
 
 def root_derivatives(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> RootDerivatives:
     """Derivatives of P with respect to the root coordinates, velocities and accelerations."""
-    model = skeleton.model_with(bsp)
-    data = model.createData()
-    n = len(motion.q)
-    dq, dv, da = np.empty((n, 6, 6)), np.empty((n, 6, 6)), np.empty((n, 6, 6))
-    tau = np.empty((n, 6))
-    for k, (x, v, a) in enumerate(_axes(skeleton, motion)):
-        pin.computeRNEADerivatives(model, data, x, v, a)
-        tau[k] = data.tau[:6]
-        dq[k], dv[k], da[k] = data.dtau_dq[:6, :6], data.dtau_dv[:6, :6], data.M[:6, :6]
-    da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
-    q, root = motion.q, skeleton.root
-    dq[:, 3:, 3:] -= root.turning(root.axes(q), root.load(q, tau)[:, 3:])
-    dq = root.load(q, dq)
-    for i, direction in enumerate((root.rotation @ root.slides).T):
-        dq[:, 3:, i] += np.cross(direction, wrench[:, :3])
-    return RootDerivatives(dq, root.load(q, dv), root.load(q, da))
+    terms = root_terms(skeleton, bsp, motion, skeleton.root.centre(motion.q))
+    by_q = terms.q[:, :, :6].copy()
+    by_q[:, 3:, :3] -= skeleton.root.centre_moves(terms.load - skeleton.root.about_centre(motion.q, wrench))
+    return RootDerivatives(by_q, terms.qd[:, :, :6], terms.qdd[:, :, :6])
 
 
 def inverse_dynamics(
@@ -141,11 +148,10 @@ def inverse_dynamics(
         foot_loads: (n, f, 6) per foot: force (N), moment about the ground origin (N m), ground axes.
         feet: the segments they act on; the skeleton's feet if None.
     """
-    model = skeleton.model_with(bsp)
-    data = model.createData()
-    tau = np.array([pin.rnea(model, data, x, v, a) for x, v, a in _axes(skeleton, motion)])
+    state = axis_motion(skeleton, motion)
+    tau, _ = axis_forces(skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state)
     pose = skeleton.pose(motion.q)
     for i, foot in enumerate(skeleton.feet if feet is None else feet):
         moves = skeleton.support[skeleton.segments.index(foot)]
-        tau[:, moves] -= np.einsum("nic,ni->nc", pose.jacobian[:, :, moves], foot_loads[:, i])
+        tau[:, moves] -= (pose.axes[:, moves] @ foot_loads[:, i, :, None])[..., 0]
     return skeleton.map.to_coordinates(tau, pose.slopes)

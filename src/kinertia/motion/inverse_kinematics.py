@@ -212,9 +212,8 @@ def _gauss_newton(
     active = np.arange(n)
     normal = np.zeros((n, q.shape[1], q.shape[1]))
     gradient = np.zeros_like(q)
-    above = ancestor_of(model)
     for _ in range(stop.most_steps):
-        h, g, cost = normal_equations(model, above, measured[active], model.pose(q[active]))
+        h, g, cost = normal_equations(model, measured[active], model.pose(q[active]))
         better = cost <= best[active] * (1 + 1e-12)
         up = active[better]
         best[up], accepted[up] = cost[better], q[up]
@@ -241,41 +240,35 @@ def _damped_step(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) 
     return np.linalg.solve(damped, gradient[..., None])[..., 0]
 
 
-def normal_equations(
-    model: Skeleton, above: np.ndarray, measured: np.ndarray, pose: Pose
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
-
-    `above` is the model's `ancestor_of`.
-    """
+def normal_equations(model: Skeleton, measured: np.ndarray, pose: Pose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model."""
     positions = model.marker_positions(pose)
     residual = measured - positions
     seen = np.isfinite(residual).all(axis=-1)
     residual = np.where(seen[..., None], residual, 0.0)
-    normal = gram(model, above, pose, twist_blocks(model, positions, positions, seen.astype(float)))
+    normal = gram(model, pose, twist_blocks(model, positions, positions, seen.astype(float)))
     return normal, marker_forces(model, pose, positions, residual), np.square(residual).sum(axis=(1, 2))
 
 
 def marker_forces(model: Skeleton, pose: Pose, positions: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """(n, c) generalised forces J^T f of forces (n, m, 3) on the markers at these positions (n, m, 3)."""
     wrench = _per_segment(model) @ np.concatenate([forces, np.cross(positions, forces)], axis=-1)
-    columns = pose.jacobian.transpose(0, 2, 1)
+    columns = pose.axes
     return model.map.to_coordinates(np.einsum("ncd,ncd->nc", columns, model.support.T @ wrench), pose.slopes)
 
 
-def gram(model: Skeleton, above: np.ndarray, pose: Pose, blocks: np.ndarray, second: Pose | None = None) -> np.ndarray:
+def gram(model: Skeleton, pose: Pose, blocks: np.ndarray, second: Pose | None = None) -> np.ndarray:
     """(n, c, c) J^T W J' with J of the markers at a pose and J' at a second pose (the same if None).
 
     Args:
         model: the skeleton.
-        above: its `ancestor_of`.
         pose, second: n frames each.
         blocks: (n, s, 6, 6) of `twist_blocks`, symmetric if there is no second pose.
     """
     n, s = blocks.shape[:2]
     carried = (model.support.T.astype(float) @ blocks.reshape(n, s, 36)).reshape(n, model.support.shape[1], 6, 6)
-    columns = pose.jacobian.transpose(0, 2, 1)
-    others = columns if second is None else second.jacobian.transpose(0, 2, 1)
+    columns, above = pose.axes, model.above
+    others = columns if second is None else second.axes
     moved = (carried @ others[..., None])[..., 0]
     product = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
     if second is None:
@@ -312,15 +305,6 @@ def _per_segment(model: Skeleton) -> np.ndarray:
     """(s, m) 1 where the marker is on the segment."""
     result: np.ndarray = (np.arange(len(model.segments))[:, None] == model.marker_segments).astype(float)
     return result
-
-
-def ancestor_of(model: Skeleton) -> np.ndarray:
-    """(a, a) True where axis i is axis j or moves it (parents come first, so this is upper triangular)."""
-    tree = model.model
-    above = np.zeros((tree.nv, tree.nv), dtype=bool)
-    for joint in range(1, tree.njoints):
-        above[[i - 1 for i in tree.supports[joint] if i > 0], joint - 1] = True
-    return above
 
 
 def _skew(v: np.ndarray) -> np.ndarray:

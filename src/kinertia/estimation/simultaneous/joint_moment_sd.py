@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.marker_terms import FRAMES_AT_ONCE
@@ -23,7 +22,9 @@ from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK,
 from kinertia.estimation.simultaneous.problem import MapProblem, by_body
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Pose, Skeleton
+from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.rigid_body import axis_force_derivatives, regressor
 
 _LOST_KNOTS = 2.0
 """Half of the stretch over which it is averaged, in knot intervals: one period of the cutoff."""
@@ -106,27 +107,21 @@ def moment_derivatives(
     trial, layout = problem.trials[k], problem.layout
     skeleton = problem.placed(static)
     q, qd, qdd = motion
-    model = skeleton.model_with(problem.bsp(static))
-    data = model.createData()
-    x, v, a = skeleton.map.motion(q, qd, qdd)
-    d, axes = x.shape
-    dq, dv, da = np.empty((d, axes, axes)), np.empty((d, axes, axes)), np.empty((d, axes, axes))
-    joints, place = skeleton.placement_of_parameters(problem.segments)
-    columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
-    tau, regressor = np.empty((d, axes)), np.empty((d, axes, len(columns)))
-    for i in range(d):
-        pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
-        tau[i], dq[i], dv[i], da[i] = data.tau, data.dtau_dq, data.dtau_dv, data.M
-        regressor[i] = pin.computeJointTorqueRegressor(model, data, x[i], v[i], a[i])[:, columns]
-    da = np.triu(da) + np.triu(da, 1).transpose(0, 2, 1)
+    state = axis_motion(skeleton, Motion(q, qd, qdd))
+    tree, gravity = skeleton.tree, skeleton.gravity_m_s2
+    tau, (dq, dv, da) = axis_force_derivatives(tree, gravity, skeleton.bodies(problem.bsp(static)), *state)
+    (d, axes), chain = tau.shape, dynamic_jacobian(static[layout.theta])
     time = trial.time[frames]
     loads, rates, fast = reactions.at(time), reactions.rate(time), reactions.impact_at(time)
     pose = skeleton.pose(q)
+    rows = [skeleton.segments.index(segment) for segment in problem.segments]
     by_static, impact = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
-    by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
+    shown = by_body(regressor(tree, gravity, *state, np.zeros((d, 3)))[:, :, rows].reshape(d, 6, -1), chain)
+    carried = np.repeat(skeleton.support[rows].T, 10, axis=1)
+    by_static[:, :, layout.theta] = np.where(carried, pose.axes @ shown, 0.0)
     for foot, name in enumerate(skeleton.feet):
         moves = skeleton.support[skeleton.segments.index(name)]
-        jacobian = (pose.jacobian * moves).transpose(0, 2, 1)
+        jacobian = pose.axes * moves[:, None]
         only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
         by_plate = trial.ground.by_plate(only, problem.carriers[k][frames], problem.plate_values(static))
         by_plate = by_plate @ problem.to_plates
@@ -143,8 +138,8 @@ def moment_derivatives(
     by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
     by_static = _rows_to_coordinates(skeleton, pose, by_static)
     by_static[:, :, layout.coordinates] = by_q[:, :, problem.still]
-    rows = problem.moving[:, None]
-    by_q, by_qd, by_qdd = (part[:, rows, problem.moving] for part in (by_q, by_qd, by_qdd))
+    moving = problem.moving[:, None]
+    by_q, by_qd, by_qdd = (part[:, moving, problem.moving] for part in (by_q, by_qd, by_qdd))
     impact = skeleton.map.to_coordinates(impact, pose.slopes)[:, problem.moving]
     return MomentDerivatives(by_q, by_qd, by_qdd, by_static[:, problem.moving], impact)
 
@@ -159,7 +154,7 @@ def _load_derivative(pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndar
 
     An axis turns the axes of all that come after it: column j of J changes by the motion product of i and j.
     """
-    columns = pose.jacobian.transpose(0, 2, 1) * moves[:, None]
+    columns = pose.axes * moves[:, None]
     linear, angular = columns[..., :3], columns[..., 3:]
     force, moment = load[:, None, :3], load[:, None, 3:]
     # (J_i x J_j) . load = J_j . (load carried along by i)

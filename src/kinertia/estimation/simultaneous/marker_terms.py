@@ -79,7 +79,6 @@ class ErrorInformation:
 
 def marker_terms(
     skeleton: Skeleton,
-    above: np.ndarray,
     measured: np.ndarray,
     q: np.ndarray,
     deviation: tuple[np.ndarray, float],
@@ -90,7 +89,6 @@ def marker_terms(
 
     Args:
         skeleton: with static coordinates free.
-        above: its `ancestor_of`.
         measured: (n, m, 3) m; NaN where not seen.
         q: (n, c) rad and m.
         deviation: (m,) of each marker's errors, m, and their correlation between neighbouring frames.
@@ -114,14 +112,14 @@ def marker_terms(
         here, before, after = _stretch(start, n)
         now = pose.cut(here)
         blocks = twist_blocks(skeleton, positions[here], positions[here], information.own[here])
-        whole = gram(skeleton, above, now, blocks)
+        whole = gram(skeleton, now, blocks)
         per_frame[here] = whole[:, moving[:, None], moving]
         by_still[here] += whole[:, :, still]
         by_place = _by_places(skeleton, now, positions[here], weighted[here])
         across[here, :, k:] = by_place[:, moving]
         static[:k, k:] += by_place[:, still].sum(axis=0)
         blocks = twist_blocks(skeleton, positions[before], positions[after], information.next[before])
-        following = gram(skeleton, above, pose.cut(before), blocks, pose.cut(after))
+        following = gram(skeleton, pose.cut(before), blocks, pose.cut(after))
         to_next[before] = following[:, moving[:, None], moving]
         by_still[before] += following[:, :, still]
         by_still[after] += following[:, still].transpose(0, 2, 1)
@@ -153,6 +151,6 @@ def _by_places(skeleton: Skeleton, pose: Pose, positions: np.ndarray, directions
     """(n, c, 3 m) generalised forces of the columns of directions (n, m, 3, 3) at each marker's place (n, m, 3)."""
     n, m = positions.shape[:2]
     wrench = np.concatenate([directions, np.cross(positions[..., None], directions, axis=2)], axis=2)
-    forces = pose.jacobian.transpose(0, 2, 1) @ wrench.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
+    forces = pose.axes @ wrench.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
     forces *= np.repeat(skeleton.support[skeleton.marker_segments].T, 3, axis=1)
     return skeleton.map.to_coordinates(forces.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)

@@ -1,7 +1,8 @@
 """Terms of the simultaneous estimate: residuals, derivatives and normal equations of markers, root and priors.
 
-All derivatives are analytic, and come from Pinocchio's Jacobian, RNEA derivatives and joint torque regressor. Frames
-are summed knot interval by knot interval: the normal matrix is banded in the motion and bordered by what does not move.
+All derivatives are analytic (`kinertia.motion.rigid_body`); root residuals are forces and moments about the pelvis
+origin, ground axes. Frames are summed knot interval by knot interval: the normal matrix is banded in the motion and
+bordered by what does not move.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.marker_terms import marker_terms
@@ -27,8 +27,8 @@ from kinertia.model.log_cholesky import (
     to_log_cholesky,
 )
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, root_regressor, root_terms
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.inverse_kinematics import ancestor_of
 
 COEFFICIENT_SD = 1.0
 """Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
@@ -202,7 +202,6 @@ class MapProblem:
         self.carriers = [trial.ground.among(self.plates)[trial.ground.carrier] for trial in trials]
         self.to_plates = plates_with_floor(len(self.plates))
         self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
-        self.above = ancestor_of(self.free)
         count = len(skeleton.markers)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
@@ -309,7 +308,7 @@ class MapProblem:
         parts = self.full(basis.evaluate(coefficients), static)
         skeleton = self.placed(static)
         noise = (trial.marker_sd, trial.marker_autocorrelation)
-        marker = marker_terms(skeleton, self.above, trial.markers, parts[0], noise, self.moving, self.still)
+        marker = marker_terms(skeleton, trial.markers, parts[0], noise, self.moving, self.still)
         root = self._root_terms(k, skeleton, parts, static)
         normal = assemble(basis, marker, root, layout.in_markers, layout.in_root)
         moved = coefficients - self.start[k]
@@ -325,50 +324,25 @@ class MapProblem:
         trial, layout = self.trials[k], self.layout
         frames = np.flatnonzero(trial.dynamic)
         q, qd, qdd = (part[frames] for part in parts)
-        bsp = self.bsp(static)
-        model = skeleton.model_with(bsp)
-        data = model.createData()
-        # the regressor needs no static coordinates: a model without them is smaller
-        names = list(self.calibration.coordinates)
-        smaller = skeleton.lock(dict(zip(names, static[layout.coordinates].tolist(), strict=True)))
-        bare, bare_data = smaller.model, smaller.model.createData()
-        joints, place = smaller.placement_of_parameters(self.segments)
-        columns = (10 * (joints - 1)[:, None] + np.arange(10)).ravel()
-        x, v, a = skeleton.map.motion(q, qd, qdd)
-        few = np.stack(smaller.map.motion(*(part[:, self.moving] for part in (q, qd, qdd))))
-        d, axes = x.shape
-        dq, dv, da = np.empty((d, 6, axes)), np.empty((d, 6, axes)), np.empty((d, 6, axes))
-        tau, regressor = np.empty((d, 6)), np.empty((d, 6, len(columns)))
-        for i in range(d):
-            pin.computeRNEADerivatives(model, data, x[i], v[i], a[i])
-            tau[i] = data.tau[:6]
-            dq[i], dv[i], da[i] = data.dtau_dq[:6], data.dtau_dv[:6], data.M[:6]
-            regressor[i] = pin.computeJointTorqueRegressor(bare, bare_data, *few[:, i])[:6, columns]
-        square = da[:, :, :6]
-        da[:, :, :6] = np.triu(square) + np.triu(square, 1).transpose(0, 2, 1)
-        dq, dv, da = skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+        motion = Motion(q, qd, qdd)
         root = skeleton.root
+        terms = root_terms(skeleton, self.bsp(static), motion, root.centre(q))
         loads = self.foot_loads(k, static, 0, frames)
-        wrench = loads.sum(axis=1)
-        dq[:, :, :6] -= root.ground_load_derivative(q, wrench)
-        by_static = np.zeros((d, 6, layout.in_root.stop))
-        by_static[:, :, layout.theta] = by_body(regressor, place @ dynamic_jacobian(static[layout.theta]))
-        by_static[:, :, layout.coordinates] = dq[:, :, self.still]
+        left = terms.load - root.about_centre(q, loads.sum(axis=1))
+        by_q = terms.q
+        by_q[:, 3:, :3] -= root.centre_moves(left)
+        by_static = np.zeros((len(q), 6, layout.in_root.stop))
+        shown = root_regressor(skeleton, self.segments, motion)
+        by_static[:, :, layout.theta] = by_body(shown, dynamic_jacobian(static[layout.theta]))
+        by_static[:, :, layout.coordinates] = by_q[:, :, self.still]
         by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static)) @ self.to_plates
-        for column in range(by_plate.shape[2]):
-            by_static[:, :, layout.plates.start + column] = -root.ground_load_to_generalised(q, by_plate[..., column])
         rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
-        by_static[:, :, layout.clock] = -root.ground_load_to_generalised(q, rates)
-        sd = self.root_sd(trial)[None, :, None]
-        left = (tau - root.ground_load_to_generalised(q, wrench)) / sd[..., 0]
-        return (
-            frames,
-            dq[..., self.moving] / sd,
-            dv[..., self.moving] / sd,
-            da[..., self.moving] / sd,
-            by_static / sd,
-            left,
-        )
+        by_instrument = np.concatenate([by_plate, rates[:, :, None]], axis=2)
+        by_instrument[:, 3:] -= np.cross(root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
+        by_static[:, :, layout.instruments] = -by_instrument
+        sd = self.root_sd(trial)[:, None]
+        rows = (part[..., self.moving] / sd for part in (by_q, terms.qd, terms.qdd))
+        return (frames, *rows, by_static / sd, left / sd[:, 0])
 
 
 def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:

@@ -13,12 +13,11 @@ from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
-import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, placed_by
+from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, inverse, placed, placed_by
 
 _FORMAT = 40000
 """The oldest of the current formats: every OpenSim 4 reads it."""
@@ -104,15 +103,16 @@ def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
     them.
     """
     axes = [axis for axis in joint.axes if skeleton.locked.get(axis.coordinate) != 0.0 or axis.function is not None]
-    near = pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
-    far = pin.SE3(np.asarray(joint.child_rotation), np.asarray(joint.child_translation))
+    near = placed(joint.rotation, joint.translation)
+    far = placed(joint.child_rotation, joint.child_translation)
     while axes and axes[0].coordinate in skeleton.locked:
         axis = axes.pop(0)
-        near = near * placed_by(axis, skeleton.locked[axis.coordinate])
+        near = near @ placed_by(axis, skeleton.locked[axis.coordinate])
     while axes and axes[-1].coordinate in skeleton.locked:
         axis = axes.pop()
-        far = far * placed_by(axis, skeleton.locked[axis.coordinate]).inverse()
-    return Joint(joint.parent, joint.child, near.rotation, near.translation, tuple(axes), far.rotation, far.translation)
+        far = far @ inverse(placed_by(axis, skeleton.locked[axis.coordinate]))
+    frames = (near[:3, :3], near[:3, 3], tuple(axes), far[:3, :3], far[:3, 3])
+    return Joint(joint.parent, joint.child, *frames)
 
 
 def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:

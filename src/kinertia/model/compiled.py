@@ -1,0 +1,79 @@
+"""Functions that Numba compiles to machine code, once per machine.
+
+What runs over the frames of a trial is compiled, and kept in a folder that names its sources: whoever changes a line
+of a compiled function, or installs another version, compiles anew and never runs what an older line gave. The folder
+is beside this file or, where that cannot be written to, in the user's cache; if neither can, in the folder for
+temporary files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core import config
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+SOURCES = (
+    "model/compiled.py",
+    "model/spatial.py",
+    "model/kinematic_tree.py",
+    "motion/rigid_body.py",
+)
+"""Files of the package with compiled functions: those call one another."""
+
+
+def compiled(function: F) -> F:
+    """The function as machine code; division by zero gives inf or nan, as NumPy has it."""
+    with _kept_in(cache_folder()):
+        result: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    return result
+
+
+@cache
+def cache_folder() -> Path:
+    """Where compiled functions are kept: a folder of its own for every state of their sources."""
+    package = Path(__file__).parents[1]
+    text = hashlib.sha256()
+    for name in SOURCES:
+        text.update((package / name).read_bytes())
+    name = f"kinertia-{text.hexdigest()[:16]}"
+    places = (Path(__file__).parent / "__pycache__", _user_cache() / "kinertia", Path(tempfile.gettempdir()))
+    return next((place / name for place in places if _writable(place / name)), places[-1] / name)
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
+    if sys.platform == "darwin":
+        return Path("~/Library/Caches").expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
+
+
+def _writable(folder: Path) -> bool:
+    """Whether functions can be kept there; tried, since permissions do not tell."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+@contextmanager
+def _kept_in(folder: Path) -> Iterator[None]:
+    """Numba reads the folder while it decorates a function; other packages' functions stay where they are."""
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,128 @@
+"""`KinematicTree`: a skeleton as plain arrays, axis by axis, and where it puts everything: the compiled core.
+
+Every moving axis has a frame of its own, which stands at a fixed place in that of the axis before it (its parent) and
+turns about, or slides along, a fixed direction. Parents come first. A segment stands at a fixed place in the frame of
+the axis that carries it. Everything is worked out in ground axes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.model.compiled import compiled
+
+
+class KinematicTree(NamedTuple):
+    """Axes and segments as arrays.
+
+    Attributes:
+        parent: (a,) index of the axis before; -1 where that is the ground.
+        slides: (a,) True for a translation.
+        direction: (a, 3) unit, in the axis' frame.
+        rotation, translation: (a, 3, 3) and (a, 3) m, place of the axis' frame in its parent's, at zero.
+        carrier: (s,) index of the axis that carries each segment; -1 for none.
+        segment_rotation, segment_translation: (s, 3, 3) and (s, 3) m, place of the segment in its carrier's frame.
+    """
+
+    parent: np.ndarray
+    slides: np.ndarray
+    direction: np.ndarray
+    rotation: np.ndarray
+    translation: np.ndarray
+    carrier: np.ndarray
+    segment_rotation: np.ndarray
+    segment_translation: np.ndarray
+
+
+@compiled
+def place_axes(
+    tree: KinematicTree, at: np.ndarray, rotation: np.ndarray, translation: np.ndarray, axes: np.ndarray
+) -> None:
+    """Frames of all axes, and the motion that each gives at unit rate, in one frame of a trial.
+
+    Args:
+        tree: the skeleton.
+        at: (a,) places of the axes, rad or m.
+        rotation, translation: (a, 3, 3) and (a, 3) m, written: the axes' frames in ground.
+        axes: (a, 6), written: motion in ground axes at the ground origin, linear first.
+    """
+    base, turn, unit, here = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    for j in range(len(at)):
+        parent = tree.parent[j]
+        if parent < 0:
+            base[:] = tree.rotation[j]
+            here[:] = tree.translation[j]
+        else:
+            _product(rotation[parent], tree.rotation[j], base)
+            _moved(rotation[parent], tree.translation[j], translation[parent], here)
+        x, y, z = tree.direction[j]
+        for r in range(3):
+            unit[r] = base[r, 0] * x + base[r, 1] * y + base[r, 2] * z
+        if tree.slides[j]:
+            rotation[j] = base
+            for r in range(3):
+                translation[j, r] = here[r] + unit[r] * at[j]
+                axes[j, r], axes[j, 3 + r] = unit[r], 0.0
+            continue
+        # Rodrigues' formula
+        s, c = np.sin(at[j]), np.cos(at[j])
+        o = 1.0 - c
+        turn[0, 0], turn[0, 1], turn[0, 2] = c + o * x * x, o * x * y - s * z, o * x * z + s * y
+        turn[1, 0], turn[1, 1], turn[1, 2] = o * x * y + s * z, c + o * y * y, o * y * z - s * x
+        turn[2, 0], turn[2, 1], turn[2, 2] = o * x * z - s * y, o * y * z + s * x, c + o * z * z
+        _product(base, turn, rotation[j])
+        translation[j] = here
+        axes[j, 3:] = unit
+        axes[j, 0] = here[1] * unit[2] - here[2] * unit[1]
+        axes[j, 1] = here[2] * unit[0] - here[0] * unit[2]
+        axes[j, 2] = here[0] * unit[1] - here[1] * unit[0]
+
+
+@compiled
+def place_segments(
+    tree: KinematicTree,
+    axis_rotation: np.ndarray,
+    axis_translation: np.ndarray,
+    rotation: np.ndarray,
+    translation: np.ndarray,
+) -> None:
+    """Frames of all segments, written to `rotation` (s, 3, 3) and `translation` (s, 3), from those of the axes."""
+    for s in range(len(tree.carrier)):
+        carrier = tree.carrier[s]
+        if carrier < 0:
+            rotation[s] = tree.segment_rotation[s]
+            translation[s] = tree.segment_translation[s]
+        else:
+            _product(axis_rotation[carrier], tree.segment_rotation[s], rotation[s])
+            _moved(axis_rotation[carrier], tree.segment_translation[s], axis_translation[carrier], translation[s])
+
+
+@compiled
+def poses(tree: KinematicTree, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Segment frames (n, s, 3, 3) and (n, s, 3), and motions of the axes (n, a, 6), at axes' places (n, a)."""
+    n, a = at.shape
+    s = len(tree.carrier)
+    rotation, translation, axes = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty((n, a, 6))
+    axis_rotation, axis_translation = np.empty((a, 3, 3)), np.empty((a, 3))
+    for k in range(n):
+        place_axes(tree, at[k], axis_rotation, axis_translation, axes[k])
+        place_segments(tree, axis_rotation, axis_translation, rotation[k], translation[k])
+    return rotation, translation, axes
+
+
+@compiled
+def _product(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
+    """out = first @ second of two rotations."""
+    for r in range(3):
+        for c in range(3):
+            out[r, c] = first[r, 0] * second[0, c] + first[r, 1] * second[1, c] + first[r, 2] * second[2, c]
+
+
+@compiled
+def _moved(rotation: np.ndarray, local: np.ndarray, origin: np.ndarray, out: np.ndarray) -> None:
+    """out = rotation @ local + origin."""
+    for r in range(3):
+        turned = rotation[r, 0] * local[0] + rotation[r, 1] * local[1] + rotation[r, 2] * local[2]
+        out[r] = origin[r] + turned
