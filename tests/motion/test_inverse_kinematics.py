@@ -64,7 +64,7 @@ def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
     q = random_coordinates(skeleton, 3)
     measured = without(noisy(markers_of(skeleton, q), 0.02), ["R.Heel", "Top.Head"], slice(1, 2)).positions
     pose = skeleton.pose(q + 0.05)
-    normal, gradient, cost = normal_equations(skeleton, measured, pose)
+    normal, gradient, cost = normal_equations(skeleton, measured, q + 0.05)
     jacobian = marker_jacobian(skeleton, pose, skeleton.marker_positions(pose))
     difference = measured - skeleton.marker_positions(pose)
     for k in range(3):

@@ -28,6 +28,9 @@ SOURCES = (
     "model/spatial.py",
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
+    "motion/marker_sums.py",
+    "estimation/simultaneous/normal_equations.py",
+    "estimation/simultaneous/marker_terms.py",
 )
 """Files of the package with compiled functions: those call one another."""
 

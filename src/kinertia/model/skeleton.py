@@ -261,6 +261,13 @@ class Skeleton:
         """(m, 3) marker positions in their segments' frames, m."""
         return np.array([marker.position for marker in self.markers]).reshape(-1, 3)
 
+    @cached_property
+    def carried_markers(self) -> tuple[np.ndarray, np.ndarray]:
+        """(m,) axis that carries each marker, and (m, 3) m the markers in the frames of these axes."""
+        tree, segment = self.tree, self.marker_segments
+        turned = (tree.segment_rotation[segment] @ self.marker_locals[:, :, None])[..., 0]
+        return tree.carrier[segment], np.ascontiguousarray(turned + tree.segment_translation[segment])
+
     @property
     def labels(self) -> tuple[str, ...]:
         """Labels of all markers."""

@@ -1,12 +1,8 @@
 """Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
-once, by Gauss-Newton steps with an analytic Jacobian. Frames are independent problems, so they are computed together:
-one Pinocchio pass per frame, the rest vectorised over frames. A coarse pass over a frame every tenth of a second gives
-the warm start of all the others.
-
-The normal matrix of a tree of markers is the mass matrix of the same tree with a unit mass at every marker, and is
-built the same way: per segment one 6 x 6 matrix of its markers, summed over what each coordinate carries.
+once, by Gauss-Newton steps with an analytic Jacobian (`kinertia.motion.marker_sums`). Frames are independent problems.
+A coarse pass over a frame every tenth of a second gives the warm start of all the others.
 """
 
 from __future__ import annotations
@@ -17,7 +13,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.model.skeleton import Pose, Skeleton
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion import marker_sums
+from kinertia.motion.marker_sums import damped_steps
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
@@ -213,14 +211,14 @@ def _gauss_newton(
     normal = np.zeros((n, q.shape[1], q.shape[1]))
     gradient = np.zeros_like(q)
     for _ in range(stop.most_steps):
-        h, g, cost = normal_equations(model, measured[active], model.pose(q[active]))
+        h, g, cost = normal_equations(model, measured[active], q[active])
         better = cost <= best[active] * (1 + 1e-12)
         up = active[better]
         best[up], accepted[up] = cost[better], q[up]
         normal[up], gradient[up] = h[better], g[better]
         damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
         damping[active[~better]] *= 100.0
-        step[active] = _damped_step(normal[active], gradient[active], damping[active])
+        step[active] = damped_steps(normal[active], gradient[active], damping[active])
         gain = np.einsum("nc,nc->n", step[active], gradient[active])
         small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | (gain < stop.gain_tolerance_m2)
         done = active[small]
@@ -233,84 +231,16 @@ def _gauss_newton(
     return accepted, converged, normal
 
 
-def _damped_step(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    c = normal.shape[-1]
-    scale = np.einsum("nii->n", normal) / c
-    damped = normal + (damping * scale)[:, None, None] * np.eye(c)
-    return np.linalg.solve(damped, gradient[..., None])[..., 0]
-
-
-def normal_equations(model: Skeleton, measured: np.ndarray, pose: Pose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model."""
-    positions = model.marker_positions(pose)
-    residual = measured - positions
-    seen = np.isfinite(residual).all(axis=-1)
-    residual = np.where(seen[..., None], residual, 0.0)
-    normal = gram(model, pose, twist_blocks(model, positions, positions, seen.astype(float)))
-    return normal, marker_forces(model, pose, positions, residual), np.square(residual).sum(axis=(1, 2))
-
-
-def marker_forces(model: Skeleton, pose: Pose, positions: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """(n, c) generalised forces J^T f of forces (n, m, 3) on the markers at these positions (n, m, 3)."""
-    wrench = _per_segment(model) @ np.concatenate([forces, np.cross(positions, forces)], axis=-1)
-    columns = pose.axes
-    return model.map.to_coordinates(np.einsum("ncd,ncd->nc", columns, model.support.T @ wrench), pose.slopes)
-
-
-def gram(model: Skeleton, pose: Pose, blocks: np.ndarray, second: Pose | None = None) -> np.ndarray:
-    """(n, c, c) J^T W J' with J of the markers at a pose and J' at a second pose (the same if None).
-
-    Args:
-        model: the skeleton.
-        pose, second: n frames each.
-        blocks: (n, s, 6, 6) of `twist_blocks`, symmetric if there is no second pose.
-    """
-    n, s = blocks.shape[:2]
-    carried = (model.support.T.astype(float) @ blocks.reshape(n, s, 36)).reshape(n, model.support.shape[1], 6, 6)
-    columns, above = pose.axes, model.above
-    others = columns if second is None else second.axes
-    moved = (carried @ others[..., None])[..., 0]
-    product = np.where(above, columns @ moved.transpose(0, 2, 1), 0.0)
-    if second is None:
-        product += np.triu(product, 1).transpose(0, 2, 1)
-    else:
-        moved = (columns[:, :, None] @ carried)[:, :, 0]
-        product += np.where(above.T & ~above, moved @ others.transpose(0, 2, 1), 0.0)
-    half = model.map.to_coordinates(product, (second or pose).slopes).transpose(0, 2, 1)
-    return model.map.to_coordinates(half, pose.slopes).transpose(0, 2, 1)
-
-
-def twist_blocks(model: Skeleton, first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(n, s, 6, 6): sum over a segment's markers of w B^T B' with B = [1, -[x]]: how a twist moves them.
-
-    Args:
-        model: tells which marker is on which segment.
-        first, second: (n, m, 3) m, places x and x' of the markers.
-        weight: (n, m).
-    """
-    per_segment = _per_segment(model)
-    x, y = (places * weight[..., None] for places in (first, second))
-    sums = per_segment @ np.concatenate([weight[..., None], x, y], axis=-1)
-    outer = per_segment @ (y[..., :, None] * first[..., None, :]).reshape(*x.shape[:2], 9)
-    outer = outer.reshape(*outer.shape[:2], 3, 3)
-    blocks = np.zeros((*outer.shape[:2], 6, 6))
-    blocks[..., :3, :3] = sums[..., :1, None] * np.eye(3)
-    blocks[..., :3, 3:] = -_skew(sums[..., 4:])
-    blocks[..., 3:, :3] = _skew(sums[..., 1:4])
-    blocks[..., 3:, 3:] = np.einsum("nsii->ns", outer)[..., None, None] * np.eye(3) - outer
-    return blocks
-
-
-def _per_segment(model: Skeleton) -> np.ndarray:
-    """(s, m) 1 where the marker is on the segment."""
-    result: np.ndarray = (np.arange(len(model.segments))[:, None] == model.marker_segments).astype(float)
-    return result
-
-
-def _skew(v: np.ndarray) -> np.ndarray:
-    zero = np.zeros(v.shape[:-1])
-    rows = [[zero, -v[..., 2], v[..., 1]], [v[..., 2], zero, -v[..., 0]], [-v[..., 1], v[..., 0], zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+def normal_equations(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers (n, m, 3); r = measured - model."""
+    tree, axes = model.tree, model.map
+    carrier, local = model.carried_markers
+    at, slopes = axes.axes(q), axes.slopes(q)
+    if slopes is None:
+        slopes = np.ones_like(at)
+    return marker_sums.normal_equations(
+        tree, axes.owner, slopes, np.ascontiguousarray(at), carrier, local, np.ascontiguousarray(measured), axes.count
+    )
 
 
 def _uninformed(normal: np.ndarray) -> np.ndarray:

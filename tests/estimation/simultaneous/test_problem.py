@@ -101,18 +101,6 @@ def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
     np.testing.assert_allclose(-right, gradient, atol=1e-6 * np.abs(gradient).max())
 
 
-@pytest.mark.parametrize("at_once", [1, 4, 5])
-def test_frames_in_stretches_are_those_of_the_whole(any_problem, monkeypatch, at_once):
-    """Also where the last stretch is a single frame, which has none after it."""
-    (coefficients,), static = point(any_problem)
-    whole = any_problem.normal(0, coefficients, static)
-    monkeypatch.setattr("kinertia.estimation.simultaneous.marker_terms.FRAMES_AT_ONCE", at_once)
-    parts = any_problem.normal(0, coefficients, static)
-    for name in ("band", "border", "static", "right", "static_right", "cost"):
-        one, other = getattr(whole, name), getattr(parts, name)
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(one).max())
-
-
 def test_prior_information_is_the_derivative_of_its_gradient(problem):
     """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
     static = problem.start_static

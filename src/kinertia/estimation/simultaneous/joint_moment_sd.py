@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from kinertia.estimation.simultaneous.marker_terms import FRAMES_AT_ONCE
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Reduced, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem, by_body
 from kinertia.model.log_cholesky import dynamic_jacobian
@@ -26,6 +25,8 @@ from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.rigid_body import axis_force_derivatives, regressor
 
+_FRAMES_AT_ONCE = 100
+"""Larger arrays would leave the processor's cache."""
 _LOST_KNOTS = 2.0
 """Half of the stretch over which it is averaged, in knot intervals: one period of the cutoff."""
 
@@ -69,11 +70,11 @@ def joint_moment_sd(
     motion = _MotionSpread.of(eliminated, coefficients.shape[1], root)
     variance, impact = np.empty((2, len(frames), coefficients.shape[1]))
     reactions = problem.reactions(k, static)
-    for start in range(0, len(frames), FRAMES_AT_ONCE):
-        chosen = frames[start : start + FRAMES_AT_ONCE]
+    for start in range(0, len(frames), _FRAMES_AT_ONCE):
+        chosen = frames[start : start + _FRAMES_AT_ONCE]
         by = moment_derivatives(problem, k, [part[chosen] for part in parts], static, reactions, chosen)
         still = by.static @ root[problem.layout.in_root]
-        through = by_splines(basis.values[:, chosen], (by.q, by.qd, by.qdd)).reshape(*by.q.shape[:2], -1)
+        through = by_splines(basis.values[:, chosen], by.q, by.qd, by.qdd).reshape(*by.q.shape[:2], -1)
         impact[start : start + len(chosen)] = by.impact
         for first in np.unique(basis.first[chosen]):
             rows = np.flatnonzero(basis.first[chosen] == first)

@@ -6,43 +6,29 @@ frame sees itself and its two neighbours, so the normal matrix stays banded. A g
 
 Slow skin motion (a near one) counts for few independent frames where the motion is slow, and hardly disturbs what is
 fast: accelerations, which the forces answer to.
+
+With J the derivative of the markers by the coordinates that move, S that by what does not (static coordinates, then
+marker positions), r = measured - model and W the information, the terms are J^T W J, J^T W S, J^T W r, S^T W S and
+S^T W r. They are summed over the frames of a knot interval, in which the same six splines are active, and seven with the
+frame after it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.skeleton import Pose, Skeleton
-from kinertia.motion.inverse_kinematics import gram, marker_forces, twist_blocks
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
+from kinertia.model.compiled import compiled
+from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.skeleton import Skeleton
+from kinertia.model.spatial import inner
+from kinertia.motion.marker_sums import add_force, add_marker, hand_down, met_force, place_marker, swapped
 
-FRAMES_AT_ONCE = 100
-"""Larger arrays would leave the processor's cache."""
-
-
-@dataclass(frozen=True)
-class MarkerTerms:
-    """J^T W J and the like: J is the derivative of the markers by the coordinates, S that by what does not move (static
-    coordinates, then marker positions), r = measured - model, and W the information of the errors.
-
-    Attributes:
-        per_frame: (n, c, c) of J^T W J, each frame with itself.
-        to_next: (n - 1, c, c) of J^T W J, each frame (rows) with the one after it (columns).
-        across: (n, c, k) J^T W S.
-        gradient: (n, c) J^T W r.
-        static: (k, k) S^T W S.
-        static_gradient: (k,) S^T W r.
-        square: r^T W r.
-    """
-
-    per_frame: np.ndarray
-    to_next: np.ndarray
-    across: np.ndarray
-    gradient: np.ndarray
-    static: np.ndarray
-    static_gradient: np.ndarray
-    square: float
+_TOGETHER = SPLINES_PER_BLOCK + 1
 
 
 @dataclass(frozen=True)
@@ -68,89 +54,362 @@ class ErrorInformation:
         weight = 1.0 / np.square(sd_m)
         return cls(own * weight, -a / (1.0 - a**2) * both * weight)
 
-    def __matmul__(self, values: np.ndarray) -> np.ndarray:
-        """(n, m, ...) the information times values (n, m, ...), along time."""
-        own, following = (part.reshape(*part.shape, *(1,) * (values.ndim - 2)) for part in (self.own, self.next))
-        result: np.ndarray = own * values
-        result[:-1] += following * values[1:]
-        result[1:] += following * values[:-1]
-        return result
+
+class _Markers(NamedTuple):
+    """Markers of a trial and the axes that move them.
+
+    Attributes:
+        tree: the skeleton.
+        column: (a,) place of each axis' coordinate among those that move, then those that do not.
+        at, slopes: (n, a) places of the axes, rad or m, and their derivatives by the coordinates.
+        carrier: (m,) the axis that carries each marker.
+        local: (m, 3) m, the markers in the frames of these axes.
+        turned: (m, 3, 3) the segments' axes in these frames.
+        measured: (n, m, 3) m; NaN where not seen.
+        own, next: as `ErrorInformation` has them.
+    """
+
+    tree: KinematicTree
+    column: np.ndarray
+    at: np.ndarray
+    slopes: np.ndarray
+    carrier: np.ndarray
+    local: np.ndarray
+    turned: np.ndarray
+    measured: np.ndarray
+    own: np.ndarray
+    next: np.ndarray
 
 
-def marker_terms(
+class _Placed(NamedTuple):
+    """Three neighbouring frames, in turn: axes (3, a, 6), and of the markers the places (3, m, 3) m, the errors
+    (3, m, 3) m (zero where not seen) and the axes of their segments (3, m, 3, 3)."""
+
+    axes: np.ndarray
+    places: np.ndarray
+    errors: np.ndarray
+    turned: np.ndarray
+
+
+class _Interval(NamedTuple):
+    """Terms of the frames of a knot interval, and of the one after them.
+
+    Attributes:
+        squares: (3, f, c c) J^T W J of each frame with itself, with the next, and the latter transposed.
+        across: (f + 1, c, k + 3 m) J^T W S.
+        gradient: (f, c) J^T W r.
+    """
+
+    squares: np.ndarray
+    across: np.ndarray
+    gradient: np.ndarray
+
+
+class _Static(NamedTuple):
+    """S^T W S (k + 3 m, k + 3 m), S^T W r (k + 3 m,) and r^T W r (1,)."""
+
+    square: np.ndarray
+    right: np.ndarray
+    cost: np.ndarray
+
+
+def add_markers(
+    normal: NormalEquations,
+    columns: slice,
+    basis: MotionBasis,
     skeleton: Skeleton,
     measured: np.ndarray,
     q: np.ndarray,
     deviation: tuple[np.ndarray, float],
     moving: np.ndarray,
     still: np.ndarray,
-) -> MarkerTerms:
-    """The terms of one trial at the coordinates q.
+) -> None:
+    """Add the terms of the markers of one trial, at the coordinates q, to its normal equations.
 
     Args:
+        normal: zero, or with other terms.
+        columns: of the static unknowns, those that markers depend on.
+        basis: of the motion.
         skeleton: with static coordinates free.
         measured: (n, m, 3) m; NaN where not seen.
         q: (n, c) rad and m.
         deviation: (m,) of each marker's errors, m, and their correlation between neighbouring frames.
         moving, still: columns of q that move in time, and that do not.
     """
-    (n, m), c, k = measured.shape[:2], len(moving), len(still)
-    pose = skeleton.pose(q)
-    positions = skeleton.marker_positions(pose)
-    error = measured - positions
-    seen = np.isfinite(error).all(axis=-1)
-    information = ErrorInformation.of(seen, *deviation)
-    error = np.where(seen[..., None], error, 0.0)
-    pull = information @ error
-    gradient = marker_forces(skeleton, pose, positions, pull)
-    turned = pose.rotation[:, skeleton.marker_segments]
-    weighted = information @ turned
-    per_frame, to_next = np.empty((n, c, c)), np.empty((n - 1, c, c))
-    across, by_still = np.empty((n, c, k + 3 * m)), np.zeros((n, q.shape[1], k))
-    static = np.zeros((k + 3 * m, k + 3 * m))
-    for start in range(0, n, FRAMES_AT_ONCE):
-        here, before, after = _stretch(start, n)
-        now = pose.cut(here)
-        blocks = twist_blocks(skeleton, positions[here], positions[here], information.own[here])
-        whole = gram(skeleton, now, blocks)
-        per_frame[here] = whole[:, moving[:, None], moving]
-        by_still[here] += whole[:, :, still]
-        by_place = _by_places(skeleton, now, positions[here], weighted[here])
-        across[here, :, k:] = by_place[:, moving]
-        static[:k, k:] += by_place[:, still].sum(axis=0)
-        blocks = twist_blocks(skeleton, positions[before], positions[after], information.next[before])
-        following = gram(skeleton, pose.cut(before), blocks, pose.cut(after))
-        to_next[before] = following[:, moving[:, None], moving]
-        by_still[before] += following[:, :, still]
-        by_still[after] += following[:, still].transpose(0, 2, 1)
-    across[:, :, :k] = by_still[:, moving]
-    static[:k, :k] = by_still[:, still].sum(axis=0)
-    static[k:, :k] = static[:k, k:].T
-    each = np.arange(k, k + 3 * m).reshape(m, 3)
-    static[each[:, :, None], each[:, None]] = np.einsum("nmij,nmik->mjk", turned, weighted)
-    by_place = np.einsum("nmij,nmi->mj", turned, pull)
-    return MarkerTerms(
-        per_frame,
-        to_next,
-        across,
-        gradient[:, moving],
-        static,
-        np.concatenate([gradient[:, still].sum(axis=0), by_place.ravel()]),
-        float((error * pull).sum()),
+    information = ErrorInformation.of(np.isfinite(measured).all(axis=-1), *deviation)
+    place = np.empty(q.shape[1], dtype=np.int64)
+    place[np.concatenate([moving, still])] = np.arange(q.shape[1])
+    at, slopes = skeleton.map.axes(q), skeleton.map.slopes(q)
+    carrier, local = skeleton.carried_markers
+    markers = _Markers(
+        skeleton.tree,
+        place[skeleton.map.owner],
+        np.ascontiguousarray(at),
+        np.ones_like(at) if slopes is None else np.ascontiguousarray(slopes),
+        carrier,
+        local,
+        np.ascontiguousarray(skeleton.tree.segment_rotation[skeleton.marker_segments]),
+        np.ascontiguousarray(measured),
+        information.own,
+        information.next,
     )
+    border = normal.border[..., columns]
+    static = _Static(normal.static[columns, columns], normal.static_right[columns], np.zeros(1))
+    _add(markers, basis.first, basis.values[0], len(still), normal.band, border, normal.right, static)
+    normal.cost += 0.5 * float(static.cost[0])
 
 
-def _stretch(start: int, n: int) -> tuple[slice, slice, slice]:
-    """The frames of one stretch, those of them that have one after them, and the ones after these."""
-    end = min(start + FRAMES_AT_ONCE, n)
-    last = min(end, n - 1)
-    return slice(start, end), slice(start, last), slice(start + 1, last + 1)
+@compiled
+def _add(
+    markers: _Markers,
+    first: np.ndarray,
+    values: np.ndarray,
+    still: int,
+    band: np.ndarray,
+    border: np.ndarray,
+    right: np.ndarray,
+    static: _Static,
+) -> None:
+    """All frames, interval by interval; `first` and `values` are the motion basis'."""
+    n, m = markers.own.shape
+    c, a, s = band.shape[2], len(markers.column), border.shape[2]
+    placed = _Placed(np.empty((3, a, 6)), np.empty((3, m, 3)), np.empty((3, m, 3)), np.empty((3, m, 3, 3)))
+    most = _longest_run(first)
+    interval = _Interval(np.empty((3, most, c * c)), np.zeros((most + 1, c, s)), np.empty((most, c)))
+    _place(markers, 0, placed)
+    start = 0
+    while start < n:
+        end = start + 1
+        while end < n and first[end] == first[start]:
+            end += 1
+        interval.squares[:] = 0.0
+        interval.gradient[:] = 0.0
+        interval.across[1:] = 0.0
+        for k in range(start, end):
+            if k + 1 < n:
+                _place(markers, k + 1, placed)
+            _frame(markers, k, k - start, still, placed, interval, static)
+            if k + 1 < n:
+                _pair(markers, k, k - start, still, placed, interval, static)
+        _to_splines(first, values, start, end, interval, band, border, right)
+        interval.across[0] = interval.across[end - start]
+        start = end
 
 
-def _by_places(skeleton: Skeleton, pose: Pose, positions: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(n, c, 3 m) generalised forces of the columns of directions (n, m, 3, 3) at each marker's place (n, m, 3)."""
-    n, m = positions.shape[:2]
-    wrench = np.concatenate([directions, np.cross(positions[..., None], directions, axis=2)], axis=2)
-    forces = pose.axes @ wrench.transpose(0, 2, 1, 3).reshape(n, 6, 3 * m)
-    forces *= np.repeat(skeleton.support[skeleton.marker_segments].T, 3, axis=1)
-    return skeleton.map.to_coordinates(forces.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
+@compiled
+def _longest_run(first: np.ndarray) -> int:
+    """The most frames of an interval."""
+    longest, run = 1, 1
+    for k in range(1, len(first)):
+        run = run + 1 if first[k] == first[k - 1] else 1
+        longest = max(longest, run)
+    return longest
+
+
+@compiled
+def _place(markers: _Markers, k: int, placed: _Placed) -> None:
+    """Axes and markers of frame k."""
+    a, here = len(markers.column), k % 3
+    rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
+    place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])
+    for m in range(len(markers.carrier)):
+        j = markers.carrier[m]
+        place_marker(rotation[j], translation[j], markers.local[m], placed.places[here, m])
+        seen = markers.own[k, m] > 0.0
+        for r in range(3):
+            placed.errors[here, m, r] = markers.measured[k, m, r] - placed.places[here, m, r] if seen else 0.0
+            for i in range(3):
+                total = 0.0
+                for h in range(3):
+                    total += rotation[j, r, h] * markers.turned[m, h, i]
+                placed.turned[here, m, r, i] = total
+
+
+@compiled
+def _frame(
+    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: _Interval, static: _Static
+) -> None:
+    """J^T W J of frame k with itself; J^T W S of marker positions and J^T W r, W r being of three frames."""
+    a, here = len(markers.column), k % 3
+    c = interval.gradient.shape[1]
+    sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty(6)
+    pull, directions = np.empty(3), np.empty((3, 3))
+    for m in range(len(markers.carrier)):
+        weight = markers.own[k, m]
+        if weight == 0.0:
+            continue
+        _informed(markers, k, m, placed, pull, directions)
+        at = placed.places[here, m]
+        add_marker(weight, at, at, sums[markers.carrier[m]])
+        add_force(pull, at, forces[markers.carrier[m]])
+        _by_place(markers, k, m, row, still, placed, directions, interval, static)
+        for i in range(3):
+            static.cost[0] += placed.errors[here, m, i] * pull[i]
+            for r in range(3):
+                static.right[still + 3 * m + i] += placed.turned[here, m, r, i] * pull[r]
+    hand_down(markers.tree.parent, sums)
+    hand_down(markers.tree.parent, forces)
+    for j in range(a):
+        axis, slope, column = placed.axes[here, j], markers.slopes[k, j], markers.column[j]
+        force = slope * inner(axis, forces[j])
+        if column < c:
+            interval.gradient[row, column] += force
+        else:
+            static.right[column - c] += force
+        met_force(sums[j], axis, met)
+        _sort(slope * slope * inner(axis, met), column, column, row, row, c, 0, interval, static)
+        i = markers.tree.parent[j]
+        while i >= 0:
+            value = slope * markers.slopes[k, i] * inner(placed.axes[here, i], met)
+            _sort(value, column, markers.column[i], row, row, c, 0, interval, static)
+            if (column < c and markers.column[i] < c) or (column >= c and markers.column[i] >= c):
+                _sort(value, markers.column[i], column, row, row, c, 0, interval, static)
+            i = markers.tree.parent[i]
+
+
+@compiled
+def _informed(markers: _Markers, k: int, m: int, placed: _Placed, pull: np.ndarray, directions: np.ndarray) -> None:
+    """pull = (3,) W r and directions = (3, 3) W times the segment's axes, of marker m in frame k."""
+    for offset in range(-1, 2):
+        other = k + offset
+        if other < 0 or other >= len(markers.own):
+            weight = 0.0
+        else:
+            weight = markers.own[k, m] if offset == 0 else markers.next[min(k, other), m]
+        there = other % 3
+        for r in range(3):
+            if offset == -1:
+                pull[r] = 0.0
+                directions[r] = 0.0
+            if weight != 0.0:
+                pull[r] += weight * placed.errors[there, m, r]
+                for i in range(3):
+                    directions[r, i] += weight * placed.turned[there, m, r, i]
+
+
+@compiled
+def _by_place(
+    markers: _Markers,
+    k: int,
+    m: int,
+    row: int,
+    still: int,
+    placed: _Placed,
+    directions: np.ndarray,
+    interval: _Interval,
+    static: _Static,
+) -> None:
+    """Terms of marker m's position in its segment: across the coordinates, and with itself."""
+    c, here, first = interval.gradient.shape[1], k % 3, still + 3 * m
+    force = np.empty(6)
+    for i in range(3):
+        force[:] = 0.0
+        add_force(directions[:, i], placed.places[here, m], force)
+        j = markers.carrier[m]
+        while j >= 0:
+            value = markers.slopes[k, j] * inner(placed.axes[here, j], force)
+            if markers.column[j] < c:
+                interval.across[row, markers.column[j], first + i] += value
+            else:
+                static.square[markers.column[j] - c, first + i] += value
+                static.square[first + i, markers.column[j] - c] += value
+            j = markers.tree.parent[j]
+        for h in range(3):
+            for r in range(3):
+                static.square[first + h, first + i] += placed.turned[here, m, r, h] * directions[r, i]
+
+
+@compiled
+def _sort(
+    value: float,
+    i: int,
+    j: int,
+    row_i: int,
+    row_j: int,
+    c: int,
+    kind: int,
+    interval: _Interval,
+    static: _Static,
+) -> None:
+    """Add a term of the coordinates i, in one frame, and j, in the same or the next, to where it belongs."""
+    if i < c and j < c:
+        interval.squares[kind, row_i, i * c + j] += value
+        if kind == 1:
+            interval.squares[2, row_i, j * c + i] += value
+    elif i < c:
+        interval.across[row_i, i, j - c] += value
+    elif j < c:
+        interval.across[row_j, j, i - c] += value
+    else:
+        static.square[i - c, j - c] += value
+        if kind == 1:
+            static.square[j - c, i - c] += value
+
+
+@compiled
+def _pair(
+    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: _Interval, static: _Static
+) -> None:
+    """J^T W J of frame k with the next."""
+    a, here, there, c = len(markers.column), k % 3, (k + 1) % 3, interval.gradient.shape[1]
+    sums, back, met = np.zeros((a, 16)), np.empty(16), np.empty(6)
+    for m in range(len(markers.carrier)):
+        if markers.next[k, m] != 0.0:
+            add_marker(markers.next[k, m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
+    hand_down(markers.tree.parent, sums)
+    for j in range(a):
+        # what axis j carries meets it, and all axes before it, in the other frame
+        now, later, column = markers.slopes[k, j], markers.slopes[k + 1, j], markers.column[j]
+        met_force(sums[j], placed.axes[there, j], met)
+        i = j
+        while i >= 0:
+            value = later * markers.slopes[k, i] * inner(placed.axes[here, i], met)
+            _sort(value, markers.column[i], column, row, row + 1, c, 1, interval, static)
+            i = markers.tree.parent[i]
+        swapped(sums[j], back)
+        met_force(back, placed.axes[here, j], met)
+        i = markers.tree.parent[j]
+        while i >= 0:
+            value = now * markers.slopes[k + 1, i] * inner(placed.axes[there, i], met)
+            _sort(value, column, markers.column[i], row, row + 1, c, 1, interval, static)
+            i = markers.tree.parent[i]
+
+
+@compiled
+def _to_splines(
+    first: np.ndarray,
+    values: np.ndarray,
+    start: int,
+    end: int,
+    interval: _Interval,
+    band: np.ndarray,
+    border: np.ndarray,
+    right: np.ndarray,
+) -> None:
+    """Weigh the terms of an interval with the splines that are active, two by two."""
+    n, count, c, at = len(first), end - start, right.shape[1], first[start]
+    weight = np.zeros((_TOGETHER, _TOGETHER, 3, count))
+    for k in range(start, end):
+        later = np.zeros(_TOGETHER)
+        if k + 1 < n:
+            later[first[k + 1] - at : first[k + 1] - at + 6] = values[k + 1]
+        for i in range(6):
+            for j in range(_TOGETHER):
+                if j < 6:
+                    weight[i, j, 0, k - start] = values[k, i] * values[k, j]
+                weight[i, j, 1, k - start] += values[k, i] * later[j]
+                weight[j, i, 2, k - start] += values[k, i] * later[j]
+    size = len(band)
+    for i in range(_TOGETHER):
+        reach = min(_TOGETHER - i, size - at - i)
+        if reach <= 0:
+            break
+        pairs = np.ascontiguousarray(weight[i, i : i + reach]).reshape(reach, 3 * count)
+        squares = np.ascontiguousarray(interval.squares[:, :count]).reshape(3 * count, c * c)
+        band[at + i, :reach] += np.dot(pairs, squares).reshape(reach, c, c)
+    for i in range(6):
+        for k in range(count):
+            for j in range(c):
+                right[at + i, j] += values[start + k, i] * interval.gradient[k, j]
+                for s in range(border.shape[2]):
+                    border[at + i, j, s] += values[start + k, i] * interval.across[k, j, s]

@@ -8,11 +8,30 @@ from itertools import pairwise
 import numpy as np
 
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
-from kinertia.estimation.simultaneous.marker_terms import MarkerTerms
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.model.compiled import compiled
 
 SPLINES_PER_BLOCK = 6
 """Two neighbouring frames see seven splines together: each at most the six after it, and so at most the next block."""
+
+
+@dataclass(frozen=True)
+class RootTerms:
+    """Residuals of the root equations at the dynamic frames and their derivatives, each over its deviation.
+
+    Attributes:
+        frames: (d,) indices.
+        q, qd, qdd: (d, 6, c) by the coordinates that move, and their rates.
+        static: (d, 6, s) by the static unknowns that they depend on.
+        left: (d, 6) residuals.
+    """
+
+    frames: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    static: np.ndarray
+    left: np.ndarray
 
 
 @dataclass
@@ -41,68 +60,49 @@ class NormalEquations:
         )
 
 
-def assemble(
-    basis: MotionBasis,
-    marker: MarkerTerms,
-    root: tuple[np.ndarray, ...],
-    in_markers: slice,
-    in_root: slice,
-) -> NormalEquations:
-    """Sum the terms of all frames into normal equations, one knot interval at a time.
+def add_root(normal: NormalEquations, columns: slice, basis: MotionBasis, root: RootTerms) -> None:
+    """Add the terms of the root equations, one knot interval at a time.
 
-    `in_markers` and `in_root` are the static unknowns that markers and root equations depend on.
+    Args:
+        normal: zero, or with other terms.
+        columns: of the static unknowns, those that the root equations depend on.
+        basis: of the motion.
+        root: the terms.
     """
-    frames, dq, dv, da, by_static, left = root
-    c, wide = marker.gradient.shape[1], by_static.shape[2]
-    normal = NormalEquations.zero(basis.size, c, max(in_markers.stop, in_root.stop))
-    flat = by_static.reshape(-1, wide)
-    normal.static[in_root, in_root] += flat.T @ flat
-    normal.static[in_markers, in_markers] += marker.static
-    normal.static_right[in_root] -= flat.T @ left.ravel()
-    normal.static_right[in_markers] += marker.static_gradient
-    normal.cost += 0.5 * float(marker.square + np.square(left).sum())
-    values, size = basis.values, basis.size
-    rows = by_splines(values[:, frames], (dq, dv, da))
-    neighbours = _neighbours(basis)
-    starts = np.searchsorted(basis.first, np.arange(size - 4))
-    root_starts = np.searchsorted(frames, starts)
-    next_starts = np.minimum(starts, len(marker.to_next))
+    left, size = root.left, basis.size
+    (_, _, c), wide = root.q.shape, root.static.shape[2]
+    flat = root.static.reshape(-1, wide)
+    normal.static[columns, columns] += flat.T @ flat
+    normal.static_right[columns] -= flat.T @ left.ravel()
+    normal.cost += 0.5 * float(np.square(left).sum())
+    rows = by_splines(basis.values[:, root.frames], root.q, root.qd, root.qdd)
+    starts = np.searchsorted(basis.first[root.frames], np.arange(size - 4))
     for first, (start, end) in enumerate(pairwise(starts)):
-        here, dynamic, pairs = (slice(each[first], each[first + 1]) for each in (starts, root_starts, next_starts))
-        weight = values[0, here]
-        block = np.zeros((7, 7, c, c))
-        block[:6] = (neighbours[pairs].T @ marker.to_next[pairs].reshape(-1, c * c)).reshape(6, 7, c, c)
-        block += block.transpose(1, 0, 3, 2)
-        squares = (weight[:, :, None] * weight[:, None]).reshape(-1, 36)
-        block[:6, :6] += (squares.T @ marker.per_frame[here].reshape(-1, c * c)).reshape(6, 6, c, c)
-        border, right = normal.border[first : first + 6], normal.right[first : first + 6]
-        border[..., in_markers] += (weight.T @ marker.across[here].reshape(end - start, -1)).reshape(6, c, -1)
-        right += weight.T @ marker.gradient[here]
-        x = rows[dynamic].reshape(-1, 6 * c)
-        if len(x):
-            block[:6, :6] += (x.T @ x).reshape(6, c, 6, c).transpose(0, 2, 1, 3)
-            border[..., in_root] += (x.T @ by_static[dynamic].reshape(-1, wide)).reshape(6, c, wide)
-            right -= (x.T @ left[dynamic].ravel()).reshape(6, c)
-        reach = min(7, size - first)
-        for a in range(reach):
-            normal.band[first + a, : reach - a] += block[a, a:reach]
-    return normal
+        if start == end:
+            continue
+        x = rows[start:end].reshape(-1, 6 * c)
+        square = (x.T @ x).reshape(6, c, 6, c)
+        for a in range(6):
+            normal.band[first + a, : 6 - a] += square[a, :, a:].transpose(1, 0, 2)
+        normal.border[first : first + 6, :, columns] += (x.T @ flat[6 * start : 6 * end]).reshape(6, c, wide)
+        normal.right[first : first + 6] -= (x.T @ left[start:end].ravel()).reshape(6, c)
 
 
-def by_splines(values: np.ndarray, parts: tuple[np.ndarray, ...]) -> np.ndarray:
-    """(d, r, 6, c) derivatives by the coefficients of the six active splines, from those by q, qd, qdd (d, r, c)."""
-    result: np.ndarray = values[0][:, None, :, None] * parts[0][:, :, None]
-    for value, part in zip(values[1:], parts[1:], strict=True):
-        result += value[:, None, :, None] * part[:, :, None]
-    return result
+@compiled
+def by_splines(values: np.ndarray, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    """(d, r, 6, c) derivatives by the coefficients of the six active splines, from those by q, qd, qdd (d, r, c).
 
-
-def _neighbours(basis: MotionBasis) -> np.ndarray:
-    """(n - 1, 42) products of the six splines at a frame and the seven, from the same one on, at the frame after it."""
-    values, first = basis.values[0], basis.first
-    later = np.zeros((len(first) - 1, SPLINES_PER_BLOCK + 1))
-    np.put_along_axis(later, np.diff(first)[:, None] + np.arange(6), values[1:], axis=1)
-    result: np.ndarray = (values[:-1, :, None] * later[:, None]).reshape(len(later), -1)
+    `values` (3, d, 6) are those of the splines and of their first two derivatives.
+    """
+    d, r, c = q.shape
+    result = np.empty((d, r, 6, c))
+    for k in range(d):
+        for row in range(r):
+            for i in range(6):
+                place, rate, acceleration = values[0, k, i], values[1, k, i], values[2, k, i]
+                for j in range(c):
+                    total = place * q[k, row, j] + rate * qd[k, row, j]
+                    result[k, row, i, j] = total + acceleration * qdd[k, row, j]
     return result
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.marker_terms import marker_terms
+from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import NormalEquations, assemble
+from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
@@ -307,20 +307,19 @@ class MapProblem:
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
         parts = self.full(basis.evaluate(coefficients), static)
         skeleton = self.placed(static)
+        normal = NormalEquations.zero(basis.size, len(self.moving), layout.size)
         noise = (trial.marker_sd, trial.marker_autocorrelation)
-        marker = marker_terms(skeleton, trial.markers, parts[0], noise, self.moving, self.still)
-        root = self._root_terms(k, skeleton, parts, static)
-        normal = assemble(basis, marker, root, layout.in_markers, layout.in_root)
+        columns = (self.moving, self.still)
+        add_markers(normal, layout.in_markers, basis, skeleton, trial.markers, parts[0], noise, *columns)
+        add_root(normal, layout.in_root, basis, self._root_terms(k, skeleton, parts, static))
         moved = coefficients - self.start[k]
         normal.band[:, 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2
         normal.right -= moved / COEFFICIENT_SD**2
         normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
         return normal
 
-    def _root_terms(
-        self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray
-    ) -> tuple[np.ndarray, ...]:
-        """At the dynamic frames: indices, rows by q, qd, qdd (each d, 6, c), by static unknowns (d, 6, s), residual."""
+    def _root_terms(self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray) -> RootTerms:
+        """The root equations at the dynamic frames."""
         trial, layout = self.trials[k], self.layout
         frames = np.flatnonzero(trial.dynamic)
         q, qd, qdd = (part[frames] for part in parts)
@@ -342,7 +341,7 @@ class MapProblem:
         by_static[:, :, layout.instruments] = -by_instrument
         sd = self.root_sd(trial)[:, None]
         rows = (part[..., self.moving] / sd for part in (by_q, terms.qd, terms.qdd))
-        return (frames, *rows, by_static / sd, left / sd[:, 0])
+        return RootTerms(frames, *rows, by_static / sd, left / sd[:, 0])
 
 
 def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:

@@ -1,0 +1,172 @@
+"""Sums over the markers of a body, frame by frame in compiled code.
+
+A motion (l, w) at the ground origin moves a marker at x by l + w x x. The normal matrix of a tree of markers is the
+mass matrix of the same tree with a mass at every marker, and is built the same way: per axis, sums over all markers
+that it carries. For weights that go with two frames, in which a marker is at x and at y, they are
+
+    [0]      sum w                [1:4] sum w x        [4:7] sum w y        [7:16] sum w y x^T, row by row
+
+so that the motion S in the second frame meets, in the first, the generalised force
+
+    (sum w (l + w_ x y),  sum w x x (l + w_ x y)),    with  x x (w_ x y) = w_ (x . y) - y (x . w_).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.model.compiled import compiled
+from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.spatial import inner
+
+
+@compiled
+def add_marker(weight: float, x: np.ndarray, y: np.ndarray, sums: np.ndarray) -> None:
+    """Add a marker at x, and at y in the second frame, to the sums (16,) of the axis that carries it."""
+    sums[0] += weight
+    for r in range(3):
+        sums[1 + r] += weight * x[r]
+        sums[4 + r] += weight * y[r]
+        for c in range(3):
+            sums[7 + 3 * r + c] += weight * y[r] * x[c]
+
+
+@compiled
+def met_force(sums: np.ndarray, s: np.ndarray, out: np.ndarray) -> None:
+    """out = (6,) force that the motion s in the second frame meets in the first."""
+    w = sums[0]
+    lx, ly, lz, wx, wy, wz = s[0], s[1], s[2], s[3], s[4], s[5]
+    square = sums[7] + sums[11] + sums[15]
+    out[0] = w * lx + wy * sums[6] - wz * sums[5]
+    out[1] = w * ly + wz * sums[4] - wx * sums[6]
+    out[2] = w * lz + wx * sums[5] - wy * sums[4]
+    out[3] = sums[2] * lz - sums[3] * ly + square * wx - (sums[7] * wx + sums[8] * wy + sums[9] * wz)
+    out[4] = sums[3] * lx - sums[1] * lz + square * wy - (sums[10] * wx + sums[11] * wy + sums[12] * wz)
+    out[5] = sums[1] * ly - sums[2] * lx + square * wz - (sums[13] * wx + sums[14] * wy + sums[15] * wz)
+
+
+@compiled
+def swapped(sums: np.ndarray, out: np.ndarray) -> None:
+    """out = the sums with the two frames exchanged."""
+    out[0] = sums[0]
+    for r in range(3):
+        out[1 + r], out[4 + r] = sums[4 + r], sums[1 + r]
+        for c in range(3):
+            out[7 + 3 * r + c] = sums[7 + 3 * c + r]
+
+
+@compiled
+def hand_down(parent: np.ndarray, sums: np.ndarray) -> None:
+    """Add to the sums (a, k) of every axis those of the axes that it carries."""
+    for j in range(len(parent) - 1, -1, -1):
+        if parent[j] >= 0:
+            for k in range(sums.shape[1]):
+                sums[parent[j], k] += sums[j, k]
+
+
+@compiled
+def place_marker(rotation: np.ndarray, translation: np.ndarray, local: np.ndarray, out: np.ndarray) -> None:
+    """out = (3,) m, in ground."""
+    for r in range(3):
+        turned = rotation[r, 0] * local[0] + rotation[r, 1] * local[1] + rotation[r, 2] * local[2]
+        out[r] = translation[r] + turned
+
+
+@compiled
+def normal_equations(
+    tree: KinematicTree,
+    owner: np.ndarray,
+    slopes: np.ndarray,
+    at: np.ndarray,
+    carrier: np.ndarray,
+    local: np.ndarray,
+    measured: np.ndarray,
+    count: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
+
+    Args:
+        tree: the skeleton.
+        owner: (a,) the coordinate of each axis.
+        slopes: (n, a) derivatives of the axes by their coordinates.
+        at: (n, a) places of the axes, rad or m.
+        carrier: (m,) the axis that carries each marker.
+        local: (m, 3) m, the markers in the frames of these axes.
+        measured: (n, m, 3) m; NaN where not seen.
+        count: number of coordinates, c.
+    """
+    n, a = at.shape
+    normal, gradient, cost = np.zeros((n, count, count)), np.zeros((n, count)), np.zeros(n)
+    rotation, translation, axes = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty((a, 6))
+    sums, forces, x, r, met = np.empty((a, 16)), np.empty((a, 6)), np.empty(3), np.empty(3), np.empty(6)
+    for k in range(n):
+        place_axes(tree, at[k], rotation, translation, axes)
+        sums[:] = 0.0
+        forces[:] = 0.0
+        for m in range(len(carrier)):
+            j = carrier[m]
+            place_marker(rotation[j], translation[j], local[m], x)
+            for i in range(3):
+                r[i] = measured[k, m, i] - x[i]
+            square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+            if np.isnan(square):
+                continue
+            cost[k] += square
+            add_marker(1.0, x, x, sums[j])
+            add_force(r, x, forces[j])
+        hand_down(tree.parent, sums)
+        hand_down(tree.parent, forces)
+        for j in range(a):
+            met_force(sums[j], axes[j], met)
+            here, own = slopes[k, j], owner[j]
+            gradient[k, own] += here * inner(axes[j], forces[j])
+            normal[k, own, own] += here * here * inner(axes[j], met)
+            i = tree.parent[j]
+            while i >= 0:
+                value = here * slopes[k, i] * inner(axes[i], met)
+                normal[k, own, owner[i]] += value
+                normal[k, owner[i], own] += value
+                i = tree.parent[i]
+    return normal, gradient, cost
+
+
+@compiled
+def add_force(force: np.ndarray, at: np.ndarray, total: np.ndarray) -> None:
+    """Add a force (3,) that acts at a point (3,) m to a total (6,) at the ground origin."""
+    total[0] += force[0]
+    total[1] += force[1]
+    total[2] += force[2]
+    total[3] += at[1] * force[2] - at[2] * force[1]
+    total[4] += at[2] * force[0] - at[0] * force[2]
+    total[5] += at[0] * force[1] - at[1] * force[0]
+
+
+@compiled
+def damped_steps(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """(n, c) solutions of (normal + damping mean(diag) 1) step = gradient, frame by frame, by L D L^T."""
+    n, c = gradient.shape
+    step, lower, diagonal = gradient.copy(), np.empty((c, c)), np.empty(c)
+    for k in range(n):
+        scale = 0.0
+        for i in range(c):
+            scale += normal[k, i, i] / c
+        for i in range(c):
+            for j in range(i + 1):
+                value = normal[k, i, j]
+                if i == j:
+                    value += damping[k] * scale
+                for m in range(j):
+                    value -= lower[i, m] * lower[j, m] * diagonal[m]
+                if i == j:
+                    # rounding must not turn it negative
+                    diagonal[i] = max(value, 1e-16 * scale)
+                else:
+                    lower[i, j] = value / diagonal[j]
+        for i in range(c):
+            for m in range(i):
+                step[k, i] -= lower[i, m] * step[k, m]
+        for i in range(c - 1, -1, -1):
+            step[k, i] /= diagonal[i]
+            for m in range(i + 1, c):
+                step[k, i] -= lower[m, i] * step[k, m]
+    return step
