@@ -28,6 +28,7 @@ SOURCES = (
     "model/spatial.py",
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
+    "motion/regressor.py",
     "motion/marker_sums.py",
     "estimation/simultaneous/normal_equations.py",
     "estimation/simultaneous/marker_terms.py",
@@ -39,6 +40,13 @@ def compiled(function: F) -> F:
     """The function as machine code; division by zero gives inf or nan, as NumPy has it."""
     with _kept_in(cache_folder()):
         result: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    return result
+
+
+def inlined(function: F) -> F:
+    """As `compiled`, for small functions in inner loops: their code stands where they are called."""
+    with _kept_in(cache_folder()):
+        result: F = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
     return result
 
 

@@ -1,60 +1,42 @@
 """Spatial vectors in ground axes, at the ground origin: linear part first, then angular (Featherstone 2008, ch. 2).
 
 A motion (velocity of the body's point at the origin, angular velocity) and a force (force, moment about the origin) of
-all bodies can be added up as they are, since all are taken at one place.
+all bodies can be added up as they are, since all are taken at one place. Vectors are rows of arrays (k, 6), told by
+their indices: in inner loops a view of its own for each row takes longer than what is computed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import inlined
 
 
-@compiled
-def motion_cross(v: np.ndarray, m: np.ndarray, out: np.ndarray) -> None:
-    """out = v x m: how the motion m changes when what it belongs to moves by v."""
-    out[0] = v[4] * m[2] - v[5] * m[1] + v[1] * m[5] - v[2] * m[4]
-    out[1] = v[5] * m[0] - v[3] * m[2] + v[2] * m[3] - v[0] * m[5]
-    out[2] = v[3] * m[1] - v[4] * m[0] + v[0] * m[4] - v[1] * m[3]
-    out[3] = v[4] * m[5] - v[5] * m[4]
-    out[4] = v[5] * m[3] - v[3] * m[5]
-    out[5] = v[3] * m[4] - v[4] * m[3]
+@inlined
+def motion_cross(v: np.ndarray, i: int, m: np.ndarray, j: int, out: np.ndarray, k: int) -> None:
+    """out[k] = v[i] x m[j]: how the motion m changes when what it belongs to moves by v."""
+    out[k, 0] = v[i, 4] * m[j, 2] - v[i, 5] * m[j, 1] + v[i, 1] * m[j, 5] - v[i, 2] * m[j, 4]
+    out[k, 1] = v[i, 5] * m[j, 0] - v[i, 3] * m[j, 2] + v[i, 2] * m[j, 3] - v[i, 0] * m[j, 5]
+    out[k, 2] = v[i, 3] * m[j, 1] - v[i, 4] * m[j, 0] + v[i, 0] * m[j, 4] - v[i, 1] * m[j, 3]
+    out[k, 3] = v[i, 4] * m[j, 5] - v[i, 5] * m[j, 4]
+    out[k, 4] = v[i, 5] * m[j, 3] - v[i, 3] * m[j, 5]
+    out[k, 5] = v[i, 3] * m[j, 4] - v[i, 4] * m[j, 3]
 
 
-@compiled
-def force_cross(v: np.ndarray, f: np.ndarray, out: np.ndarray) -> None:
-    """out = v x* f: how the force f changes when what it belongs to moves by v."""
-    out[0] = v[4] * f[2] - v[5] * f[1]
-    out[1] = v[5] * f[0] - v[3] * f[2]
-    out[2] = v[3] * f[1] - v[4] * f[0]
-    out[3] = v[4] * f[5] - v[5] * f[4] + v[1] * f[2] - v[2] * f[1]
-    out[4] = v[5] * f[3] - v[3] * f[5] + v[2] * f[0] - v[0] * f[2]
-    out[5] = v[3] * f[4] - v[4] * f[3] + v[0] * f[1] - v[1] * f[0]
+@inlined
+def force_cross(v: np.ndarray, i: int, f: np.ndarray, j: int, out: np.ndarray, k: int) -> None:
+    """out[k] = v[i] x* f[j]: how the force f changes when what it belongs to moves by v."""
+    out[k, 0] = v[i, 4] * f[j, 2] - v[i, 5] * f[j, 1]
+    out[k, 1] = v[i, 5] * f[j, 0] - v[i, 3] * f[j, 2]
+    out[k, 2] = v[i, 3] * f[j, 1] - v[i, 4] * f[j, 0]
+    out[k, 3] = v[i, 4] * f[j, 5] - v[i, 5] * f[j, 4] + v[i, 1] * f[j, 2] - v[i, 2] * f[j, 1]
+    out[k, 4] = v[i, 5] * f[j, 3] - v[i, 3] * f[j, 5] + v[i, 2] * f[j, 0] - v[i, 0] * f[j, 2]
+    out[k, 5] = v[i, 3] * f[j, 4] - v[i, 4] * f[j, 3] + v[i, 0] * f[j, 1] - v[i, 1] * f[j, 0]
 
 
-@compiled
-def times(matrix: np.ndarray, vector: np.ndarray, out: np.ndarray) -> None:
-    """out = matrix @ vector, (6, 6) and (6,)."""
-    for i in range(6):
-        total = 0.0
-        for k in range(6):
-            total += matrix[i, k] * vector[k]
-        out[i] = total
-
-
-@compiled
-def transposed_times(matrix: np.ndarray, vector: np.ndarray, out: np.ndarray) -> None:
-    """out = matrix^T @ vector, (6, 6) and (6,)."""
-    for i in range(6):
-        out[i] = 0.0
-    for k in range(6):
-        for i in range(6):
-            out[i] += matrix[k, i] * vector[k]
-
-
-@compiled
-def inner(a: np.ndarray, b: np.ndarray) -> float:
-    """a . b of two (6,)."""
-    result: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+@inlined
+def inner(a: np.ndarray, i: int, b: np.ndarray, j: int) -> float:
+    """a[i] . b[j]."""
+    result: float = a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2]
+    result += a[i, 3] * b[j, 3] + a[i, 4] * b[j, 4] + a[i, 5] * b[j, 5]
     return result

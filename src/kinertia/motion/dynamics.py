@@ -19,7 +19,8 @@ import numpy as np
 
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.rigid_body import axis_forces, regressor, root_load
+from kinertia.motion.regressor import regressor
+from kinertia.motion.rigid_body import axis_forces, root_load
 
 
 @dataclass(frozen=True)

@@ -15,44 +15,59 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import compiled, inlined
 from kinertia.model.kinematic_tree import KinematicTree, place_axes
 from kinertia.model.spatial import inner
 
 
-@compiled
+@inlined
 def add_marker(weight: float, x: np.ndarray, y: np.ndarray, sums: np.ndarray) -> None:
     """Add a marker at x, and at y in the second frame, to the sums (16,) of the axis that carries it."""
     sums[0] += weight
-    for r in range(3):
-        sums[1 + r] += weight * x[r]
-        sums[4 + r] += weight * y[r]
-        for c in range(3):
-            sums[7 + 3 * r + c] += weight * y[r] * x[c]
+    sums[1] += weight * x[0]
+    sums[4] += weight * y[0]
+    sums[2] += weight * x[1]
+    sums[5] += weight * y[1]
+    sums[3] += weight * x[2]
+    sums[6] += weight * y[2]
+    sums[7] += weight * y[0] * x[0]
+    sums[8] += weight * y[0] * x[1]
+    sums[9] += weight * y[0] * x[2]
+    sums[10] += weight * y[1] * x[0]
+    sums[11] += weight * y[1] * x[1]
+    sums[12] += weight * y[1] * x[2]
+    sums[13] += weight * y[2] * x[0]
+    sums[14] += weight * y[2] * x[1]
+    sums[15] += weight * y[2] * x[2]
+
+
+@inlined
+def met_force(sums: np.ndarray, i: int, s: np.ndarray, j: int, out: np.ndarray) -> None:
+    """out[0] = force that the motion s[j] in the second frame meets in the first, with sums[i]."""
+    w = sums[i, 0]
+    lx, ly, lz, wx, wy, wz = s[j, 0], s[j, 1], s[j, 2], s[j, 3], s[j, 4], s[j, 5]
+    square = sums[i, 7] + sums[i, 11] + sums[i, 15]
+    out[0, 0] = w * lx + wy * sums[i, 6] - wz * sums[i, 5]
+    out[0, 1] = w * ly + wz * sums[i, 4] - wx * sums[i, 6]
+    out[0, 2] = w * lz + wx * sums[i, 5] - wy * sums[i, 4]
+    along_x = sums[i, 7] * wx + sums[i, 8] * wy + sums[i, 9] * wz
+    along_y = sums[i, 10] * wx + sums[i, 11] * wy + sums[i, 12] * wz
+    along_z = sums[i, 13] * wx + sums[i, 14] * wy + sums[i, 15] * wz
+    out[0, 3] = sums[i, 2] * lz - sums[i, 3] * ly + square * wx - along_x
+    out[0, 4] = sums[i, 3] * lx - sums[i, 1] * lz + square * wy - along_y
+    out[0, 5] = sums[i, 1] * ly - sums[i, 2] * lx + square * wz - along_z
 
 
 @compiled
-def met_force(sums: np.ndarray, s: np.ndarray, out: np.ndarray) -> None:
-    """out = (6,) force that the motion s in the second frame meets in the first."""
-    w = sums[0]
-    lx, ly, lz, wx, wy, wz = s[0], s[1], s[2], s[3], s[4], s[5]
-    square = sums[7] + sums[11] + sums[15]
-    out[0] = w * lx + wy * sums[6] - wz * sums[5]
-    out[1] = w * ly + wz * sums[4] - wx * sums[6]
-    out[2] = w * lz + wx * sums[5] - wy * sums[4]
-    out[3] = sums[2] * lz - sums[3] * ly + square * wx - (sums[7] * wx + sums[8] * wy + sums[9] * wz)
-    out[4] = sums[3] * lx - sums[1] * lz + square * wy - (sums[10] * wx + sums[11] * wy + sums[12] * wz)
-    out[5] = sums[1] * ly - sums[2] * lx + square * wz - (sums[13] * wx + sums[14] * wy + sums[15] * wz)
-
-
-@compiled
-def swapped(sums: np.ndarray, out: np.ndarray) -> None:
-    """out = the sums with the two frames exchanged."""
-    out[0] = sums[0]
-    for r in range(3):
-        out[1 + r], out[4 + r] = sums[4 + r], sums[1 + r]
-        for c in range(3):
-            out[7 + 3 * r + c] = sums[7 + 3 * c + r]
+def swapped(sums: np.ndarray) -> np.ndarray:
+    """(a, 16) the sums with the two frames exchanged."""
+    result = sums.copy()
+    for j in range(len(sums)):
+        for r in range(3):
+            result[j, 1 + r], result[j, 4 + r] = sums[j, 4 + r], sums[j, 1 + r]
+            for c in range(3):
+                result[j, 7 + 3 * r + c] = sums[j, 7 + 3 * c + r]
+    return result
 
 
 @compiled
@@ -64,12 +79,12 @@ def hand_down(parent: np.ndarray, sums: np.ndarray) -> None:
                 sums[parent[j], k] += sums[j, k]
 
 
-@compiled
+@inlined
 def place_marker(rotation: np.ndarray, translation: np.ndarray, local: np.ndarray, out: np.ndarray) -> None:
     """out = (3,) m, in ground."""
-    for r in range(3):
-        turned = rotation[r, 0] * local[0] + rotation[r, 1] * local[1] + rotation[r, 2] * local[2]
-        out[r] = translation[r] + turned
+    out[0] = translation[0] + rotation[0, 0] * local[0] + rotation[0, 1] * local[1] + rotation[0, 2] * local[2]
+    out[1] = translation[1] + rotation[1, 0] * local[0] + rotation[1, 1] * local[1] + rotation[1, 2] * local[2]
+    out[2] = translation[2] + rotation[2, 0] * local[0] + rotation[2, 1] * local[1] + rotation[2, 2] * local[2]
 
 
 @compiled
@@ -98,7 +113,7 @@ def normal_equations(
     n, a = at.shape
     normal, gradient, cost = np.zeros((n, count, count)), np.zeros((n, count)), np.zeros(n)
     rotation, translation, axes = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty((a, 6))
-    sums, forces, x, r, met = np.empty((a, 16)), np.empty((a, 6)), np.empty(3), np.empty(3), np.empty(6)
+    sums, forces, x, r, met = np.empty((a, 16)), np.empty((a, 6)), np.empty(3), np.empty(3), np.empty((1, 6))
     for k in range(n):
         place_axes(tree, at[k], rotation, translation, axes)
         sums[:] = 0.0
@@ -117,20 +132,20 @@ def normal_equations(
         hand_down(tree.parent, sums)
         hand_down(tree.parent, forces)
         for j in range(a):
-            met_force(sums[j], axes[j], met)
+            met_force(sums, j, axes, j, met)
             here, own = slopes[k, j], owner[j]
-            gradient[k, own] += here * inner(axes[j], forces[j])
-            normal[k, own, own] += here * here * inner(axes[j], met)
+            gradient[k, own] += here * inner(axes, j, forces, j)
+            normal[k, own, own] += here * here * inner(axes, j, met, 0)
             i = tree.parent[j]
             while i >= 0:
-                value = here * slopes[k, i] * inner(axes[i], met)
+                value = here * slopes[k, i] * inner(axes, i, met, 0)
                 normal[k, own, owner[i]] += value
                 normal[k, owner[i], own] += value
                 i = tree.parent[i]
     return normal, gradient, cost
 
 
-@compiled
+@inlined
 def add_force(force: np.ndarray, at: np.ndarray, total: np.ndarray) -> None:
     """Add a force (3,) that acts at a point (3,) m to a total (6,) at the ground origin."""
     total[0] += force[0]

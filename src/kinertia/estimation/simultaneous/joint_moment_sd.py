@@ -23,7 +23,8 @@ from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.rigid_body import axis_force_derivatives, regressor
+from kinertia.motion.regressor import regressor
+from kinertia.motion.rigid_body import axis_force_derivatives
 
 _FRAMES_AT_ONCE = 100
 """Larger arrays would leave the processor's cache."""

@@ -9,8 +9,8 @@ fast: accelerations, which the forces answer to.
 
 With J the derivative of the markers by the coordinates that move, S that by what does not (static coordinates, then
 marker positions), r = measured - model and W the information, the terms are J^T W J, J^T W S, J^T W r, S^T W S and
-S^T W r. They are summed over the frames of a knot interval, in which the same six splines are active, and seven with the
-frame after it.
+S^T W r. They are summed over the frames of a knot interval, in which the same six splines are active, and seven with
+the frame after it.
 """
 
 from __future__ import annotations
@@ -230,120 +230,95 @@ def _frame(
     markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: _Interval, static: _Static
 ) -> None:
     """J^T W J of frame k with itself; J^T W S of marker positions and J^T W r, W r being of three frames."""
-    a, here = len(markers.column), k % 3
-    c = interval.gradient.shape[1]
-    sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty(6)
-    pull, directions = np.empty(3), np.empty((3, 3))
-    for m in range(len(markers.carrier)):
-        weight = markers.own[k, m]
-        if weight == 0.0:
-            continue
-        _informed(markers, k, m, placed, pull, directions)
-        at = placed.places[here, m]
-        add_marker(weight, at, at, sums[markers.carrier[m]])
-        add_force(pull, at, forces[markers.carrier[m]])
-        _by_place(markers, k, m, row, still, placed, directions, interval, static)
-        for i in range(3):
-            static.cost[0] += placed.errors[here, m, i] * pull[i]
-            for r in range(3):
-                static.right[still + 3 * m + i] += placed.turned[here, m, r, i] * pull[r]
+    a, m, here = len(markers.column), len(markers.carrier), k % 3
+    pull, directions = np.zeros((m, 3)), np.zeros((m, 3, 3))
+    for offset in range(-1, 2):
+        _informed(markers, k, offset, placed, pull, directions)
+    sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty((1, 6))
+    for i in range(m):
+        at = placed.places[here, i]
+        add_marker(markers.own[k, i], at, at, sums[markers.carrier[i]])
+        add_force(pull[i], at, forces[markers.carrier[i]])
+    _by_place(markers, k, row, still, placed, pull, directions, interval, static)
     hand_down(markers.tree.parent, sums)
     hand_down(markers.tree.parent, forces)
+    parent, column, slopes, axes = markers.tree.parent, markers.column, markers.slopes, placed.axes[here]
+    c, gradient = interval.gradient.shape[1], interval.gradient[row]
+    product = np.zeros((a, a))
     for j in range(a):
-        axis, slope, column = placed.axes[here, j], markers.slopes[k, j], markers.column[j]
-        force = slope * inner(axis, forces[j])
-        if column < c:
-            interval.gradient[row, column] += force
+        force = slopes[k, j] * inner(axes, j, forces, j)
+        if column[j] < c:
+            gradient[column[j]] += force
         else:
-            static.right[column - c] += force
-        met_force(sums[j], axis, met)
-        _sort(slope * slope * inner(axis, met), column, column, row, row, c, 0, interval, static)
-        i = markers.tree.parent[j]
+            static.right[column[j] - c] += force
+        met_force(sums, j, axes, j, met)
+        i = j
         while i >= 0:
-            value = slope * markers.slopes[k, i] * inner(placed.axes[here, i], met)
-            _sort(value, column, markers.column[i], row, row, c, 0, interval, static)
-            if (column < c and markers.column[i] < c) or (column >= c and markers.column[i] >= c):
-                _sort(value, markers.column[i], column, row, row, c, 0, interval, static)
-            i = markers.tree.parent[i]
+            value = slopes[k, j] * slopes[k, i] * inner(axes, i, met, 0)
+            product[i, j] = value
+            product[j, i] = value
+            i = parent[i]
+    _sort(column, product, interval.squares[0, row], interval.across[row], static.square)
 
 
 @compiled
-def _informed(markers: _Markers, k: int, m: int, placed: _Placed, pull: np.ndarray, directions: np.ndarray) -> None:
-    """pull = (3,) W r and directions = (3, 3) W times the segment's axes, of marker m in frame k."""
-    for offset in range(-1, 2):
-        other = k + offset
-        if other < 0 or other >= len(markers.own):
-            weight = 0.0
-        else:
-            weight = markers.own[k, m] if offset == 0 else markers.next[min(k, other), m]
-        there = other % 3
+def _informed(
+    markers: _Markers, k: int, offset: int, placed: _Placed, pull: np.ndarray, directions: np.ndarray
+) -> None:
+    """Add what the frame at this offset from k gives of W r (m, 3) and W times the segments' axes (m, 3, 3)."""
+    if k + offset < 0 or k + offset >= len(markers.own):
+        return
+    weights = markers.own[k] if offset == 0 else markers.next[min(k, k + offset)]
+    errors, turned = placed.errors[(k + offset) % 3], placed.turned[(k + offset) % 3]
+    for m in range(len(weights)):
         for r in range(3):
-            if offset == -1:
-                pull[r] = 0.0
-                directions[r] = 0.0
-            if weight != 0.0:
-                pull[r] += weight * placed.errors[there, m, r]
-                for i in range(3):
-                    directions[r, i] += weight * placed.turned[there, m, r, i]
+            pull[m, r] += weights[m] * errors[m, r]
+            for i in range(3):
+                directions[m, r, i] += weights[m] * turned[m, r, i]
 
 
 @compiled
 def _by_place(
     markers: _Markers,
     k: int,
-    m: int,
     row: int,
     still: int,
     placed: _Placed,
+    pull: np.ndarray,
     directions: np.ndarray,
     interval: _Interval,
     static: _Static,
 ) -> None:
-    """Terms of marker m's position in its segment: across the coordinates, and with itself."""
-    c, here, first = interval.gradient.shape[1], k % 3, still + 3 * m
-    force = np.empty(6)
-    for i in range(3):
-        force[:] = 0.0
-        add_force(directions[:, i], placed.places[here, m], force)
+    """Terms of the markers' positions in their segments: across the coordinates, with themselves, and of r."""
+    c, here = interval.gradient.shape[1], k % 3
+    parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
+    axes, at, turned, errors = placed.axes[here], placed.places[here], placed.turned[here], placed.errors[here]
+    across, square, right, d = interval.across[row], static.square, static.right, directions
+    moments = np.empty((3, 3))
+    for m in range(len(markers.carrier)):
+        first = still + 3 * m
+        for i in range(3):
+            moments[0, i] = at[m, 1] * d[m, 2, i] - at[m, 2] * d[m, 1, i]
+            moments[1, i] = at[m, 2] * d[m, 0, i] - at[m, 0] * d[m, 2, i]
+            moments[2, i] = at[m, 0] * d[m, 1, i] - at[m, 1] * d[m, 0, i]
+            static.cost[0] += errors[m, i] * pull[m, i]
+            for r in range(3):
+                right[first + i] += turned[m, r, i] * pull[m, r]
+                for h in range(3):
+                    square[first + h, first + i] += turned[m, r, h] * d[m, r, i]
         j = markers.carrier[m]
         while j >= 0:
-            value = markers.slopes[k, j] * inner(placed.axes[here, j], force)
-            if markers.column[j] < c:
-                interval.across[row, markers.column[j], first + i] += value
-            else:
-                static.square[markers.column[j] - c, first + i] += value
-                static.square[first + i, markers.column[j] - c] += value
-            j = markers.tree.parent[j]
-        for h in range(3):
-            for r in range(3):
-                static.square[first + h, first + i] += placed.turned[here, m, r, h] * directions[r, i]
-
-
-@compiled
-def _sort(
-    value: float,
-    i: int,
-    j: int,
-    row_i: int,
-    row_j: int,
-    c: int,
-    kind: int,
-    interval: _Interval,
-    static: _Static,
-) -> None:
-    """Add a term of the coordinates i, in one frame, and j, in the same or the next, to where it belongs."""
-    if i < c and j < c:
-        interval.squares[kind, row_i, i * c + j] += value
-        if kind == 1:
-            interval.squares[2, row_i, j * c + i] += value
-    elif i < c:
-        interval.across[row_i, i, j - c] += value
-    elif j < c:
-        interval.across[row_j, j, i - c] += value
-    else:
-        static.square[i - c, j - c] += value
-        if kind == 1:
-            static.square[j - c, i - c] += value
+            for i in range(3):
+                value = 0.0
+                for r in range(3):
+                    value += axes[j, r] * d[m, r, i] + axes[j, 3 + r] * moments[r, i]
+                value *= slopes[k, j]
+                if column[j] < c:
+                    across[column[j], first + i] += value
+                else:
+                    square[column[j] - c, first + i] += value
+                    square[first + i, column[j] - c] += value
+            j = parent[j]
 
 
 @compiled
@@ -351,28 +326,54 @@ def _pair(
     markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: _Interval, static: _Static
 ) -> None:
     """J^T W J of frame k with the next."""
-    a, here, there, c = len(markers.column), k % 3, (k + 1) % 3, interval.gradient.shape[1]
-    sums, back, met = np.zeros((a, 16)), np.empty(16), np.empty(6)
+    a, here, there = len(markers.column), k % 3, (k + 1) % 3
+    sums, met = np.zeros((a, 16)), np.empty((1, 6))
     for m in range(len(markers.carrier)):
-        if markers.next[k, m] != 0.0:
-            add_marker(markers.next[k, m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
+        add_marker(markers.next[k, m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
     hand_down(markers.tree.parent, sums)
+    back = swapped(sums)
+    parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
+    axes, later = placed.axes[here], placed.axes[there]
+    product = np.zeros((a, a))
     for j in range(a):
         # what axis j carries meets it, and all axes before it, in the other frame
-        now, later, column = markers.slopes[k, j], markers.slopes[k + 1, j], markers.column[j]
-        met_force(sums[j], placed.axes[there, j], met)
+        met_force(sums, j, later, j, met)
         i = j
         while i >= 0:
-            value = later * markers.slopes[k, i] * inner(placed.axes[here, i], met)
-            _sort(value, markers.column[i], column, row, row + 1, c, 1, interval, static)
-            i = markers.tree.parent[i]
-        swapped(sums[j], back)
-        met_force(back, placed.axes[here, j], met)
-        i = markers.tree.parent[j]
+            product[i, j] = slopes[k + 1, j] * slopes[k, i] * inner(axes, i, met, 0)
+            i = parent[i]
+        met_force(back, j, axes, j, met)
+        i = parent[j]
         while i >= 0:
-            value = now * markers.slopes[k + 1, i] * inner(placed.axes[there, i], met)
-            _sort(value, column, markers.column[i], row, row + 1, c, 1, interval, static)
-            i = markers.tree.parent[i]
+            product[j, i] = slopes[k, j] * slopes[k + 1, i] * inner(later, i, met, 0)
+            i = parent[i]
+    _sort(column, product, interval.squares[1, row], interval.across[row], static.square)
+    _sort(column, product.T, interval.squares[2, row], interval.across[row + 1], static.square)
+
+
+@compiled
+def _sort(column: np.ndarray, product: np.ndarray, squares: np.ndarray, across: np.ndarray, square: np.ndarray) -> None:
+    """Add products (a, a) of axes to where their coordinates belong: the first in a frame, the second in any.
+
+    Args:
+        column: (a,) as `_Markers` has it.
+        product: of the first's axes (rows) with the second's.
+        squares: (c c,) where both coordinates move.
+        across: (c, s) of the first's frame, where the second does not move.
+        square: (s, s) where neither does.
+    """
+    a, c = len(column), len(across)
+    for i in range(a):
+        for j in range(a):
+            value = product[i, j]
+            if value != 0.0:
+                if column[i] < c:
+                    if column[j] < c:
+                        squares[column[i] * c + column[j]] += value
+                    else:
+                        across[column[i], column[j] - c] += value
+                elif column[j] >= c:
+                    square[column[i] - c, column[j] - c] += value
 
 
 @compiled
@@ -400,16 +401,14 @@ def _to_splines(
                 weight[i, j, 1, k - start] += values[k, i] * later[j]
                 weight[j, i, 2, k - start] += values[k, i] * later[j]
     size = len(band)
+    squares = np.ascontiguousarray(interval.squares[:, :count]).reshape(3 * count, c * c)
     for i in range(_TOGETHER):
         reach = min(_TOGETHER - i, size - at - i)
         if reach <= 0:
             break
         pairs = np.ascontiguousarray(weight[i, i : i + reach]).reshape(reach, 3 * count)
-        squares = np.ascontiguousarray(interval.squares[:, :count]).reshape(3 * count, c * c)
         band[at + i, :reach] += np.dot(pairs, squares).reshape(reach, c, c)
-    for i in range(6):
-        for k in range(count):
-            for j in range(c):
-                right[at + i, j] += values[start + k, i] * interval.gradient[k, j]
-                for s in range(border.shape[2]):
-                    border[at + i, j, s] += values[start + k, i] * interval.across[k, j, s]
+    active = np.ascontiguousarray(values[start:end].T)
+    right[at : at + 6] += np.dot(active, interval.gradient[:count])
+    across = interval.across[:count].reshape(count, -1)
+    border[at : at + 6] += np.dot(active, across).reshape(6, c, -1)

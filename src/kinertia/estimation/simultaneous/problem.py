@@ -340,8 +340,8 @@ class MapProblem:
         by_instrument[:, 3:] -= np.cross(root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
         by_static[:, :, layout.instruments] = -by_instrument
         sd = self.root_sd(trial)[:, None]
-        rows = (part[..., self.moving] / sd for part in (by_q, terms.qd, terms.qdd))
-        return RootTerms(frames, *rows, by_static / sd, left / sd[:, 0])
+        by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by_q, terms.qd, terms.qdd))
+        return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[:, 0])
 
 
 def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
