@@ -166,7 +166,7 @@ def write_actuators(model: Path, free: list[str], out: Path) -> None:
         if not name.startswith("pelvis_"):
             where = f"<coordinate>{name}</coordinate>"
             objects.append(_actuator("CoordinateActuator", name, where, by_prefix(name, OPTIMAL_NM, 100.0), 1.0))
-    out.write_text(_document("ForceSet", objects))
+    out.write_text(_document("ForceSet", objects), encoding="utf-8")
 
 
 def _actuator(kind: str, name: str, where: str, optimal: float, limit: float) -> str:
@@ -182,7 +182,7 @@ def write_tasks(free: list[str], out: Path) -> None:
         f"<coordinate>{name}</coordinate><limit>0</limit></CMC_Joint>"
         for name in free
     ]
-    out.write_text(_document("CMC_TaskSet", objects))
+    out.write_text(_document("CMC_TaskSet", objects), encoding="utf-8")
 
 
 def _document(kind: str, objects: list[str]) -> str:

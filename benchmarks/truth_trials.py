@@ -266,7 +266,8 @@ def write_loads(path: Path, forces: str) -> None:
     <datafile>{forces}</datafile>
   </ExternalLoads>
 </OpenSimDocument>
-"""
+""",
+        encoding="utf-8",
     )
 
 

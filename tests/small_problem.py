@@ -85,7 +85,7 @@ def curved_problem(path: Path) -> MapProblem:
     places = (("0.1 -0.05 0.02", "0.3 -0.4 0.2"), ("0.01 0.02 0.03", "0.1 0.2 -0.3"))
     root = joint("CustomJoint", "root", "/ground", "pelvis", FREE[1], CUSTOM_ROOT, places=places)
     knee = joint("CustomJoint", "knee", "/bodyset/pelvis", "leg", "ab", transform(list(axes)))
-    path.write_text(model(root + knee))
+    path.write_text(model(root + knee), encoding="utf-8")
     ours = read_osim(path)
     skeleton = replace(ours.skeleton, feet=("leg", "pelvis"))
     time, motion = smooth_motion(skeleton, 13, 50.0)

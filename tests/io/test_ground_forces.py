@@ -170,6 +170,26 @@ def test_datafile_is_used_only_without_a_force_file(write, write_xml, tmp_path):
         read_forces(None)
 
 
+def test_datafile_as_windows_writes_it(write, write_xml, tmp_path):
+    (tmp_path / "forces").mkdir()
+    write(named("A")).rename(tmp_path / "forces" / "grf.mot")
+    plates, notes = read_forces_with_notes(None, write_xml("A", datafile=r"forces\grf.mot"))
+    assert plates.names == ("A",)
+    assert not any("beside" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    "datafile", [r"C:\Users\anna\grf.mot", r"\\server\lab\grf.mot", "D:/lab/grf.mot", "/lab/grf.mot"]
+)
+def test_datafile_of_another_computer_is_looked_for_beside_the_loads(write, write_xml, datafile):
+    write(named("A"))
+    plates, notes = read_forces_with_notes(None, write_xml("A", datafile=datafile))
+    assert plates.names == ("A",)
+    assert f"loads.xml: its datafile {datafile} is not there; grf.mot beside it was read" in notes
+    with pytest.raises(FileError, match=r"its datafile .*gone.mot is not at"):
+        read_forces(None, write_xml("A", datafile=datafile.replace("grf", "gone")))
+
+
 @pytest.mark.parametrize("tag", ["<isDisabled> true </isDisabled>", "<appliesForce>false</appliesForce>"])
 def test_disabled_loads_are_left_out(write, write_xml, tag):
     xml = write_xml("A", "B", replace=('name="A">', f'name="A">{tag}'))

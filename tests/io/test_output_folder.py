@@ -1,16 +1,18 @@
 """Result folders: complete or not at all, and nobody else's."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
+from pathlib import Path
 
 import pytest
 
 from kinertia.errors import FileError
-from kinertia.io.output_folder import GENERATOR, complete_folder, expect_own_folder
+from kinertia.io.output_folder import GENERATOR, check_folder, complete_folder, expect_own_folder
 
 
 @pytest.mark.parametrize("name", ["missing", "empty", "hidden"])
@@ -61,6 +63,69 @@ def test_an_error_leaves_nothing(tmp_path):
     with pytest.raises(RuntimeError):
         fail()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Results of an earlier run."""
+    folder = tmp_path / "out"
+    (folder / "walk").mkdir(parents=True)
+    for name in ("a.txt", "b.txt", "walk/c.txt"):
+        (folder / name).write_text("old", encoding="utf-8")
+    return folder
+
+
+def _write_again(folder):
+    with complete_folder(folder) as work:
+        (work / "walk").mkdir()
+        for name in ("a.txt", "b.txt", "walk/c.txt", "walk/new.txt"):
+            (work / name).write_text("new", encoding="utf-8")
+
+
+def _texts(folder):
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return {path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8") for path in files}
+
+
+def test_results_are_replaced(results):
+    (results / "mine.txt").write_text("mine", encoding="utf-8")
+    _write_again(results)
+    new = dict.fromkeys(("a.txt", "b.txt", "walk/c.txt", "walk/new.txt"), "new")
+    assert _texts(results) == {**new, "mine.txt": "mine"}
+    assert [path.name for path in results.parent.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("open_one", ["a.txt", "b.txt", "walk/c.txt"])
+def test_a_file_that_is_open_elsewhere_leaves_all_as_it_was(results, monkeypatch, open_one):
+    """On Windows nobody can replace a file that Excel or OpenSim has open."""
+    before, move = _texts(results), os.replace
+
+    def replace(source, target):
+        if results / open_one in (Path(source), Path(target)):
+            raise PermissionError(13, "Access is denied", str(source), 5, str(target))
+        move(source, target)
+
+    monkeypatch.setattr("kinertia.io.output_folder.os.replace", replace)
+    with pytest.raises(FileError, match=rf"{Path(open_one).name}: cannot be replaced .*close the program"):
+        _write_again(results)
+    assert _texts(results) == before
+    assert [path.name for path in results.parent.iterdir()] == ["out"]
+
+
+def test_a_folder_in_the_way_leaves_all_as_it_was(results):
+    (results / "b.txt").unlink()
+    (results / "b.txt").mkdir()
+    (results / "b.txt" / "mine.txt").write_text("mine", encoding="utf-8")
+    before = _texts(results)
+    with pytest.raises(FileError, match=r"b.txt: cannot be replaced"):
+        _write_again(results)
+    assert _texts(results) == before
+
+
+def test_a_drive_that_is_not_there(monkeypatch, tmp_path):
+    monkeypatch.setattr(Path, "exists", lambda path: False)
+    with pytest.raises(FileError, match="on a drive or share that is not there"):
+        check_folder(tmp_path / "out")
 
 
 def test_works_outside_the_main_thread(tmp_path):

@@ -1,3 +1,4 @@
+import os
 import re
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from kinertia.io.toml_lines import TomlFile
 from kinertia.settings import Settings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
+elsewhere = pytest.mark.skipif(os.name == "nt", reason="Windows has drives")
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured data are not at {DATA}")
 
 GOOD = """\
@@ -116,6 +118,17 @@ def test_own_marker_set_and_absolute_paths(folder):
     assert result.model.static == folder / "static.trc"
 
 
+def test_paths_with_the_separators_of_windows(folder):
+    trial = read(folder, changed('"data/walk1.trc"', r"'data\walk1.trc'")).trials[0]
+    assert trial.markers == folder / "data" / "walk1.trc"
+    assert trial.name == "walk1"
+
+
+def test_one_trial_needs_no_folder_of_its_own(folder):
+    text = GOOD[: GOOD.index("[[trial]]")] + '[[trial]]\nmarkers = "data/walk2.c3d"\nname = "walk: 2"\n'
+    assert read(folder, text).trials[0].name == "walk: 2"
+
+
 def test_paths_do_not_depend_on_the_working_folder(folder, monkeypatch):
     (folder / "subject.toml").write_text(GOOD)
     monkeypatch.chdir(folder / "data")
@@ -171,10 +184,17 @@ CASES = [
     ('name = "second"', 'name = "walk1"', 18, "trial 'walk1' is there already"),
     ('name = "second"', 'name = ""', 18, "must be a name that a folder can have"),
     ('name = "second"', 'name = "../second"', 18, "must be a name that a folder can have"),
+    ('name = "second"', 'name = "nul"', 18, 'name = "nul": must be a name that a folder can have on every system'),
+    ('name = "second"', 'name = "walk: 2"', 18, "must be a name that a folder can have on every system"),
+    ('name = "second"', 'name = "Walk1"', 18, "trial 'walk1' is there already; Windows and macOS"),
     ('"data/walk2.c3d"', '"data"', 17, "data is a folder; give a file"),
     ('sex = "female"', "sex = female", 2, "put text in quotes"),
     ("height_m = 1.68", "height_m = 1.68\nheight_m = 1.7", 5, "not valid TOML"),
     ('"data/walk1.mot"', '"C:\\walk1.mot"', 12, "write paths with /"),
+    ('"data/walk1.mot"', '"C:\\Users\\a.mot"', 12, "write paths with /"),
+    ('"data/walk1.mot"', '"C:\\trials\\new.mot"', 12, "write / instead of"),
+    pytest.param('"data/walk1.mot"', '"C:/a.mot"', 12, "is on drive C: of Windows", marks=elsewhere),
+    pytest.param('"data/walk1.mot"', "'C:\\data\\a.mot'", 12, "is on drive C: of Windows", marks=elsewhere),
 ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +19,7 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.provenance import VERSION, provenance_of
+from kinertia.io.provenance import VERSION, command_line, provenance_of
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_from_options, with_settings
 from kinertia.report.files import save_fit
@@ -188,7 +187,7 @@ def _command(trial: Path, options: dict[str, Any], method: str | None, output: P
         if value is not None
         for word in ([name] if value is True else [name, value])
     ]
-    return shlex.join(["kinertia", "fit", str(trial), *words])
+    return command_line(["kinertia", "fit", str(trial), *words])
 
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:

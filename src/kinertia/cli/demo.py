@@ -6,7 +6,6 @@ reads the laboratory's files.
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +18,7 @@ from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import provenance_of
+from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
@@ -119,7 +118,7 @@ def run_demo(
         recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
         wanted = read_subject(write_lab(work / "lab", recordings))
         static, inputs, marker_set = read_inputs(wanted, progress)
-        provenance = provenance_of(wanted, shlex.join(["kinertia", "demo", "-o", str(folder)]))
+        provenance = provenance_of(wanted, command_line(["kinertia", "demo", "-o", str(folder)]))
         fits = []
         for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
             settings = with_settings(wanted, method=method).settings

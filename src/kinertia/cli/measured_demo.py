@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import shutil
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.prepare import Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import provenance_of
+from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import read_subject
 from kinertia.report.files import save_fit
 
@@ -33,6 +32,6 @@ def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, sha
         shutil.copytree(FILES, work / "lab", copy_function=shutil.copyfile)
         wanted = read_subject(work / "lab" / "subject.toml")
         fit = fit_subject(wanted, progress)
-        command = shlex.join(["kinertia", "demo", "--measured", "-o", str(folder)])
+        command = command_line(["kinertia", "demo", "--measured", "-o", str(folder)])
         save_fit(fit, work, provenance_of(wanted, command))
     return fit

@@ -14,11 +14,11 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import ezc3d
 import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.io.c3d_plates import LabPlates, lab_plates, to_ground_plates
+from kinertia.io.ezc3d_library import expect_ezc3d, open_c3d
 from kinertia.io.number_table import expect_file
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
@@ -45,7 +45,8 @@ def read_c3d(path: str | Path) -> Recording:
     `plates` is None when none is left.
 
     Raises:
-        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit.
+        FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit;
+            or ezc3d is not installed.
     """
     path = Path(path)
     file, notes = _open(path)
@@ -65,13 +66,14 @@ def read_c3d(path: str | Path) -> Recording:
 def _open(path: Path) -> tuple[Any, list[str]]:
     """The file as ezc3d holds it, with forces where ezc3d can work them out."""
     expect_file(path)
+    expect_ezc3d(path)
     _expect_complete(path)
     notes = []
     try:
-        file = ezc3d.c3d(str(path), extract_forceplat_data=True)
+        file = open_c3d(path, extract_forceplat_data=True)
     except Exception as trouble:  # ezc3d lets OSError, RuntimeError, IndexError and more through
         try:
-            file = ezc3d.c3d(str(path))
+            file = open_c3d(path)
         except Exception as error:
             raise FileError(path, f"broken C3D file ({error}); export it again") from None
         if _values(file["parameters"], "FORCE_PLATFORM", "USED", [0])[0]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-import ezc3d
 import numpy as np
 
+from kinertia.io.ezc3d_library import new_c3d, save_c3d
 from kinertia.trial.data import FloatArray, PlateLoads, Recording
 
 _TO_LAB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -28,9 +29,11 @@ def write_c3d(path: str | Path, recording: Recording) -> None:
             frame.
 
     Raises:
+        FileError: ezc3d is not installed.
         ValueError: the plates have no corners, or their time base does not fit the markers'.
     """
-    file = ezc3d.c3d()
+    path = Path(path)
+    file = new_c3d(path)
     markers, parameters = recording.markers, file["parameters"]
     parameters["POINT"]["LABELS"]["value"] = list(markers.labels)
     parameters["POINT"]["UNITS"]["value"] = ["mm"]
@@ -46,7 +49,7 @@ def write_c3d(path: str | Path, recording: Recording) -> None:
         file.add_parameter("PROCESSING", "Height", _MM * recording.height_m)
     if recording.plates is not None:
         _add_plates(file, recording.plates, _samples_per_frame(recording, recording.plates))
-    file.write(str(path))
+    save_c3d(file, path)
 
 
 def _samples_per_frame(recording: Recording, plates: PlateLoads) -> int:
@@ -58,7 +61,7 @@ def _samples_per_frame(recording: Recording, plates: PlateLoads) -> int:
     return ratio
 
 
-def _add_plates(file: ezc3d.c3d, plates: PlateLoads, samples_per_frame: int) -> None:
+def _add_plates(file: Any, plates: PlateLoads, samples_per_frame: int) -> None:
     if plates.corners is None:
         raise ValueError("a C3D file needs the corners of its force plates")
     count, parameters = len(plates.names), file["parameters"]

@@ -6,12 +6,13 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import numpy as np
 import pandas as pd
 
 from kinertia.errors import FileError
+from kinertia.io.file_names import path_from
 from kinertia.io.number_table import expect_file
 from kinertia.io.sto import read_sto
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
@@ -64,9 +65,10 @@ def read_forces_with_notes(
     else:
         loads_path = Path(loads_path)
         root = _external_loads(loads_path)
-        path = Path(mot_path) if mot_path is not None else _datafile(root, loads_path)
-        table = read_sto(path)
         groups, notes = _groups_by_identifier(root, loads_path)
+        path, more = (Path(mot_path), ()) if mot_path is not None else _datafile(root, loads_path)
+        notes += more
+        table = read_sto(path)
         _expect_columns(groups, table, path, loads_path)
     _expect_steady_time(path, table.index.to_numpy(float))
     wrenches = [_wrench(path, table, group) for group in groups]
@@ -190,14 +192,22 @@ def _external_loads(path: Path) -> ElementTree.Element:
     return root
 
 
-def _datafile(root: ElementTree.Element, loads_path: Path) -> Path:
+def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[str, ...]]:
+    """Where the force file is that the loads name, and what was assumed.
+
+    Of a whole path on another computer, often one with Windows, the file of that name beside the loads counts.
+    """
     name = (root.findtext(".//datafile") or "").strip()
     if not name or name.lower() == "unassigned":
         raise FileError(loads_path, "names no datafile; give the MOT or STO file of the forces beside it")
-    path = loads_path.parent / name.replace("\\", "/")
-    if not path.is_file():
-        raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
-    return path
+    path = path_from(loads_path.parent, name)
+    if path.is_file():
+        return path, ()
+    told = PureWindowsPath(name)  # knows both separators
+    beside = loads_path.parent / told.name
+    if told.root and beside.is_file():
+        return beside, (f"{loads_path.name}: its datafile {name} is not there; {beside.name} beside it was read",)
+    raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
 
 
 def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_Columns], tuple[str, ...]]:

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from uuid import uuid4
 
 from kinertia.errors import FileError
 
@@ -18,6 +19,8 @@ GENERATOR = '<meta name="generator" content="kinertia'
 """In the head of every HTML page that is a result of its own."""
 _TELLING = (".json", ".html")
 """Types of the result files that name Kinertia as what made them."""
+_NEW, _BEFORE = "new", "before"
+"""Parts of the temporary folder: results to be, and the files that they replace."""
 
 
 def check_folder(folder: str | Path) -> None:
@@ -28,8 +31,7 @@ def check_folder(folder: str | Path) -> None:
     existing = _existing(Path(folder))
     if not existing.is_dir():
         raise FileError(existing, "is a file; give a folder for the results")
-    if not os.access(existing, os.W_OK):
-        raise FileError(existing, "cannot be written to; give another folder for the results")
+    _hidden_folder(existing).rmdir()  # Windows does not tell otherwise whether that is allowed
 
 
 def expect_own_folder(folder: str | Path) -> None:
@@ -67,32 +69,72 @@ def _says_kinertia(path: Path) -> bool:
 
 def _existing(folder: Path) -> Path:
     """The folder itself, or the nearest one above it that exists."""
-    return next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    places = (folder.absolute(), *folder.absolute().parents)
+    existing = next((path for path in places if path.exists()), None)
+    if existing is None:
+        raise FileError(folder, "on a drive or share that is not there; give another folder for the results")
+    return existing
+
+
+def _hidden_folder(within: Path) -> Path:
+    """A new folder of a name of its own."""
+    folder = within / f".kinertia.{uuid4().hex[:12]}"
+    try:
+        folder.mkdir()
+    except OSError as error:
+        problem = f"cannot be written to ({error.strerror}); give another folder for the results"
+        raise FileError(within, problem) from error
+    return folder
 
 
 @contextmanager
 def complete_folder(folder: str | Path) -> Iterator[Path]:
     """A hidden temporary folder; its files are moved into `folder` when the block ends without an error.
 
-    Files of the same name are replaced, others in `folder` stay. After an error or Ctrl-C nothing of the block is left;
-    Ctrl-C during the moving takes effect after it.
+    Files of the same name are replaced, others in `folder` stay. After an error or Ctrl-C nothing of the block is left,
+    and what was there before is as it was; Ctrl-C during the moving takes effect after it.
 
     Raises:
-        FileError: the folder cannot be written to.
+        FileError: the folder cannot be written to, or a file in it not be replaced.
     """
     folder = Path(folder)
     check_folder(folder)
-    work = Path(tempfile.mkdtemp(dir=_existing(folder), prefix=".kinertia."))
+    work = _hidden_folder(_existing(folder))
     try:
-        yield work
+        (work / _NEW).mkdir()
+        yield work / _NEW
         with _uninterrupted():
-            for path in sorted(work.rglob("*")):
-                if path.is_file():
-                    target = folder / path.relative_to(work)
-                    target.parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(path, target)
+            _move_all(work, folder)
     finally:
         shutil.rmtree(work, ignore_errors=True)
+
+
+def _move_all(work: Path, folder: Path) -> None:
+    """Move every new file to its place in `folder`, and what it replaces out of the way: all of them or none.
+
+    Windows lets nobody replace a file that another program has open.
+    """
+    done: list[tuple[Path, Path]] = []
+
+    def move(source: Path, target: Path) -> None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(source, target)
+        done.append((source, target))
+
+    for path in sorted(path for path in (work / _NEW).rglob("*") if path.is_file()):
+        name = path.relative_to(work / _NEW)
+        try:
+            if (folder / name).is_file():
+                move(folder / name, work / _BEFORE / name)
+            move(path, folder / name)
+        except OSError as error:
+            for source, target in reversed(done):
+                os.replace(target, source)
+            problem = (
+                f"cannot be replaced ({error.strerror}): nothing was written; close the program that has it open, and "
+                "run the command again"
+            )
+            raise FileError(folder / name, problem) from error
 
 
 @contextmanager

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import platform
-from collections.abc import Mapping
+import shlex
+import subprocess
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
-from pathlib import Path
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path, PurePath
 
 from kinertia.io.subject_file import SubjectFile
 
 VERSION = version("kinertia")
-_COMPUTES = ("kinertia", "numpy", "scipy", "pin", "ezc3d")
+_COMPUTES = ("kinertia", "numpy", "scipy", "numba", "ezc3d")
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,19 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     paths = [path for path in (model.static, model.osim, model.markers) if isinstance(path, Path)]
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
-    above = os.path.commonpath([path.parent for path in paths])
-    return Provenance(command, {path.relative_to(above).as_posix(): _sha256(path) for path in paths})
+    names = names_from_common_folder(paths)
+    return Provenance(command, {name: _sha256(path) for name, path in zip(names, paths, strict=True)})
+
+
+def names_from_common_folder(paths: Sequence[PurePath]) -> list[str]:
+    """Each path from the folder that holds them all; whole paths where none does, as on two drives of Windows."""
+    above = next((folder for folder in paths[0].parents if all(path.is_relative_to(folder) for path in paths)), None)
+    return [(path if above is None else path.relative_to(above)).as_posix() for path in paths]
+
+
+def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
+    """One line that a shell takes apart into these words again: cmd and PowerShell know no single quotes of POSIX."""
+    return subprocess.list2cmdline(words) if windows else shlex.join(words)
 
 
 def _sha256(path: Path) -> str:
@@ -45,5 +59,9 @@ def _sha256(path: Path) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything that numbers depend on."""
-    return {"Python": platform.python_version(), **{name: version(name) for name in _COMPUTES}}
+    """Versions of everything that numbers depend on, as far as it is installed."""
+    found = {"Python": platform.python_version()}
+    for name in _COMPUTES:
+        with contextlib.suppress(PackageNotFoundError):  # ezc3d, where it has no wheel
+            found[name] = version(name)
+    return found

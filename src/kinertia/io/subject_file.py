@@ -27,8 +27,8 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PureWindowsPath
 from typing import Annotated, Any
 
 from pydantic import (
@@ -40,6 +40,7 @@ from pydantic import (
 )
 
 from kinertia.errors import FileError, SettingsError, SubjectError
+from kinertia.io.file_names import fits_everywhere, path_from, path_trouble, same_folder
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
@@ -50,11 +51,13 @@ def _file(value: object, info: ValidationInfo) -> Path:
     """An existing file, absolute; a relative one counts from the subject file's folder (the context)."""
     if not isinstance(value, str | Path):
         raise ValueError("must be a path in quotes")
-    path = (folder_of(info) / Path(value).expanduser()).resolve()
+    path = path_from(folder_of(info), str(value)).resolve()
     if path.is_file():
         return path
     if path.is_dir():
         raise ValueError(f"{path} is a folder; give a file")
+    if trouble := path_trouble(str(value)):
+        raise ValueError(trouble)
     names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
     near = difflib.get_close_matches(path.name, names, n=1)
     raise ValueError(f"no such file in {path.parent}" + (f"; did you mean '{near[0]}'?" if near else ""))
@@ -117,7 +120,8 @@ class TrialFiles(Table):
         if not isinstance(data, dict):
             return data
         markers = data.get("markers")
-        return {"name": Path(markers).stem if isinstance(markers, str | Path) else "trial", **data}
+        # Windows' kind of path knows both separators
+        return {"name": PureWindowsPath(markers).stem if isinstance(markers, str | Path) else "trial", **data}
 
 
 class SubjectFile(Table):
@@ -140,7 +144,8 @@ def read_subject(path: str | Path) -> SubjectFile:
 
     Raises:
         FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or
-            wrong value, no such trial file, two trials of one name, implausible mass); with the line.
+            wrong value, no such trial file, several trials whose names cannot be folders side by side, implausible
+            mass); with the line.
     """
     path = Path(path).resolve()
     document = read_toml(path, "a subject file (subject.toml)")
@@ -154,18 +159,34 @@ def read_subject(path: str | Path) -> SubjectFile:
     if lack := _incomplete(result):
         place, sentence = lack
         raise FileError(path, sentence, document.line(place) or document.last_line)
-    subject, names = result.subject, [trial.name for trial in result.trials]
+    subject = result.subject
     mass_kg = 70.0 if subject.mass_kg is None else subject.mass_kg  # left open: any plausible value
     height_m = 1.7 if subject.height_m is None else subject.height_m
     try:
         check_subject(mass_kg, height_m, subject.sex or "male")
     except SubjectError as error:
         raise FileError(path, str(error), document.line(("subject", error.field))) from error
-    for index, name in enumerate(names):
-        if name in names[:index]:
-            problem = f"trial '{name}' is there already; give this one a name = \"...\" of its own"
-            raise FileError(path, problem, document.line(("trial", index, "name")))
+    if trouble := _name_trouble([trial.name for trial in result.trials]):
+        index, sentence = trouble
+        raise FileError(path, sentence, document.line(("trial", index, "name")))
     return result
+
+
+def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
+    """The first of several trials whose name cannot be that of a folder beside those before, and why."""
+    for index, name in enumerate(names if len(names) > 1 else ()):
+        if not fits_everywhere(name):
+            told = json.dumps(name, ensure_ascii=False)
+            return index, (
+                f'name = {told}: must be a name that a folder can have on every system: none of < > : " / \\ | ? *, '
+                "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...); "
+                'give the trial a name = "..." of its own'
+            )
+        for before in names[:index]:
+            if same_folder(before, name):
+                same = "" if before == name else "; Windows and macOS take both for one folder"
+                return index, f"trial '{before}' is there already{same}; give this one a name = \"...\" of its own"
+    return None
 
 
 def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:

@@ -66,7 +66,8 @@ def parse_toml(text: str, path: Path) -> TomlFile:
         what, _, where = str(error).rpartition(" (at ")
         number = re.match(r"line (\d+)", where)
         line = int(number[1]) if number else text.count("\n") + 1
-        hints = {"Invalid value": "; put text in quotes", "Unescaped": "; write paths with / instead of \\"}
+        slashes = "; write paths with / instead of \\"  # TOML reads \d and \U as the beginning of something else
+        hints = {"Invalid value": "; put text in quotes", "Unescaped": slashes, "Invalid hex value": slashes}
         hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
         raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
 

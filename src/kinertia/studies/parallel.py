@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
+
+_MOST_ON_WINDOWS = 61
+"""More than these handles cannot be waited for there: `ProcessPoolExecutor` raises ValueError."""
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -29,7 +33,7 @@ def in_parallel(
         workers: processes; as many as there are cores if None.
         progress: called with the share that is done.
     """
-    workers = max(1, min(workers or os.cpu_count() or 1, len(cases)))
+    workers = process_count(workers, len(cases))
     progress(0.0)
     # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
@@ -41,6 +45,12 @@ def in_parallel(
         return [future.result() for future in futures]
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def process_count(wanted: int | None, cases: int) -> int:
+    """How many processes to start: as wanted, or one per core; never more than cases, nor than the system can await."""
+    most = _MOST_ON_WINDOWS if sys.platform == "win32" else cases
+    return max(1, min(wanted or os.cpu_count() or 1, cases, most))
 
 
 def _one_thread() -> None:

@@ -1,0 +1,40 @@
+"""Names of files and folders as every system has them: what Windows forbids, and its backslashes read elsewhere."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from pathlib import Path
+
+_DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
+_DRIVE = re.compile(r"[A-Za-z]:[\\/]")
+
+
+def fits_everywhere(name: str) -> bool:
+    """Whether a folder can have this name on Windows, macOS and Linux.
+
+    Windows reserves the names of devices, with any extension (`nul.walk`), and drops dots and blanks at the end.
+    """
+    return bool(name) and not _FORBIDDEN.search(name) and not _DEVICES.fullmatch(name.partition(".")[0])
+
+
+def same_folder(one: str, other: str) -> bool:
+    """Whether two names are one folder's on some system: Windows and macOS do not tell capitals from small letters."""
+    first, second = (unicodedata.normalize("NFC", name).casefold() for name in (one, other))
+    return first == second
+
+
+def path_from(folder: Path, written: str) -> Path:
+    """A path as it stands in a file, counted from a folder; backslashes are separators unless a file has them."""
+    path = folder / Path(written).expanduser()
+    return path if path.is_file() else folder / Path(written.replace("\\", "/")).expanduser()
+
+
+def path_trouble(written: str) -> str | None:
+    """What is wrong with a path that leads nowhere, where it is Windows' way to write it; None if that is not it."""
+    if any(ord(letter) < 32 for letter in written):
+        return "has a tab or line end in it, which TOML makes of \\t and \\n in double quotes; write / instead of \\"
+    if _DRIVE.match(written) and not Path(written).is_absolute():
+        return f"is on drive {written[:2]} of Windows, which this computer does not have; give the path from here"
+    return None

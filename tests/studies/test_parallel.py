@@ -1,0 +1,30 @@
+"""Work in processes of its own."""
+
+import os
+import sys
+
+import pytest
+
+from kinertia.studies.parallel import in_parallel, process_count
+
+
+def test_results_are_in_the_order_of_the_cases():
+    assert in_parallel(abs, [-3, 1, -2], workers=2) == [3, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("system", "cores", "wanted", "cases", "count"),
+    [
+        ("linux", 128, None, 100, 100),
+        ("linux", 4, None, 100, 4),
+        ("linux", 4, 9, 100, 9),
+        ("linux", 4, None, 0, 1),
+        ("win32", 128, None, 100, 61),  # concurrent.futures refuses more there
+        ("win32", 4, 99, 100, 61),
+        ("win32", 4, None, 100, 4),
+    ],
+)
+def test_number_of_processes(monkeypatch, system, cores, wanted, cases, count):
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    assert process_count(wanted, cases) == count
