@@ -12,9 +12,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
-import plotly.graph_objects as go
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
@@ -23,6 +21,7 @@ from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
 from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
+from kinertia.report.figure import Figure
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.skeleton_view import packed, scene
@@ -41,7 +40,7 @@ from kinertia.trial.rms import rms_length
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
 _VIEW_FRAMES = 800
-"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 8 MB."""
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
 @cache
@@ -59,9 +58,7 @@ def _environment() -> jinja2.Environment:
 
 
 def _asset(name: str) -> Markup:
-    """A style sheet or script as it is; plotly.js from its package."""
-    if name == "plotly.js":
-        return Markup(get_plotlyjs())
+    """A style sheet or script as it is."""
     loader = _environment().loader
     assert loader is not None
     return Markup(loader.get_source(_environment(), name)[0])
@@ -99,10 +96,10 @@ def rendered(template: str, **content: Any) -> str:
     return _environment().get_template(template).render(version=VERSION, **content)
 
 
-def written(figure: go.Figure) -> dict[str, Any]:
+def written(figure: Figure) -> dict[str, Any]:
     """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
     text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
-    return {"alt": figure.layout.meta["alt"], "json": Markup(text), "height": figure.layout.height}
+    return {"alt": figure.alt, "json": Markup(text), "height": figure.layout["height"]}
 
 
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:

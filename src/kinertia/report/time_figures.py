@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from kinertia.estimation.forces_used import full_bandwidth
 from kinertia.estimation.result import TrialFit
@@ -17,7 +16,8 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate, panels_of
-from kinertia.report.panels import Panel, compact, small_multiples
+from kinertia.report.figure import Figure, compact
+from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.wording import LITERATURE, Start
 from kinertia.trial.gait_events import GaitEvent, gait_events
 from kinertia.trial.rms import rms, rms_length
@@ -32,7 +32,7 @@ _AXES = ("forward", "upward", "to the right")
 _BAND_SD = 1.96
 
 
-def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> go.Figure:
+def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> Figure:
     """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage, with
     forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
     """
@@ -81,7 +81,7 @@ def _hz(trial: TrialFit, stage: str) -> float:
     return trial.motion_hz if stage == "estimate" else trial.kinematics.cutoff_hz
 
 
-def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> go.Figure:
+def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
     """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated."""
     ik, axis = trial.kinematics.ik, _time_axis(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
@@ -113,7 +113,7 @@ def motion_change(trial: TrialFit) -> np.ndarray:
 
 def moment_figure(
     trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES, start: Start = LITERATURE
-) -> go.Figure:
+) -> Figure:
     """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band."""
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
     sd = trial.moment_sd
