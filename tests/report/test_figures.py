@@ -100,7 +100,7 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
     trial = fit.trials[0]
     mass = fit.literature.total_mass_kg
     assert trial.moment_sd is not None
-    plain = as_plotly(moment_figure(replace(trial, moment_sd=None), fit.skeleton, mass))
+    plain = as_plotly(moment_figure(replace(trial, joint_load_sd=None), fit.skeleton, mass))
     trace = next(t for t in plain.data if t.name == "right, estimate")
     np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
     assert not any("band" in (t.name or "") for t in plain.data)

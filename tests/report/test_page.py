@@ -9,7 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import plotly.graph_objects as go
 import pytest
 
@@ -275,11 +274,8 @@ def prolonged(trial, times):
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
         full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},
-        moments={
-            stage: pd.DataFrame(again(values.to_numpy()), columns=values.columns)
-            for stage, values in trial.moments.items()
-        },
-        moment_sd=pd.DataFrame(again(trial.moment_sd.to_numpy()), columns=trial.moment_sd.columns),
+        joint_loads={stage: again(values) for stage, values in trial.joint_loads.items()},
+        joint_load_sd=again(trial.joint_load_sd),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
     )
 

@@ -13,7 +13,7 @@ from kinertia.estimation.input_checks import check_masses, known, mass_by_force_
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.result import Fit, TrialFit, by_coordinate
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
@@ -244,11 +244,11 @@ def _trial_fit(
         reactions=after.reactions,
         residuals=narrow,
         full_residuals=full,
-        moments={
-            "literature": by_coordinate(k, inverse_dynamics(before, literature, window.motion, measured)),
-            "estimate": by_coordinate(k, inverse_dynamics(after.skeleton, bsp, motion, delivered)),
+        joint_loads={
+            "literature": inverse_dynamics(before, literature, window.motion, measured),
+            "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
-        moment_sd=None if after.moment_sd is None else by_coordinate(k, after.moment_sd),
+        joint_load_sd=after.moment_sd,
         marker_errors_m={"ik": k.ik.errors_m[k.frames], "final": _marker_errors(after.skeleton, k, after.motion)},
         seconds=seconds,
     )

@@ -118,7 +118,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "residuals": written(residual_figure(trial, frames, start_of(fit))),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
         "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames, start_of(fit))),
-        "bands": trial.moment_sd is not None,
+        "bands": trial.joint_load_sd is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(
