@@ -84,9 +84,18 @@ def application(only: str | None = None) -> typer.Typer:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; a user's error is one line and exit status 2."""
+    """Run the command line on these arguments, or on those of this process."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    app = application(given[0] if given and given[0] in _MODULES else None)
+    run(application_for(given), given)
+
+
+def application_for(given: Sequence[str]) -> typer.Typer:
+    """The command line with what these arguments ask for."""
+    return application(given[0] if given and given[0] in _MODULES else None)
+
+
+def run(app: typer.Typer, given: Sequence[str]) -> None:
+    """Run it; a user's error is one line and exit status 2."""
     try:
         app(args=given, prog_name="kinertia")
     except KinertiaError as error:

@@ -1,16 +1,22 @@
-"""The command `kinertia`: answers `--version` at once, and loads the commands for everything else."""
+"""The command `kinertia`: answers `--version` at once, and loads for everything else only what is asked for."""
 
 from __future__ import annotations
 
+import gc
 import sys
 from importlib.metadata import version
 
 
 def main() -> None:
     """Run the command line on the arguments of this process."""
-    if sys.argv[1:] == ["--version"]:
+    given = sys.argv[1:]
+    if given == ["--version"]:
         print(version("kinertia"))
         return
-    from kinertia.cli.app import main as run
+    gc.disable()  # what is imported stays: looking through it for garbage, again and again, finds none
+    from kinertia.cli.app import application_for, run
 
-    run()
+    app = application_for(given)
+    gc.freeze()
+    gc.enable()
+    run(app, given)

@@ -11,7 +11,6 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used
 from kinertia.estimation.input_checks import check_masses, known, mass_by_force_kg
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
-from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
@@ -81,6 +80,8 @@ def estimate_bsp_of_model(
     Raises:
         KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
     """
+    from kinertia.estimation.prepare_osim import prepare_osim
+
     settings = settings or Settings()
     return estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
 

@@ -14,6 +14,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import ezc3d
 import numpy as np
 
 from kinertia.errors import FileError
@@ -63,8 +64,6 @@ def read_c3d(path: str | Path) -> Recording:
 
 def _open(path: Path) -> tuple[Any, list[str]]:
     """The file as ezc3d holds it, with forces where ezc3d can work them out."""
-    import ezc3d  # other formats need not wait for it
-
     expect_file(path)
     _expect_complete(path)
     notes = []

@@ -18,10 +18,8 @@ import numpy as np
 from kinertia.checks.verdict import verdicts
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
-from kinertia.estimation.prepare_osim import centre_offsets
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.warnings import mass_from_force_kg
-from kinertia.io.osim.editor import write_osim
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
@@ -70,6 +68,9 @@ def _write_model(fit: Fit, folder: Path) -> None:
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
+    from kinertia.estimation.prepare_osim import centre_offsets
+    from kinertia.io.osim.editor import write_osim
+
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
     changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)

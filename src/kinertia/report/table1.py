@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
-from kinertia.report.page import rendered
+from kinertia.report.rendering import rendered
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
 from kinertia.trial.rms import rms
 
