@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,22 @@ def run(*arguments: object) -> Outcome:
         except SystemExit as end:
             status = end.code
     return Outcome(0 if status is None else status, out.getvalue(), err.getvalue())
+
+
+def loaded_after(code: str) -> set[str]:
+    """Names of all modules in a fresh interpreter once it has run this."""
+    program = f"import json, sys\n{code}\nprint(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def loaded_by(*arguments: object) -> set[str]:
+    """Names of all modules that the installed command has loaded when it ends."""
+    given = ["kinertia", *map(str, arguments)]
+    return loaded_after(
+        f"sys.argv = {given!r}\nfrom kinertia.cli.start import main\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert end.code in (0, 1, None), end.code"
+    )
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from hypothesis import settings
 
 import osim_models
 from command_line import Outcome, fitted, run
-from kinertia.cli.demo import Demo, run_demo
 from kinertia.cli.measured_demo import FILES, run_measured_demo
+from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.result import Fit
@@ -118,7 +118,7 @@ def measured_demo(tmp_path_factory) -> MeasuredDemo:
         fits.append(run_measured_demo(*arguments))
         return fits[-1]
 
-    with mock.patch("kinertia.cli.study.run_measured_demo", kept):
+    with mock.patch("kinertia.cli.demo.run_measured_demo", kept):
         outcome = run("demo", "--measured", "-o", folder)
     assert outcome.status in (0, 1), outcome.err
     return MeasuredDemo(folder, outcome, fits[0])

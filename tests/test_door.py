@@ -3,7 +3,6 @@
 import ast
 import doctest
 import inspect
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -12,17 +11,11 @@ import numpy as np
 import pytest
 
 import kinertia
+from command_line import loaded_after
 
 HEAVY = ("plotly", "matplotlib", "jinja2", "pandas", "scipy.stats")
 PACKAGE = Path(kinertia.__file__).parent
 CLASSES = [name for name in kinertia.__all__ if inspect.isclass(getattr(kinertia, name))]
-
-
-def loaded_after(code):
-    """Names of all modules in a fresh interpreter once it has run this."""
-    program = f"import json, sys\n{code}\nprint(json.dumps(sorted(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    return set(json.loads(done.stdout.splitlines()[-1]))
 
 
 def test_the_import_loads_nothing_heavy():
@@ -33,11 +26,6 @@ def test_a_name_is_loaded_when_it_is_used_and_data_know_no_reports():
     loaded = loaded_after("import kinertia\nkinertia.Markers")
     assert "kinertia.trial.data" in loaded
     assert not loaded.intersection((*HEAVY, "kinertia.report", "kinertia.model"))
-
-
-def test_the_version_is_told_without_loading_the_commands():
-    code = "from kinertia.cli.start import main\nsys.argv = ['kinertia', '--version']\nmain()"
-    assert not loaded_after(code).intersection((*HEAVY, "numpy", "typer"))
 
 
 def test_type_checkers_see_the_names_that_are_loaded():

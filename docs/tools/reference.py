@@ -14,7 +14,7 @@ from typing import Any
 
 import typer
 
-from kinertia.cli.app import app
+from kinertia.cli.app import application
 from kinertia.io.subject_file import Model, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
 from kinertia.settings import Settings, Subject, Table
@@ -33,7 +33,7 @@ def filled(text: str) -> str:
 
 def commands() -> Iterator[tuple[str, Any]]:
     """Every command with its full name, sub-commands after their group, in the order of `kinertia --help`."""
-    yield from _below("kinertia", typer.main.get_command(app))
+    yield from _below("kinertia", typer.main.get_command(application()))
 
 
 def _below(name: str, command: Any) -> Iterator[tuple[str, Any]]:

@@ -158,7 +158,7 @@ def fit_at_once(monkeypatch, short_fit, person):
         done.append(1)
         return replace(short_fit, converged=False)
 
-    monkeypatch.setattr("kinertia.cli.app._run", run_fit)
+    monkeypatch.setattr("kinertia.cli.fit._run", run_fit)
 
     def fit(*options):
         return run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", *options)
@@ -180,7 +180,7 @@ def test_a_failed_check_is_status_1_and_the_results_are_there(fit_at_once, tmp_p
 
 
 def test_no_failed_check_is_status_0(fit_at_once, tmp_path, monkeypatch):
-    monkeypatch.setattr("kinertia.cli.app.verdicts", lambda fit: [Verdict("caution", "so so"), Verdict("pass", "fine")])
+    monkeypatch.setattr("kinertia.cli.fit.verdicts", lambda fit: [Verdict("caution", "so so"), Verdict("pass", "fine")])
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 0
     assert "caution: so so" in outcome.out

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from command_line import run
-from kinertia.cli import demo as demo_module
-from kinertia.cli.study import _two_level_verdict
+from kinertia.cli import synthetic_demo as demo_module
+from kinertia.cli.demo import _two_level_verdict
 from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import prepare
 from kinertia.io.subject_file import read_subject

@@ -1,19 +1,23 @@
 """The report's figures show the numbers of the fit, and gait events are where the loads say."""
 
 import itertools
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinertia.report.bsp_figures import bsp_figure, departures, information_figure
 from kinertia.report.coordinate_titles import panels_of, title_of
+from kinertia.report.figure import Figure, compact
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.plots import as_plotly
 from kinertia.report.time_figures import (
     coordinate_figure,
     moment_figure,
@@ -25,6 +29,30 @@ from kinertia.report.wording import LITERATURE
 from kinertia.trial.data import FootLoads, Markers, Trial
 from kinertia.trial.gait_events import gait_events
 from report_page import figures_of, numbers
+
+
+@pytest.mark.parametrize("which", ["fit", "two_level"])
+def test_plotly_accepts_every_name_and_value_of_every_figure(which, request):
+    """Reports are written without plotly's checks; here is where they are made, on what the page carries."""
+    figures = figures_of(render(request.getfixturevalue(which)))
+    assert len(figures) >= 5
+    for figure in figures.values():
+        checked = go.Figure(figure["data"], figure["layout"])
+        assert len(checked.data) == len(figure["data"])
+        assert {trace.type for trace in checked.data} <= {"scatter", "bar", "pie"}, "all that the basic bundle draws"
+    with pytest.raises(ValueError, match="lien"):
+        go.Figure([{**figure["data"][0], "lien": {"width": 2}}])
+
+
+def test_a_figure_is_written_with_its_gaps_and_nothing_else_that_json_does_not_know():
+    values = compact(np.array([1.5, np.nan, -0.25]))
+    (trace,) = json.loads(Figure([{"y": values, "name": "a"}], {}).to_json())["data"]
+    np.testing.assert_array_equal(numbers(trace["y"]), [1.5, np.nan, -0.25])
+    np.testing.assert_array_equal(go.Scatter(y=values).to_plotly_json()["y"], values)
+    with pytest.raises(ValueError):
+        Figure([{"x0": np.nan}], {}).to_json()
+    with pytest.raises(TypeError, match="float32"):
+        Figure([{"y": np.zeros(3)}], {}).to_json()
 
 
 def test_coordinates_are_drawn_in_degrees_by_side(fit):
@@ -45,7 +73,7 @@ def test_coordinates_are_drawn_in_degrees_by_side(fit):
 
 def test_curves_are_thinned_but_not_moved(fit):
     trial = fit.trials[0]
-    figure = residual_figure(trial, most_frames=20)
+    figure = as_plotly(residual_figure(trial, most_frames=20))
     name = stage_name("estimate", LITERATURE, trial.motion_hz)
     trace = next(t for t in figure.data if t.name == name and t.yaxis == "y")
     assert len(trace.y) <= 20
@@ -56,7 +84,7 @@ def test_curves_are_thinned_but_not_moved(fit):
 
 def test_residuals_are_drawn_at_both_bandwidths(fit):
     trial = fit.trials[0]
-    drawn = {t.name: t.y for t in residual_figure(trial).data if t.yaxis == "y"}
+    drawn = {t.name: t.y for t in as_plotly(residual_figure(trial)).data if t.yaxis == "y"}
     before, after = (f"({hz:.3g} Hz)" for hz in (trial.kinematics.cutoff_hz, trial.motion_hz))
     assert list(drawn) == [
         "estimate, forces at full bandwidth",
@@ -72,11 +100,11 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
     trial = fit.trials[0]
     mass = fit.literature.total_mass_kg
     assert trial.moment_sd is not None
-    plain = moment_figure(replace(trial, moment_sd=None), fit.skeleton, mass)
+    plain = as_plotly(moment_figure(replace(trial, joint_load_sd=None), fit.skeleton, mass))
     trace = next(t for t in plain.data if t.name == "right, estimate")
     np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
     assert not any("band" in (t.name or "") for t in plain.data)
-    banded = moment_figure(trial, fit.skeleton, mass)
+    banded = as_plotly(moment_figure(trial, fit.skeleton, mass))
     upper = next(k for k, t in enumerate(banded.data) if t.name == "right 95 % band")
     width = banded.data[upper].y - banded.data[upper - 1].y
     assert banded.data[upper].xaxis == banded.data[upper - 1].xaxis
@@ -86,7 +114,7 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
 def test_frames_outside_the_window_are_shaded(fit):
     kinematics = fit.trials[0].kinematics
     start, end = kinematics.window_s
-    figure = residual_figure(fit.trials[0])
+    figure = as_plotly(residual_figure(fit.trials[0]))
     spans = {(round(s.x0, 3), round(s.x1, 3)) for s in figure.layout.shapes if s.type == "rect"}
     assert all(last <= start + 1e-3 or first >= end - 1e-3 for first, last in spans)
     assert any(abs(last - start) < 1e-3 for _, last in spans)
@@ -94,7 +122,7 @@ def test_frames_outside_the_window_are_shaded(fit):
 
 
 def test_intervals_are_those_of_the_posterior(fit):
-    figure = bsp_figure(fit)
+    figure = as_plotly(bsp_figure(fit))
     away, posterior = departures(fit), fit.posterior
     assert away is not None
     found = {}
@@ -111,15 +139,20 @@ def test_intervals_are_those_of_the_posterior(fit):
 
 
 def test_information_map_is_in_percent(fit, two_level):
-    figure = information_figure(fit)
-    np.testing.assert_allclose(figure.data[0].z, 100 * np.clip(fit.posterior.information, 0, 1), rtol=1e-5)
+    (tiles,) = as_plotly(information_figure(fit)).data
+    expected = 100 * np.clip(fit.posterior.information, 0, 1)
+    shown = np.full(expected.shape, np.nan)
+    for row, left, colour, text in zip(tiles.y, tiles.base, tiles.marker.color, tiles.text, strict=True):
+        shown[row, round(left + 0.5)] = colour
+        assert text == f"{colour:.0f}"
+    np.testing.assert_allclose(shown, expected, rtol=1e-5)
     assert information_figure(two_level) is None
-    assert not any(trace.error_x.array is not None for trace in bsp_figure(two_level).data)
+    assert not any(trace.error_x.array is not None for trace in as_plotly(bsp_figure(two_level)).data)
 
 
 def test_markers_are_sorted_and_gaps_drawn(fit):
     trial = fit.trials[0]
-    figure = marker_figure(trial, wandering=(trial.kinematics.ik.labels[0],))
+    figure = as_plotly(marker_figure(trial, wandering=(trial.kinematics.ik.labels[0],)))
     final = next(t for t in figure.data if t.name == "estimate")
     assert (np.diff(final.x) <= 1e-6).all()
     assert sum("down-weighted" in label for label in final.y) == 1
@@ -134,7 +167,7 @@ def test_markers_are_sorted_and_gaps_drawn(fit):
     positions = np.where(np.isfinite(positions), positions, 0.0)
     assert gap_figure(_with_positions(trial, positions)) is None
     positions[10:15, column, 1] = np.nan
-    gaps = gap_figure(_with_positions(trial, positions))
+    gaps = as_plotly(gap_figure(_with_positions(trial, positions)))
     assert gaps.data[0].y == (label, label, None)
     first, last, _ = gaps.data[0].x
     half = 0.5 / markers.rate_hz
@@ -157,7 +190,7 @@ def test_marker_never_seen_has_no_distance():
 def test_panels_never_overlap(count, legend):
     traces = [{"type": "scatter", "y": [1.0], "name": f"line {k}"} for k in range(legend)]
     figure = small_multiples([Panel(f"panel {k}", traces) for k in range(count)], "alt", {})
-    for flat in figure.layout.meta["arrangements"].values():
+    for flat in figure.layout["meta"]["arrangements"].values():
         boxes = []
         for k in range(count):
             suffix = "" if k == 0 else str(k + 1)
@@ -185,7 +218,7 @@ def test_change_of_motion_matches_the_curves(fit):
     trial = fit.trials[0]
     figure = coordinate_figure(trial, fit.skeleton)
     change = np.degrees(motion_change(trial)[:, np.asarray(fit.skeleton.rotational)])
-    assert f"{np.sqrt(np.nanmean(change**2)):.1f} degrees RMS" in figure.layout.meta["alt"]
+    assert f"{np.sqrt(np.nanmean(change**2)):.1f} degrees RMS" in figure.alt
 
 
 def walked(loaded, measured=True):

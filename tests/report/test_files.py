@@ -192,7 +192,7 @@ def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
         path.write_text("half a")
         raise OSError(28, "No space left on device", str(path))
 
-    monkeypatch.setattr("kinertia.report.files.write_sto", full_disk)
+    monkeypatch.setattr("kinertia.report.files.write_table", full_disk)
     with pytest.raises(OSError, match="No space left"):
         save_fit(fit, tmp_path / "deep" / "out")
     assert list(tmp_path.iterdir()) == []

@@ -1,11 +1,14 @@
 """The benchmarks in their smallest form: that they run and fill their pages. No time is judged here."""
 
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import command_speed
 import measured_trials
 
 
@@ -53,3 +56,11 @@ def test_page_of_speed(shared_data, tmp_path, monkeypatch):
         ).groups()
         assert min(float(once), float(twice), float(growth)) >= 0
     assert re.search(r"\| inverse kinematics, gait2354 walk \| [\d.]+ \| [\d.]+ \| \d+ \|", page)
+
+
+def test_a_process_is_timed_whole_and_may_not_fail():
+    clock, processor = command_speed.spent([sys.executable, "-c", "import time; time.sleep(0.3)"])
+    assert clock > 0.3
+    assert 0.0 < processor < clock
+    with pytest.raises(subprocess.CalledProcessError):
+        command_speed.spent([sys.executable, "-c", "raise SystemExit(1)"])

@@ -15,7 +15,7 @@ import house
 import reference
 from command_line import run
 from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
-from kinertia.cli.app import app
+from kinertia.cli.app import application
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.subject_file import read_subject
 
@@ -108,7 +108,7 @@ def _command_lines(text):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_and_options_named_exist(page):
     commands = dict(reference.commands())
-    general = {name for one in typer.main.get_command(app).params for name in one.opts} | {"--help"}
+    general = {name for one in typer.main.get_command(application()).params for name in one.opts} | {"--help"}
     for line in _command_lines(page.read_text(encoding="utf-8")):
         words = shlex.split(line, comments=True)
         name = max((name for name in commands if words[: name.count(" ") + 1] == name.split()), key=len, default=None)

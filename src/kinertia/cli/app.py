@@ -1,28 +1,17 @@
-"""The command line: `kinertia fit` and `init`; `kinertia.cli.check` and `kinertia.cli.study` have the others."""
+"""The command line: which commands there are, and where; each is loaded when it is asked for."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Any
+from importlib import import_module
+from typing import Annotated
 
 import typer
 
-from kinertia.checks.verdict import stands_against, verdicts
-from kinertia.cli.check import check
-from kinertia.cli.fit_report import report_fit, report_verdicts
-from kinertia.cli.options import Force, Output, Quiet, Verbose, results_folder
-from kinertia.cli.plan import crossval, plan
-from kinertia.cli.study import demo, study
-from kinertia.cli.terminal import out, show_error, shown_progress
-from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.from_files import fit_subject
-from kinertia.estimation.result import Fit
-from kinertia.io.output_folder import write_then_rename
-from kinertia.io.provenance import VERSION, command_line, provenance_of
-from kinertia.io.subject_draft import init_subject
-from kinertia.io.subject_file import SubjectFile, read_subject, subject_from_options, with_settings
-from kinertia.report.files import save_fit
+from kinertia.cli.terminal import out, show_error
+from kinertia.errors import KinertiaError
+from kinertia.io.provenance import VERSION
 
 # typer keeps these line ends: at most 78 columns
 _MANUAL = """Body segment parameters from gait.
@@ -62,20 +51,53 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 Results go to standard output, progress and errors to standard error.
 """
 
-app = typer.Typer(
-    name="kinertia",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    help=_MANUAL,
-)
+_MODULES = {
+    "demo": "demo",
+    "init": "init",
+    "check": "check",
+    "fit": "fit",
+    "crossval": "plan",
+    "plan": "plan",
+    "study": "study",
+}
+"""Module of every command, which has its name there; in the order of `kinertia --help`."""
+
+
+def application(only: str | None = None) -> typer.Typer:
+    """The command line with all its commands, or with one, which saves loading what the others need."""
+    app = typer.Typer(
+        name="kinertia",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        help=_MANUAL,
+    )
+    app.callback()(_root)
+    for name in _MODULES if only is None else (only,):
+        command = getattr(import_module(f"kinertia.cli.{_MODULES[name]}"), name)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command()(command)
+    return app
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; a user's error is one line and exit status 2."""
+    """Run the command line on these arguments, or on those of this process."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    run(application_for(given), given)
+
+
+def application_for(given: Sequence[str]) -> typer.Typer:
+    """The command line with what these arguments ask for."""
+    return application(given[0] if given and given[0] in _MODULES else None)
+
+
+def run(app: typer.Typer, given: Sequence[str]) -> None:
+    """Run it; a user's error is one line and exit status 2."""
     try:
-        app(args=arguments, prog_name="kinertia")
+        app(args=given, prog_name="kinertia")
     except KinertiaError as error:
         show_error(str(error))
     except OSError as error:
@@ -89,150 +111,9 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
     pass
-
-
-def fit(
-    trial: Annotated[Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")],
-    output: Output = Path("out"),
-    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
-    forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
-    loads: Annotated[
-        Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
-    ] = None,
-    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may contain it.")] = None,
-    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may contain it.")] = None,
-    sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
-    markers: Annotated[
-        str | None,
-        typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
-    ] = None,
-    model: Annotated[
-        Path | None, typer.Option(help="Scaled OpenSim model (.osim), in place of --static, --sex and --height.")
-    ] = None,
-    calibrate: Annotated[
-        bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
-    ] = False,
-    method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> None:
-    """Estimate body segment parameters from gait.
-
-    Exit status 1 if there is an estimate but a check of it failed
-    (see kinertia --help).
-
-    [bold]Examples[/]
-
-    kinertia fit subject.toml -o out
-
-    kinertia fit walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male -o out
-
-    kinertia fit walk.trc --forces walk_grf.mot --static static.trc --mass 72.6 --height 1.803 --sex male -o out
-
-    kinertia fit walk.trc --forces walk_grf.mot --loads loads.xml --model scaled.osim --mass 72.6 -o out
-    """
-    options = {
-        "--static": static,
-        "--forces": forces,
-        "--loads": loads,
-        "--mass": mass,
-        "--height": height,
-        "--sex": sex,
-        "--markers": markers,
-        "--model": model,
-        "--calibrate": calibrate or None,
-    }
-    wanted = _wanted(trial, options, method)
-    results_folder(output, force)
-    result = _run(wanted)
-    folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
-    judged = verdicts(result)
-    report_fit(result)
-    report_verdicts(judged, result, verbose)
-    out.print(f"results in {folder}", soft_wrap=True)
-    raise typer.Exit(int(stands_against(judged)))
-
-
-def init(
-    folder: Annotated[Path, typer.Argument(help="Folder with the files of one person.")],
-) -> None:
-    """Write a first subject.toml from the files in a folder.
-
-    [bold]Example[/]
-
-    kinertia init data/subject01
-    """
-    path = folder / "subject.toml"
-    if path.exists():
-        raise FileError(path, "exists already and is left alone; remove it to draft a new one")
-    text = init_subject(folder)
-    write_then_rename(path, text)
-    out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
-
-
-def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
-    """The command line that repeats this run."""
-    given = {**options, "--method": method, "-o": output}
-    words = [
-        str(word)
-        for name, value in given.items()
-        if value is not None
-        for word in ([name] if value is True else [name, value])
-    ]
-    return command_line(["kinertia", "fit", str(trial), *words])
-
-
-def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
-    """What to estimate, by the subject file or by options."""
-    if trial.suffix.lower() == ".toml":
-        given = [name for name, value in options.items() if value is not None]
-        if given:
-            raise FileError(trial, f"a subject file says it all; put {', '.join(given)} into it instead")
-        wanted = read_subject(trial)
-    else:
-        wanted = _from_options(trial, options)
-    return wanted if method is None else with_settings(wanted, method=method)
-
-
-def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
-    """The subject file that these options stand for."""
-    given = {
-        key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
-    }
-    for name in ("--static", "--sex"):
-        if name not in given and "--model" not in given:
-            hint = " (or --model)" if name == "--static" else ""
-            raise FileError(
-                trial, f"a trial on its own needs {name}{hint}; or write a subject file (kinertia init FOLDER)"
-            )
-    names = {
-        "subject": {"--mass": "mass_kg", "--height": "height_m", "--sex": "sex"},
-        "model": {"--static": "static", "--markers": "markers", "--model": "osim", "--calibrate": "calibrate"},
-        "trial": {"--forces": "forces", "--loads": "loads"},
-    }
-    tables = {
-        table: {key: given[option] for option, key in entries.items() if option in given}
-        for table, entries in names.items()
-    }
-    trials = [{"markers": str(trial), **tables["trial"]}]
-    return subject_from_options(
-        {"subject": {"name": trial.stem, **tables["subject"]}, "model": tables["model"], "trial": trials}
-    )
-
-
-def _run(wanted: SubjectFile) -> Fit:
-    with shown_progress() as progress:
-        return fit_subject(wanted, progress)
-
-
-for _entry in (demo, init, check, fit, crossval, plan):
-    app.command()(_entry)
-app.add_typer(study, name="study")

@@ -1,10 +1,11 @@
-"""The command `kinertia`: answers `--version` at once, and loads the commands for everything else.
+"""The command `kinertia`: answers `--version` at once, and loads for everything else only what is asked for.
 
 A terminal or pipe that is not UTF-8, as on Windows, gets a question mark for every letter that it lacks.
 """
 
 from __future__ import annotations
 
+import gc
 import io
 import sys
 from importlib.metadata import version
@@ -14,9 +15,14 @@ def main() -> None:
     """Run the command line on the arguments of this process."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # of errors Python itself takes care
         sys.stdout.reconfigure(errors="replace")
-    if sys.argv[1:] == ["--version"]:
+    given = sys.argv[1:]
+    if given == ["--version"]:
         print(version("kinertia"))
         return
-    from kinertia.cli.app import main as run
+    gc.disable()  # what is imported stays: looking through it for garbage, again and again, finds none
+    from kinertia.cli.app import application_for, run
 
-    run()
+    app = application_for(given)
+    gc.freeze()
+    gc.enable()
+    run(app, given)

@@ -1,17 +1,13 @@
-"""The commands on synthetic data: `kinertia demo`, `kinertia study ...`."""
+"""`kinertia study ...`: studies on synthetic trials, of which everything is known."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import numpy as np
 import typer
 
-from kinertia.checks.verdict import stands_against, verdicts
-from kinertia.cli.demo import Demo, run_demo
-from kinertia.cli.fit_report import report_fit, report_verdicts
-from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
@@ -21,158 +17,10 @@ from kinertia.report.table1 import save_table1, table1_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
-from kinertia.trial.rms import rms_length
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
-
-
-def demo(
-    measured: Annotated[
-        bool, typer.Option("--measured", help="Fit a measured walk, which comes with Kinertia, instead.")
-    ] = False,
-    output: Output = Path("out"),
-    force: Force = False,
-    quiet: Quiet = False,
-) -> None:
-    """Show what Kinertia does; needs no files.
-
-    A synthetic person walks through a synthetic laboratory; Kinertia then estimates from its files and compares the
-    estimate with the truth.
-
-    With --measured it is a real person in a real laboratory: results, report
-    and exit status are those of kinertia fit. Nobody knows the truth.
-
-    [bold]Examples[/]
-
-    kinertia demo -o out
-
-    kinertia demo --measured -o out
-    """
-    results_folder(output, force)
-    if measured:
-        _measured_demo(output)
-    with shown_progress() as progress:
-        result = run_demo(output, progress=progress)
-    _report_demo(result, output)
-
-
-def _measured_demo(folder: Path) -> NoReturn:
-    with shown_progress() as progress:
-        fit = run_measured_demo(folder, progress)
-    judged = verdicts(fit)
-    out.print(
-        "\nA measured walk, of which nobody knows the truth: a patient of a gait laboratory, with cerebral palsy, who "
-        "walked over two force plates with the markers of Plug-in Gait. From "
-        "https://github.com/mitkof6/opensim_automated_pipeline, copyright 2021 Dimitar Stanev, Apache License 2.0; "
-        "README.txt beside the files says what was cut."
-    )
-    report_fit(fit)
-    report_verdicts(judged, fit, verbose=False, elsewhere="report.html has them all")
-    lab = folder / "lab"
-    out.print(
-        f"results in {folder}, the laboratory's files in {lab}\n"
-        f"to see what the files are like: kinertia check {lab / 'subject.toml'}",
-        soft_wrap=True,
-    )
-    raise typer.Exit(int(stands_against(judged)))
-
-
-def _report_demo(result: Demo, folder: Path) -> None:
-    fit = result.fit
-    bodies = {
-        "truth": result.truth,
-        "literature": fit.literature,
-        "estimate": fit.estimate,
-        "two-level": result.two_level.estimate,
-    }
-    trial = fit.trials[0]
-    out.print(
-        "\nA synthetic person (72.6 kg, 1.803 m) whose body differs from the literature by 10 % in masses, 10 mm in "
-        "centres of mass and 10 % in moments of inertia (standard deviations) walked over two force plates. Measured "
-        "with: skin motion that follows the joints (10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere), "
-        f"cameras 0.5 mm, plates 1 N. {len(trial.time)} frames with all ground contact on the plates were used.\n"
-    )
-    table = plain_table("segment", "", "mass\n(kg)", "CoM off by\n(mm)", "Ixx\n(kg m2)", "Iyy", "Izz")
-    for i, segment in enumerate(result.truth.segments):
-        if segment.endswith("_l"):
-            continue
-        name = segment.removesuffix("_r")
-        for source, bsp in bodies.items():
-            off = np.linalg.norm(bsp.com_m[i] - result.truth.com_m[i])
-            moments = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
-            gap = "-" if source == "truth" else f"{off * 1e3:.0f}"
-            table.add_row(name, source, f"{bsp.mass_kg[i]:.2f}", gap, *moments)
-            name = ""
-    out.print(table)
-    joints = plain_table("joint moments, RMS error against the truth (N m)", "usual pipeline", "estimate")
-    for joint, pair in result.moment_errors.items():
-        joints.add_row(joint, *(f"{value:.2f}" for value in pair))
-    out.print(joints)
-    out.print("usual pipeline: measured motion, literature BSPs, forces as measured\n")
-    sources = list(bodies)[1:]
-    errors = plain_table("RMS error against the truth", "", *sources)
-    found = [result.rms_errors(bodies[source]) for source in sources]
-    named = (
-        ("mass", "kg", ".2f", 1.0),
-        ("centre of mass", "mm", ".0f", 1e3),
-        ("moments of inertia", "kg m2", ".4f", 1.0),
-    )
-    for k, (what, unit, form, factor) in enumerate(named):
-        errors.add_row(what, unit, *(f"{values[k] * factor:{form}}" for values in found))
-    out.print(errors)
-    loads = {**trial.residuals, "two-level": result.two_level.trials[0].residuals["estimate"]}
-    out.print(
-        "residual at the pelvis, RMS: "
-        + "; ".join(
-            f"{stage} {rms_length(load[:, :3]):.1f} N, {rms_length(load[:, 3:]):.1f} N m"
-            for stage, load in loads.items()
-        )
-        + "\n"
-    )
-    out.print(_verdict(found[0], found[1]) + "\n")
-    out.print(_two_level_verdict(found[0], found[2]) + "\n")
-    for name, one in (("estimate", fit), ("two-level", result.two_level)):
-        for warning in one.warnings:
-            out.print(f"warning ({name}): {warning}")
-    out.print(
-        f"results in {folder}, the laboratory's files in {folder / 'lab'}, truth against estimate in "
-        f"{folder / 'bsp_truth.csv'}\n"
-        f"next, with your own files: kinertia init FOLDER, then kinertia fit FOLDER/subject.toml -o out"
-    )
-
-
-def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """How the estimate compares with the literature, by the numbers of this run."""
-    shares = ", ".join(
-        f"{what} {100 * (other / one - 1):+.0f} %"
-        for what, one, other in zip(("mass", "centre of mass", "inertia"), before, after, strict=True)
-    )
-    return (
-        f"The simultaneous estimate changes the literature's errors by: {shares}. It weighs "
-        "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says "
-        "per parameter how much was measured."
-    )
-
-
-def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """What the comparison with two-level shows, by the numbers of this run."""
-    worse = sum(one < other for one, other in zip(before, after, strict=True))
-    if worse == len(before):
-        finding = "Two-level explains the forces far better, yet every class of parameters is further from the truth"
-    elif worse:
-        finding = f"Two-level explains the forces far better, yet {worse} of 3 classes of parameters are further off"
-    else:
-        return (
-            "Two-level is nearer to the truth than the literature in this run. With skin motion that is luck "
-            "rather than the rule: see docs/study.md."
-        )
-    return (
-        f"{finding} than the literature: with skin motion, small residuals do not mean right body segment parameters. "
-        "That is the finding of the study whose two-level method this is (docs/study.md); without noise the same "
-        "method finds them exactly (kinertia study table1)."
-    )
 
 
 @study.command()

@@ -11,9 +11,8 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used
 from kinertia.estimation.input_checks import check_masses, known, mass_by_force_kg
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
-from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.result import Fit, TrialFit, by_coordinate
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
@@ -81,6 +80,8 @@ def estimate_bsp_of_model(
     Raises:
         KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
     """
+    from kinertia.estimation.prepare_osim import prepare_osim
+
     settings = settings or Settings()
     return estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
 
@@ -244,11 +245,11 @@ def _trial_fit(
         reactions=after.reactions,
         residuals=narrow,
         full_residuals=full,
-        moments={
-            "literature": by_coordinate(k, inverse_dynamics(before, literature, window.motion, measured)),
-            "estimate": by_coordinate(k, inverse_dynamics(after.skeleton, bsp, motion, delivered)),
+        joint_loads={
+            "literature": inverse_dynamics(before, literature, window.motion, measured),
+            "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
-        moment_sd=None if after.moment_sd is None else by_coordinate(k, after.moment_sd),
+        joint_load_sd=after.moment_sd,
         marker_errors_m={"ik": k.ik.errors_m[k.frames], "final": _marker_errors(after.skeleton, k, after.motion)},
         seconds=seconds,
     )

@@ -9,10 +9,8 @@ from pathlib import Path
 from kinertia.errors import SettingsError
 from kinertia.estimation.estimate import estimate
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
-from kinertia.estimation.prepare_osim import prepare_osim
 from kinertia.estimation.result import Fit
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.model.marker_set import MarkerSet
@@ -44,6 +42,9 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
     if wanted.model.osim is not None:
+        from kinertia.estimation.prepare_osim import prepare_osim
+        from kinertia.io.osim.reader import read_osim
+
         model, trials = read_osim(wanted.model.osim), read_trials(wanted, progress)
         return prepare_osim(wanted.subject, model, trials, wanted.settings, wanted.model.calibrate, progress)
     static, inputs, marker_set = read_inputs(wanted, progress)

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import pandas as pd
 
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.simultaneous.fit import Posterior
@@ -23,6 +22,7 @@ from kinertia.settings import Settings, Subject
 from kinertia.trial import display
 
 if TYPE_CHECKING:
+    import pandas as pd
     from plotly.graph_objects import Figure
 
 
@@ -75,10 +75,10 @@ class TrialFit:
             bandwidth of the motion.
         full_residuals: the same at the forces' full bandwidth: before the estimate those as measured, after it
             `reactions`. That of the estimate is what OpenSim's inverse dynamics finds on the result files.
-        moments: joint inverse dynamics (N m, N of translations) over time, one column per coordinate, per stage:
-            "literature" (with forces as measured), "estimate" (with `reactions`); of the two-level estimate both with
-            forces of the motion's bandwidth.
-        moment_sd: posterior deviations of those of the estimate, in the same form; None after two-level.
+        joint_loads: joint inverse dynamics (w, c: N m, N of translations) per stage: "literature" (with forces as
+            measured), "estimate" (with `reactions`); of the two-level estimate both with forces of the motion's
+            bandwidth. `moments` has them as tables.
+        joint_load_sd: posterior deviations of those of the estimate; None after two-level. `moment_sd` as a table.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
 
@@ -95,8 +95,8 @@ class TrialFit:
     reactions: GroundReactions
     residuals: Mapping[str, np.ndarray]
     full_residuals: Mapping[str, np.ndarray]
-    moments: Mapping[str, pd.DataFrame]
-    moment_sd: pd.DataFrame | None
+    joint_loads: Mapping[str, np.ndarray]
+    joint_load_sd: np.ndarray | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
 
@@ -115,6 +115,16 @@ class TrialFit:
         """Coordinates of the estimate (rad, m) over time."""
         return by_coordinate(self.kinematics, self.motion.q)
 
+    @cached_property
+    def moments(self) -> Mapping[str, pd.DataFrame]:
+        """`joint_loads` over time, one column per coordinate."""
+        return {stage: by_coordinate(self.kinematics, loads) for stage, loads in self.joint_loads.items()}
+
+    @cached_property
+    def moment_sd(self) -> pd.DataFrame | None:
+        """`joint_load_sd` in the same form."""
+        return None if self.joint_load_sd is None else by_coordinate(self.kinematics, self.joint_load_sd)
+
     def _repr_html_(self) -> str:
         """What a notebook shows: frames used, distances of the markers, residuals."""
         return display.html(self)
@@ -122,6 +132,8 @@ class TrialFit:
 
 def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:
     """Values (w, c) of all coordinates over the measured window's time (s), a column per coordinate."""
+    import pandas as pd
+
     index = pd.Index(kinematics.time, name="time")
     return pd.DataFrame(values, index=index, columns=list(kinematics.ik.coordinates))
 
@@ -169,12 +181,18 @@ class Fit:
         The simultaneous estimate adds prior_sd, sd (deviations before and after), information, and evidence:
         "measured" (information above 0.75), "informed" (0.25 to 0.75) or "assumed" (the literature's, hardly changed).
         """
-        table = self.literature.to_frame().rename(columns={"value": "literature"})
-        table = table.assign(estimate=self.estimate.to_frame()["value"])
+        import pandas as pd
+
+        return pd.DataFrame(self.bsp_columns())
+
+    def bsp_columns(self) -> dict[str, Any]:
+        """The columns of `bsp`, by name."""
+        columns = self.literature.columns()
+        columns["literature"], columns["estimate"] = columns.pop("value"), self.estimate.columns()["value"]
         if self.posterior is None:
-            return table
+            return columns
         told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
-        return table.assign(**told, evidence=[evidence(value) for value in told["information"]])
+        return {**columns, **told, "evidence": [evidence(value) for value in told["information"]]}
 
     def save(self, folder: str | Path) -> Path:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
@@ -185,12 +203,16 @@ class Fit:
         """Posterior covariance of all body segment parameters, by "segment.parameter"; None after two-level."""
         if self.posterior is None:
             return None
+        import pandas as pd
+
         names = (self.bsp["segment"] + "." + self.bsp["parameter"]).tolist()
         return pd.DataFrame(self.posterior.covariance, index=names, columns=names)
 
     @property
     def calibration(self) -> pd.DataFrame | None:
         """Value, prior and posterior deviation and unit of every calibrated quantity; None after two-level."""
+        import pandas as pd
+
         return None if self.posterior is None else pd.DataFrame(dict(self.posterior.calibration)).T
 
     @property

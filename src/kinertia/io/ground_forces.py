@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
-import pandas as pd
 
 from kinertia.errors import FileError
 from kinertia.io.file_names import path_from
 from kinertia.io.number_table import expect_file
-from kinertia.io.sto import read_sto
+from kinertia.io.sto import TimeTable, read_table
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.idle_plate import PlateLoad, without_idle
 
@@ -60,7 +59,7 @@ def read_forces_with_notes(
         if mot_path is None:
             raise ValueError("read_forces needs a force file or an ExternalLoads file")
         path = Path(mot_path)
-        table = read_sto(path)
+        table = read_table(path)
         groups = _groups_by_name(path, table)
     else:
         loads_path = Path(loads_path)
@@ -68,12 +67,12 @@ def read_forces_with_notes(
         groups, notes = _groups_by_identifier(root, loads_path)
         path, more = (Path(mot_path), ()) if mot_path is not None else _datafile(root, loads_path)
         notes += more
-        table = read_sto(path)
+        table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
-    _expect_steady_time(path, table.index.to_numpy(float))
+    _expect_steady_time(path, table.time)
     wrenches = [_wrench(path, table, group) for group in groups]
     loads = PlateLoads(
-        table.index.to_numpy(float),
+        table.time,
         tuple(group.name for group in groups),
         np.stack([plate.force for plate in wrenches], axis=1),
         np.stack([plate.moment for plate in wrenches], axis=1),
@@ -98,7 +97,7 @@ def _expect_steady_time(path: Path, time: FloatArray) -> None:
         )
 
 
-def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> PlateLoad:
+def _wrench(path: Path, table: TimeTable, group: _Columns) -> PlateLoad:
     """Force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
     force = _triple(table, group.force)
     _expect_numbers(path, table, group.force, np.ones(len(force), dtype=bool))
@@ -114,21 +113,20 @@ def _wrench(path: Path, table: pd.DataFrame, group: _Columns) -> PlateLoad:
     if group.torque is not None:
         _expect_numbers(path, table, group.torque, loaded)
         moment = moment + _triple(table, group.torque)
-    return without_idle(table.index.to_numpy(float), force, moment)
+    return without_idle(table.time, force, moment)
 
 
-def _triple(table: pd.DataFrame, identifier: str) -> FloatArray:
-    result: FloatArray = table[[identifier + axis for axis in "xyz"]].to_numpy(float)
-    return result
+def _triple(table: TimeTable, identifier: str) -> FloatArray:
+    return table.columns([identifier + axis for axis in "xyz"])
 
 
-def _expect_numbers(path: Path, table: pd.DataFrame, identifier: str, where: np.ndarray) -> None:
+def _expect_numbers(path: Path, table: TimeTable, identifier: str, where: np.ndarray) -> None:
     broken = np.argwhere(np.isnan(_triple(table, identifier)) & where[:, None])
     if broken.size:
         row, axis = broken[0]
         raise FileError(
             path,
-            f"column {identifier}{'xyz'[axis]} has no number at {table.index[row]:g} s; expected one for "
+            f"column {identifier}{'xyz'[axis]} has no number at {table.time[row]:g} s; expected one for "
             "every loaded sample, fill the gap or cut the trial before export",
         )
 
@@ -144,8 +142,8 @@ def _remarks(path: Path, loads: PlateLoads, groups: Sequence[_Columns]) -> list[
     return notes
 
 
-def _groups_by_name(path: Path, table: pd.DataFrame) -> list[_Columns]:
-    columns = [str(column) for column in table.columns]
+def _groups_by_name(path: Path, table: TimeTable) -> list[_Columns]:
+    columns = list(table.labels)
     forces = [c[:-1] for c in columns if c.endswith("vx") and {c[:-1] + "y", c[:-1] + "z"} <= set(columns)]
     groups = []
     for force in forces:
@@ -171,8 +169,8 @@ def _groups_by_name(path: Path, table: pd.DataFrame) -> list[_Columns]:
     return groups
 
 
-def _has(table: pd.DataFrame, identifier: str) -> bool:
-    return all(identifier + axis in table.columns for axis in "xyz")
+def _has(table: TimeTable, identifier: str) -> bool:
+    return all(identifier + axis in table.labels for axis in "xyz")
 
 
 def _listed(columns: Sequence[str]) -> str:
@@ -239,14 +237,14 @@ def _text(element: ElementTree.Element, tag: str) -> str:
     return "" if text.lower() == "unassigned" else text
 
 
-def _expect_columns(groups: Sequence[_Columns], table: pd.DataFrame, path: Path, loads_path: Path) -> None:
+def _expect_columns(groups: Sequence[_Columns], table: TimeTable, path: Path, loads_path: Path) -> None:
     for group in groups:
         for identifier in filter(None, (group.force, group.point, group.torque)):
-            missing = [identifier + axis for axis in "xyz" if identifier + axis not in table.columns]
+            missing = [identifier + axis for axis in "xyz" if identifier + axis not in table.labels]
             if missing:
                 raise FileError(
                     path,
                     f"no column {', '.join(missing)}, which {loads_path.name} names for {group.name} by the "
                     f"identifier '{identifier}'; correct the identifier, the columns are "
-                    f"{_listed(list(table.columns))}",
+                    f"{_listed(table.labels)}",
                 )

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from kinertia.errors import FileError
 from kinertia.trial.data import FloatArray
-
-_TRUTH = ("true", "false")
-"""What pandas takes for the numbers 1 and 0 where a whole column has nothing else."""
 
 
 def read_lines(path: Path) -> list[str]:
@@ -72,38 +66,12 @@ def read_rows(
     kept = [(number, line.rstrip()) for number, line in enumerate(lines[first_line - 1 :], start=first_line)]
     kept = [(number, line) for number, line in kept if line]
     numbers = [number for number, _ in kept]
-    values = _all_at_once([line for _, line in kept], columns)
-    if values is None:
-        rows = [_row(path, number, line, columns, may_be_short) for number, line in kept]
-        values = np.array(rows, dtype=float).reshape(len(rows), columns)
+    rows = [_row(path, number, line, columns, may_be_short) for number, line in kept]
+    values = np.array(rows, dtype=float).reshape(len(rows), columns)
     if np.isinf(values).any():
         row_index, column_index = np.argwhere(np.isinf(values))[0]
         raise FileError(path, f"infinite value in column {column_index + 1}; expected a number", numbers[row_index])
     return values, numbers
-
-
-def _all_at_once(rows: Sequence[str], columns: int) -> FloatArray | None:
-    """The numbers of rows that all have this many cells, tabs between them; None where one needs a closer look."""
-    if not rows or any(row.count("\t") != columns - 1 for row in rows):
-        return None
-    text, missing = "\n".join(rows), ["", "nan", "NaN"]
-    lower = text.lower()
-    if any(word in lower for word in _TRUTH):
-        return None
-    try:
-        table = pd.read_csv(
-            io.StringIO(text),
-            sep="\t",
-            header=None,
-            dtype=float,
-            na_values=missing,
-            keep_default_na=False,
-            quoting=csv.QUOTE_NONE,
-        )
-    except ValueError:
-        return None
-    result: FloatArray | None = table.to_numpy(copy=True)
-    return result
 
 
 def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -> list[float]:

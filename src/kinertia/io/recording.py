@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from kinertia.errors import FileError, TrialError
-from kinertia.io.c3d import read_c3d
 from kinertia.io.ground_forces import read_forces_with_notes
 from kinertia.io.number_table import expect_file
 from kinertia.io.trc import read_trc_recording
@@ -33,7 +32,7 @@ def read_recording(
     """
     markers_path = Path(markers_path)
     _expect_kind(markers_path, (".trc", ".c3d"), "markers")
-    recording = (read_c3d if markers_path.suffix.lower() == ".c3d" else read_trc_recording)(markers_path)
+    recording = _read_c3d(markers_path) if markers_path.suffix.lower() == ".c3d" else read_trc_recording(markers_path)
     if forces_path is not None:
         _expect_kind(Path(forces_path), (".mot", ".sto"), "forces")
     if loads_path is not None:
@@ -45,6 +44,13 @@ def read_recording(
         recording = replace(recording, plates=plates, notes=(*recording.notes, *notes))
     _expect_overlap(recording)
     return recording
+
+
+def _read_c3d(path: Path) -> Recording:
+    """`read_c3d`, loaded by those who have such files."""
+    from kinertia.io.c3d import read_c3d
+
+    return read_c3d(path)
 
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:

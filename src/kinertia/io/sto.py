@@ -3,24 +3,58 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from kinertia.errors import FileError
 from kinertia.io.number_table import read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
+from kinertia.trial.data import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _ROW_KEYS = ("nrows", "datarows")
 _COLUMN_KEYS = ("ncolumns", "datacolumns")
 
 
-def read_sto(path: str | Path) -> pd.DataFrame:
-    """Read a table, indexed by time (s), in the file's own units.
+@dataclass(frozen=True)
+class TimeTable:
+    """Columns over time, in a file's own units.
 
-    Returns:
-        one column per quantity; `attrs["in_degrees"]` is True, False or, where the header does not say, None.
+    Attributes:
+        time: (n,) s.
+        labels: of the k columns.
+        values: (n, k).
+        in_degrees: whether its angles are in degrees; None where the file does not say.
+    """
+
+    time: FloatArray
+    labels: tuple[str, ...]
+    values: FloatArray
+    in_degrees: bool | None
+
+    def columns(self, labels: Sequence[str]) -> FloatArray:
+        """(n, c) the columns of these labels."""
+        return self.values[:, [self.labels.index(label) for label in labels]]
+
+
+def read_sto(path: str | Path) -> pd.DataFrame:
+    """`read_table` as pandas' table, indexed by time (s); `attrs["in_degrees"]` is its `in_degrees`."""
+    import pandas as pd
+
+    found = read_table(path)
+    table = pd.DataFrame(found.values, index=pd.Index(found.time, name="time"), columns=list(found.labels))
+    table.attrs["in_degrees"] = found.in_degrees
+    return table
+
+
+def read_table(path: str | Path) -> TimeTable:
+    """Read the columns of a file.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent STO or MOT file; with the line.
@@ -40,31 +74,35 @@ def read_sto(path: str | Path) -> pd.DataFrame:
     time = values[:, 0]
     if np.isnan(time).any():
         raise FileError(path, "the row has no time", line_numbers[int(np.argmax(np.isnan(time)))])
-    table = pd.DataFrame(values[:, 1:], index=pd.Index(time, name="time"), columns=labels[1:])
     told = header.get("indegrees")
-    table.attrs["in_degrees"] = None if told is None else told[0].lower() == "yes"
-    return table
+    in_degrees = None if told is None else told[0].lower() == "yes"
+    return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees)
 
 
 def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str, remark: str = "") -> None:
-    """Write a table indexed by time (s) in the form that OpenSim 4 reads.
+    """`write_table` of pandas' table, indexed by time (s)."""
+    labels = tuple(map(str, table.columns))
+    write_table(path, TimeTable(table.index.to_numpy(float), labels, table.to_numpy(float), in_degrees), name, remark)
+
+
+def write_table(path: str | Path, table: TimeTable, name: str, remark: str = "") -> None:
+    """Write columns over time in the form that OpenSim 4 reads.
 
     Args:
         path: the file, `.sto` or `.mot`; it appears complete or not at all.
-        table: columns over time, in the units they shall have in the file.
-        in_degrees: whether angles in the table are in degrees.
+        table: in the units it shall have in the file.
         name: first line of the file.
         remark: one line of the header for those who read the file, if any; no equals sign, which makes it a key.
     """
-    labels = ["time", *map(str, table.columns)]
-    values = np.column_stack((table.index.to_numpy(float), table.to_numpy(float))).tolist()
+    labels = ["time", *table.labels]
+    values = np.column_stack((table.time, table.values)).tolist()
     form = "\t".join(["%.17g"] * len(labels))
     lines = [
         name,
         "version=1",
-        f"nRows={len(table)}",
+        f"nRows={len(values)}",
         f"nColumns={len(labels)}",
-        f"inDegrees={'yes' if in_degrees else 'no'}",
+        f"inDegrees={'yes' if table.in_degrees else 'no'}",
         *filter(None, [remark]),
         "endheader",
         "\t".join(labels),

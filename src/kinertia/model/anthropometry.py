@@ -12,13 +12,13 @@ The numbers are in `data/dumas2007.csv` and `data/deleva1996.csv`, with their un
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import pandas as pd
 
 from kinertia.errors import SubjectError
 from kinertia.model.bsp import MIRROR_SIGNS, BodySegmentParameters, FloatArray, combine
@@ -254,30 +254,34 @@ def _along_y(y: float) -> FloatArray:
 @cache
 def _dumas_table(sex: str) -> dict[str, _Row]:
     table = {}
-    for name, row in _read("dumas2007.csv", sex).iterrows():
-        radii = row[["rxx", "ryy", "rzz", "rxy", "rxz", "ryz"]].to_numpy(dtype=float) / 100.0
+    for name, row in _read("dumas2007.csv", sex).items():
+        radii = np.array([row[key] for key in ("rxx", "ryy", "rzz", "rxy", "rxz", "ryz")]) / 100.0
         xx, yy, zz, xy, xz, yz = np.sign(radii) * radii**2
         gyration = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        com = row[["com_x", "com_y", "com_z"]].to_numpy(dtype=float) / 100.0
-        table[str(name)] = _Row(row["mass"] / 100.0, com, gyration, row["length"] / 1000.0)
+        com = np.array([row[key] for key in ("com_x", "com_y", "com_z")]) / 100.0
+        table[name] = _Row(row["mass"] / 100.0, com, gyration, row["length"] / 1000.0)
     return table
 
 
 @cache
 def _deleva_table(sex: str) -> dict[str, _Row]:
     table = {}
-    for name, row in _read("deleva1996.csv", sex).iterrows():
+    for name, row in _read("deleva1996.csv", sex).items():
         sagittal, transverse, longitudinal = row["r_sagittal"], row["r_transverse"], row["r_longitudinal"]
         if name == "foot":  # long axis x, heel to toe; the paper's sagittal column about z, transverse about y
             com, radii = [row["com"], 0.0, 0.0], [longitudinal, transverse, sagittal]
         else:  # long axis y, downwards
             com, radii = [0.0, -row["com"], 0.0], [sagittal, longitudinal, transverse]
         gyration = np.diag(np.square(radii))
-        table[str(name)] = _Row(row["mass"], np.array(com), gyration, row["length"] / 1000.0)
+        table[name] = _Row(row["mass"], np.array(com), gyration, row["length"] / 1000.0)
     return table
 
 
-def _read(name: str, sex: str) -> pd.DataFrame:
+def _read(name: str, sex: str) -> dict[str, dict[str, float]]:
+    """The numbers of the table's columns, by segment."""
     with files("kinertia.model").joinpath("data", name).open(encoding="utf-8") as file:
-        table = pd.read_csv(file, comment="#")
-    return table[table["sex"] == sex].set_index("segment")
+        rows = [row for row in csv.DictReader(line for line in file if not line.startswith("#")) if row["sex"] == sex]
+    words = ("sex", "segment", "endpoints")
+    return {
+        row["segment"]: {key: float(cell or "nan") for key, cell in row.items() if key not in words} for row in rows
+    }

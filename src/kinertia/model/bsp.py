@@ -17,10 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -131,18 +134,24 @@ class BodySegmentParameters:
 
     def to_frame(self) -> pd.DataFrame:
         """Long table with columns segment, parameter, unit, value; ten rows per segment (`PARAMETERS`)."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns())
+
+    def columns(self) -> dict[str, Any]:
+        """The columns of `to_frame`, by name."""
         s = len(self.segments)
-        return pd.DataFrame(
-            {
-                "segment": np.repeat(np.array(self.segments, dtype=object), len(PARAMETERS)),
-                "parameter": PARAMETERS * s,
-                "unit": UNITS * s,
-                "value": self.table().ravel(),
-            }
-        )
+        return {
+            "segment": np.repeat(np.array(self.segments, dtype=object), len(PARAMETERS)),
+            "parameter": PARAMETERS * s,
+            "unit": UNITS * s,
+            "value": self.table().ravel(),
+        }
 
     def _repr_html_(self) -> str:
         """What a notebook shows: a row per segment, a column per parameter, in kg, m and kg m2."""
+        import pandas as pd
+
         headings = [f"{name} ({unit})" for name, unit in zip(PARAMETERS, UNITS, strict=True)]
         frame = pd.DataFrame(self.table(), index=pd.Index(self.segments, name="segment"), columns=headings)
         return str(frame.to_html(float_format=lambda value: f"{value:.4g}"))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report import style
-from kinertia.report.panels import Panel, base_layout, compact, small_multiples
+from kinertia.report.figure import Figure, compact
+from kinertia.report.panels import Panel, base_layout, small_multiples
 from kinertia.report.wording import decimals, fixed, read_in, start_of
 
 DEPARTURE_SD = 2.0
@@ -61,7 +62,7 @@ def estimated_rows(fit: Fit) -> np.ndarray:
     return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
 
 
-def bsp_figure(fit: Fit) -> go.Figure:
+def bsp_figure(fit: Fit) -> Figure:
     """Estimate against start (literature, or OpenSim model): a panel per parameter, a row per segment.
 
     With error bars everything is in prior SDs, so that feet can be read beside the trunk; without (two-level),
@@ -70,7 +71,7 @@ def bsp_figure(fit: Fit) -> go.Figure:
     away, posterior, start = departures(fit), fit.posterior, start_of(fit)
     shown = estimated_rows(fit)
     segments = [segment_name(fit.estimate.segments[i]) for i in shown]
-    rows = {"tickvals": list(range(len(segments))), "ticktext": segments, "range": [len(segments) - 0.4, -0.6]}
+    rows = {**_named(segments), "range": [len(segments) - 0.4, -0.6]}
     if away is None or posterior is None:
         change = fit.estimate.table() - fit.literature.table()
         panels = [_plain_panel(k, change[:, k], rows, start.word) for k in range(_ESTIMATED_BY_TWO_LEVEL)]
@@ -106,7 +107,7 @@ def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict
         "type": "scatter",
         "mode": "markers",
         "x": compact(np.zeros(len(place))),
-        "y": place,
+        "y": place.tolist(),
         "marker": {"symbol": "line-ns-open", "size": 9, "color": style.GREY},
         "error_x": {"type": "constant", "value": _INTERVAL_SD, "thickness": 7, "width": 0, "color": style.PALE},
         "name": f"{start.word}, 95 %",
@@ -124,7 +125,7 @@ def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict
                     "type": "scatter",
                     "mode": "markers",
                     "x": compact(away[chosen]),
-                    "y": place[chosen],
+                    "y": place[chosen].tolist(),
                     "marker": {"symbol": symbol, "size": 8, "color": colour},
                     "error_x": {"array": compact(half[chosen]), "thickness": 2.2, "width": 0, "color": colour},
                     "name": name,
@@ -146,7 +147,7 @@ def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any], start: str) -
         "type": "scatter",
         "mode": "markers",
         "x": compact(factor * change),
-        "y": np.arange(len(change)),
+        "y": list(range(len(change))),
         "marker": {"size": 8, "color": style.BLUE},
         "name": f"estimate minus {start}",
         "hovertemplate": f"%{{y}}: %{{x:.3g}} {unit}<extra></extra>",
@@ -154,8 +155,11 @@ def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any], start: str) -
     return Panel(f"{NAMES[k]} ({unit})", [trace], (), rows)
 
 
-def information_figure(fit: Fit) -> go.Figure | None:
-    """Information (100 % is everything) on every parameter of the estimated segments; None after two-level."""
+def information_figure(fit: Fit) -> Figure | None:
+    """Information (100 % is everything) on every parameter of the estimated segments; None after two-level.
+
+    The tiles of the map are bars, which plotly's basic bundle has; it has no heat maps.
+    """
     if fit.posterior is None:
         return None
     shown = estimated_rows(fit)
@@ -166,26 +170,42 @@ def information_figure(fit: Fit) -> go.Figure | None:
         f"Map of what the data say about each parameter, in percent; most about {NAMES[best[1]]} of "
         f"{segments[best[0]]}, {told[best]:.0f} %; median {np.nanmedian(told):.0f} %."
     )
-    heat = {
-        "type": "heatmap",
-        "z": compact(told),
-        "x": list(NAMES),
-        "y": segments,
-        "zmin": 0,
-        "zmax": 100,
-        "colorscale": [[0, "#FFFFFF"], [1, style.BLUE]],
-        "xgap": 2,
-        "ygap": 2,
-        "texttemplate": "%{z:.0f}",
+    rows, columns = np.nonzero(np.isfinite(told))
+    values = told[rows, columns]
+    tiles = {
+        "type": "bar",
+        "orientation": "h",
+        "base": (columns - 0.5).tolist(),
+        "x": [1] * len(values),
+        "y": rows.tolist(),
+        "width": 1,
+        "marker": {
+            "color": compact(values),
+            "cmin": 0,
+            "cmax": 100,
+            "colorscale": [[0, "#FFFFFF"], [1, style.BLUE]],
+            "line": {"color": "#FFFFFF", "width": 2},
+        },
+        "text": [f"{value:.0f}" for value in values],
+        "textposition": "inside",
+        "insidetextanchor": "middle",
+        "textangle": 0,
+        "constraintext": "none",
         "textfont": {"size": 11},
-        "showscale": False,
-        "hovertemplate": "%{x} of %{y}: %{z:.0f} %<extra></extra>",
+        "customdata": [f"{NAMES[k]} of {segments[i]}" for i, k in zip(rows, columns, strict=True)],
+        "hovertemplate": "%{customdata}: %{text} %<extra></extra>",
     }
     layout = base_layout(alt)
+    tidy = {"fixedrange": True, "showgrid": False, "zeroline": False, "ticks": "outside"}
     layout |= {
         "height": 110 + 30 * len(segments),
         "margin": {"t": 100, "b": 10, "l": 112, "r": 34},
-        "xaxis": {"side": "top", "tickangle": -40, "fixedrange": True},
-        "yaxis": {"autorange": "reversed", "fixedrange": True},
+        "xaxis": {**tidy, "side": "top", "tickangle": -40, **_named(NAMES), "range": [-0.5, len(NAMES) - 0.5]},
+        "yaxis": {**tidy, **_named(segments), "range": [len(segments) - 0.5, -0.5]},
     }
-    return go.Figure([heat], layout)
+    return Figure([tiles], layout)
+
+
+def _named(words: Sequence[str]) -> dict[str, Any]:
+    """An axis with words at 0, 1, 2, ..."""
+    return {"tickvals": list(range(len(words))), "ticktext": list(words)}

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from kinertia.checks.model import ModelCheck
 from kinertia.checks.recording import RecordingCheck
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
+from kinertia.report.rendering import rendered
 
 
 def save_check_page(
@@ -29,16 +27,7 @@ def save_check_page(
     Raises:
         FileError: the folder cannot be written to.
     """
-    environment = Environment(
-        loader=PackageLoader("kinertia.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    page = environment.get_template("check.html.j2").render(
-        recordings=recordings, models=models, mistakes=mistakes, version=VERSION
-    )
+    page = rendered("check.html.j2", recordings=recordings, models=models, mistakes=mistakes)
     with complete_folder(folder) as work:
         (work / "check.html").write_text(page, encoding="utf-8")
     return Path(folder) / "check.html"

@@ -5,6 +5,7 @@ Everything is written to a hidden folder first and moved when complete, so a run
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -13,19 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from kinertia.checks.verdict import verdicts
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
-from kinertia.estimation.prepare_osim import centre_offsets
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.warnings import mass_from_force_kg
-from kinertia.io.osim.editor import write_osim
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
-from kinertia.io.sto import write_sto
+from kinertia.io.sto import TimeTable, write_table
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 
@@ -46,7 +44,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     with complete_folder(folder) as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
-        fit.bsp.to_csv(work / "bsp.csv", index=False, lineterminator="\n")
+        _write_bsp(fit, work / "bsp.csv")
         _write_model(fit, work)
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
@@ -55,11 +53,24 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     return Path(folder)
 
 
+def _write_bsp(fit: Fit, path: Path) -> None:
+    """The table of `Fit.bsp`, as pandas would write it: a cell without a number is empty."""
+    columns = fit.bsp_columns()
+    cells = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([None if cell != cell else cell for cell in row] for row in zip(*cells, strict=True))
+
+
 def _write_model(fit: Fit, folder: Path) -> None:
     """The model with the estimate; of the user's own OpenSim model a list of what changed, too."""
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
+    from kinertia.estimation.prepare_osim import centre_offsets
+    from kinertia.io.osim.editor import write_osim
+
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
     changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
@@ -70,28 +81,28 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     names, rotational = fit.skeleton.coordinates, fit.skeleton.rotational
     motion = f"Motion: {trial.motion_hz:.3g} Hz"
     forces = f"Ground reactions: {forces_used(trial.reactions, fit.settings, trial.motion_hz).which}. {motion}"
-    write_sto(folder / "kinematics.mot", _coordinates(fit, trial), True, "kinematics", motion)
+    write_table(folder / "kinematics.mot", _coordinates(fit, trial), "kinematics", motion)
     window_s, feet = trial.kinematics.window_s, fit.skeleton.feet
     write_ground_reactions(folder, trial.reactions, window_s, feet, forces)
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
     before = forces_before(trial.reactions, fit.settings)
     before = f"Ground reactions: {before}, instruments not corrected. Motion: {trial.kinematics.cutoff_hz:.3g} Hz"
     files = {
-        "inverse_dynamics": (trial.moments["estimate"], forces),
-        "inverse_dynamics_literature": (trial.moments["literature"], before),
-        "inverse_dynamics_sd": (trial.moment_sd, forces),
+        "inverse_dynamics": (trial.joint_loads["estimate"], forces),
+        "inverse_dynamics_literature": (trial.joint_loads["literature"], before),
+        "inverse_dynamics_sd": (trial.joint_load_sd, forces),
     }
     for file, (values, remark) in files.items():
         if values is not None:
-            write_sto(folder / f"{file}.sto", _table(trial, loads, values.to_numpy()), False, file, remark)
+            write_table(folder / f"{file}.sto", _table(trial, loads, values), file, remark)
     stages = {**trial.residuals, "estimate_full": trial.full_residuals["estimate"]}
     columns = [f"{stage}_{name}" for stage in stages for name in _RESIDUALS]
     residuals = _table(trial, columns, np.hstack(list(stages.values())))
     remark = f"Ground reactions: of the motion's bandwidth; estimate_full: {forces.partition(': ')[2]}"
-    write_sto(folder / "residuals.sto", residuals, False, "residuals", remark)
+    write_table(folder / "residuals.sto", residuals, "residuals", remark)
 
 
-def _coordinates(fit: Fit, trial: TrialFit) -> pd.DataFrame:
+def _coordinates(fit: Fit, trial: TrialFit) -> TimeTable:
     """Coordinates over time, in degrees and m; of an OpenSim model all that it has."""
     if fit.file is None:
         names, angles, q = fit.skeleton.coordinates, fit.skeleton.rotational, trial.motion.q
@@ -99,11 +110,11 @@ def _coordinates(fit: Fit, trial: TrialFit) -> pd.DataFrame:
         names = tuple(coordinate.name for coordinate in fit.file.coordinates)
         angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
         q = fit.file.all_coordinates(fit.skeleton, trial.motion.q)
-    return _table(trial, names, np.where(angles, np.degrees(q), q))
+    return _table(trial, names, np.where(angles, np.degrees(q), q), in_degrees=True)
 
 
-def _table(trial: TrialFit, columns: Sequence[str], values: np.ndarray) -> pd.DataFrame:
-    return pd.DataFrame(values, index=pd.Index(trial.time, name="time"), columns=list(columns))
+def _table(trial: TrialFit, labels: Sequence[str], values: np.ndarray, in_degrees: bool = False) -> TimeTable:
+    return TimeTable(trial.time, tuple(labels), values, in_degrees)
 
 
 def summary(fit: Fit) -> dict[str, Any]:
@@ -135,15 +146,18 @@ def _posterior_summary(fit: Fit) -> dict[str, Any]:
         "iterations": fit.posterior.iterations,
         "calibration": {name: dict(told) for name, told in fit.posterior.calibration.items()},
         "marker_noise": noise,
-        "identifiability": _identifiability(fit.bsp, fit.posterior.base),
+        "identifiability": _identifiability(fit.bsp_columns(), fit.posterior.base),
     }
 
 
-def _identifiability(bsp: pd.DataFrame, base: BaseParameters) -> dict[str, Any]:
+def _identifiability(bsp: Mapping[str, Sequence[Any]], base: BaseParameters) -> dict[str, Any]:
     """Parameters by evidence, and the combinations that the motion shows or no motion shows."""
-    names = bsp["segment"] + "." + bsp["parameter"]
+    by_evidence: dict[str, list[str]] = {"measured": [], "informed": [], "assumed": []}
+    for segment, parameter, word in zip(bsp["segment"], bsp["parameter"], bsp["evidence"], strict=True):
+        if word in by_evidence:
+            by_evidence[word].append(f"{segment}.{parameter}")
     return {
-        **{word: names[bsp["evidence"] == word].tolist() for word in ("measured", "informed", "assumed")},
+        **by_evidence,
         "base_parameters": {
             "count": base.count,
             "shown": base.shown,

@@ -4,14 +4,13 @@ on."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
-import pandas as pd
 
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.sto import write_sto
+from kinertia.io.sto import TimeTable, write_table
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.trial.data import FEET
 
@@ -44,15 +43,15 @@ def write_ground_reactions(
         point = reactions.point[:, foot]
         for stem, values in (("force_{}_v", force), ("force_{}_p", point), ("torque_{}_", reactions.torque[:, foot])):
             columns |= {f"ground_{stem.format(side)}{axis}": values[rows, k] for k, axis in enumerate("xyz")}
-    table = pd.DataFrame(columns, index=pd.Index(reactions.time[rows], name="time"))
-    write_sto(folder / FORCES_FILE, table, False, "ground_reactions", remark)
+    table = TimeTable(reactions.time[rows], tuple(columns), np.column_stack(list(columns.values())), False)
+    write_table(folder / FORCES_FILE, table, "ground_reactions", remark)
     write_then_rename(folder / LOADS_FILE, _external_loads(feet))
 
 
 def _external_loads(feet: Sequence[str]) -> str:
     forces = [
         f'''      <ExternalForce name="{name}_foot">
-        <applied_to_body>{escape(body)}</applied_to_body>
+        <applied_to_body>{escape(body, quote=False)}</applied_to_body>
         <force_expressed_in_body>ground</force_expressed_in_body>
         <point_expressed_in_body>ground</point_expressed_in_body>
         <force_identifier>ground_force_{side}_v</force_identifier>

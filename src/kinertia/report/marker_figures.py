@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
 from kinertia.estimation.result import TrialFit
 from kinertia.report import style
-from kinertia.report.panels import base_layout, compact, plain
+from kinertia.report.figure import Figure, compact
+from kinertia.report.panels import base_layout, plain
 from kinertia.trial.data import runs
 
 _ROW_PX = 17
 _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}
 
 
-def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> go.Figure:
+def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> Figure:
     """RMS distance (mm) between every measured and modelled marker over the window; the farthest on top.
 
     `wandering` names the markers that drift and are down-weighted.
@@ -50,7 +50,7 @@ def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> go.Figure
         "xaxis": {"title": {"text": "RMS distance (mm)"}, "rangemode": "tozero", "gridcolor": "#EFEFEF"},
         "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
     }
-    return go.Figure(traces, layout)
+    return Figure(traces, layout)
 
 
 def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
@@ -62,7 +62,7 @@ def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
         return result
 
 
-def gap_figure(trial: TrialFit) -> go.Figure | None:
+def gap_figure(trial: TrialFit) -> Figure | None:
     """When each marker of the model was not seen, over the whole trial; None where all always were."""
     kinematics = trial.kinematics
     time = kinematics.trial.markers.time
@@ -91,4 +91,4 @@ def gap_figure(trial: TrialFit) -> go.Figure | None:
         "shapes": [{**window, "fillcolor": style.SKY, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}],
         "showlegend": False,
     }
-    return go.Figure([{**line, "hovertemplate": "%{y}, %{x:.3f} s<extra></extra>"}], layout)
+    return Figure([{**line, "hovertemplate": "%{y}, %{x:.3f} s<extra></extra>"}], layout)

@@ -6,7 +6,8 @@ import numpy as np
 
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.headline import words
-from kinertia.report.page import bsp_rows, rendered, residual_rows
+from kinertia.report.page import bsp_rows, residual_rows
+from kinertia.report.rendering import rendered
 from kinertia.report.wording import start_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial
 from kinertia.trial.rms import rms

@@ -1,4 +1,4 @@
-"""`report.html`: one self-contained file, from the templates beside this module.
+"""`report.html`: one self-contained file.
 
 plotly.js is in the page once; its policy (Content-Security-Policy) forbids every request.
 """
@@ -7,24 +7,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from functools import cache
 from typing import Any
 
-import jinja2
 import numpy as np
-import plotly.graph_objects as go
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
-from kinertia.io.provenance import VERSION, Provenance, versions
+from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
+from kinertia.report.figure import Figure
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
+from kinertia.report.rendering import rendered
 from kinertia.report.skeleton_view import packed, scene
 from kinertia.report.time_figures import (
     MOST_EVENTS,
@@ -41,30 +39,7 @@ from kinertia.trial.rms import rms_length
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
 _VIEW_FRAMES = 800
-"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 8 MB."""
-
-
-@cache
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kinertia.report"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.globals["asset"] = _asset
-    environment.filters["fixed"] = fixed
-    return environment
-
-
-def _asset(name: str) -> Markup:
-    """A style sheet or script as it is; plotly.js from its package."""
-    if name == "plotly.js":
-        return Markup(get_plotlyjs())
-    loader = _environment().loader
-    assert loader is not None
-    return Markup(loader.get_source(_environment(), name)[0])
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
 def render(fit: Fit, provenance: Provenance | None = None) -> str:
@@ -94,15 +69,10 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
     )
 
 
-def rendered(template: str, **content: Any) -> str:
-    """A page from a template."""
-    return _environment().get_template(template).render(version=VERSION, **content)
-
-
-def written(figure: go.Figure) -> dict[str, Any]:
+def written(figure: Figure) -> dict[str, Any]:
     """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
     text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
-    return {"alt": figure.layout.meta["alt"], "json": Markup(text), "height": figure.layout.height}
+    return {"alt": figure.alt, "json": Markup(text), "height": figure.layout["height"]}
 
 
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
@@ -121,7 +91,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "residuals": written(residual_figure(trial, frames, start_of(fit))),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
         "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames, start_of(fit))),
-        "bands": trial.moment_sd is not None,
+        "bands": trial.joint_load_sd is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(

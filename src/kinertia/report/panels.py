@@ -12,10 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-import plotly.graph_objects as go
-
 from kinertia.report import style
+from kinertia.report.figure import Figure
 
 _BOTTOM_PX, _RIGHT_PX = 44, 14
 _LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
@@ -49,7 +47,7 @@ def plain(text: str) -> str:
 
 def small_multiples(
     panels: Sequence[Panel], alt: str, x: dict[str, Any], row_px: int = 170, left_px: int = 52, linked: bool = True
-) -> go.Figure:
+) -> Figure:
     """Panels of one kind as one figure.
 
     Args:
@@ -87,9 +85,16 @@ def small_multiples(
     ways["print"] = _arrangement(len(panels), MOST_COLUMNS, max(on_paper_px, 80), left_px, len(shown))
     layout = {**base_layout(alt), **axes, "shapes": shapes, "annotations": titles}
     layout["meta"] = {**layout["meta"], "arrangements": ways}
-    figure = go.Figure(data, layout)
-    figure.update_layout({key.replace(".", "_"): value for key, value in ways[str(MOST_COLUMNS)].items()})
-    return figure
+    return Figure(data, _arranged(layout, ways[str(MOST_COLUMNS)]))
+
+
+def _arranged(layout: dict[str, Any], flat: dict[str, Any]) -> dict[str, Any]:
+    """The layout with the settings of an arrangement, whose names are paths: "xaxis2.domain"."""
+    result = dict(layout)
+    for path, value in flat.items():
+        name, _, inner = path.partition(".")
+        result[name] = {**result[name], inner: value} if inner else value
+    return result
 
 
 _AXIS = {
@@ -106,9 +111,9 @@ _AXIS = {
 
 
 def base_layout(alt: str) -> dict[str, Any]:
-    """What all figures have: font, white ground, legend on top, and the text `alt`."""
+    """What all figures have: font, white ground, legend on top, the text `alt`, and no template of a notebook's."""
     return {
-        "template": "none",
+        "template": {},
         "font": {"family": style.FONT, "size": 12, "color": "#1A1A1A"},
         "paper_bgcolor": "#FFFFFF",
         "plot_bgcolor": "#FFFFFF",
@@ -134,8 +139,3 @@ def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: in
         found[f"xaxis{suffix}.domain"] = [round(left, 5), round(min(left + width, 1.0), 5)]
         found[f"yaxis{suffix}.domain"] = [round(max(top - row_px / inner_px, 0.0), 5), round(top, 5)]
     return found
-
-
-def compact(values: np.ndarray) -> np.ndarray:
-    """Single precision: plotly writes arrays as binary, so that this halves the page."""
-    return np.asarray(values, dtype=np.float32)

@@ -1,17 +1,27 @@
-"""`fit.plot`: the report's figures one by one, for notebooks."""
+"""`fit.plot`: the report's figures one by one, as plotly objects for notebooks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import plotly.graph_objects as go
+from typing import TYPE_CHECKING
 
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import bsp_figure, information_figure
+from kinertia.report.figure import Figure
 from kinertia.report.marker_figures import gap_figure, marker_figure
 from kinertia.report.skeleton_view import skeleton_figure
 from kinertia.report.time_figures import coordinate_figure, moment_figure, residual_figure
 from kinertia.report.wording import start_of
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+
+def as_plotly(figure: Figure) -> go.Figure:
+    """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed."""
+    import plotly.graph_objects as go
+
+    return go.Figure(figure.data, figure.layout, figure.frames)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,38 +36,40 @@ class FitPlots:
 
     def residuals(self, trial: str | None = None) -> go.Figure:
         """Root residual force and moment over time, stage by stage."""
-        return residual_figure(self._trial(trial), start=start_of(self.fit))
+        return as_plotly(residual_figure(self._trial(trial), start=start_of(self.fit)))
 
     def coordinates(self, trial: str | None = None) -> go.Figure:
         """Every coordinate by inverse kinematics and as estimated."""
-        return coordinate_figure(self._trial(trial), self.fit.skeleton)
+        return as_plotly(coordinate_figure(self._trial(trial), self.fit.skeleton))
 
     def moments(self, trial: str | None = None) -> go.Figure:
         """Joint moments per body mass, before against estimate."""
         mass_kg = self.fit.literature.total_mass_kg
-        return moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start_of(self.fit))
+        return as_plotly(moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start_of(self.fit)))
 
     def markers(self, trial: str | None = None) -> go.Figure:
         """Distance between every measured and modelled marker."""
         one = self._trial(trial)
         noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(one)]
-        return marker_figure(one, () if noise is None else noise.wandering)
+        return as_plotly(marker_figure(one, () if noise is None else noise.wandering))
 
     def gaps(self, trial: str | None = None) -> go.Figure | None:
         """When markers were not seen; None where all always were."""
-        return gap_figure(self._trial(trial))
+        figure = gap_figure(self._trial(trial))
+        return None if figure is None else as_plotly(figure)
 
     def skeleton(self, trial: str | None = None) -> go.Figure:
         """The skeleton in motion, with markers, centres of mass and ground reactions."""
-        return skeleton_figure(self.fit, self._trial(trial))
+        return as_plotly(skeleton_figure(self.fit, self._trial(trial)))
 
     def bsp(self) -> go.Figure:
         """Body segment parameters before and after, with intervals where there are any."""
-        return bsp_figure(self.fit)
+        return as_plotly(bsp_figure(self.fit))
 
     def information(self) -> go.Figure | None:
         """What the data say about each parameter; None after two-level."""
-        return information_figure(self.fit)
+        figure = information_figure(self.fit)
+        return None if figure is None else as_plotly(figure)
 
     def _trial(self, name: str | None) -> TrialFit:
         trials = {trial.name: trial for trial in self.fit.trials}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
@@ -22,6 +22,9 @@ from kinertia.studies.sensitivity import (
     Sensitivity,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 def sensitivity_frame(found: Sensitivity) -> pd.DataFrame:
     """One row per parameter, one column per condition: RMS error over the literature's."""
@@ -30,6 +33,8 @@ def sensitivity_frame(found: Sensitivity) -> pd.DataFrame:
 
 def sensitivity_figure(found: Sensitivity) -> Figure:
     """A map: parameters down, conditions across; dark is measured, white is no better than the literature."""
+    from matplotlib.figure import Figure  # half a second, which the other studies need not wait
+
     figure = Figure(figsize=(9.0, 12.0), layout="constrained")
     axis = figure.subplots()
     values = np.array(list(found.errors.values())).T

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.model.bsp import BodySegmentParameters
@@ -18,6 +17,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.bsp_figures import segment_name
+from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import base_layout
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
@@ -145,7 +145,7 @@ def _millimetres(positions: np.ndarray) -> str:
     return base64.b64encode(whole.astype("<i2").tobytes()).decode("ascii")
 
 
-def skeleton_figure(fit: Fit, trial: TrialFit) -> go.Figure:
+def skeleton_figure(fit: Fit, trial: TrialFit) -> Figure:
     """The same as a plotly figure for notebooks, with a slider and a play button; at most 60 frames."""
     shown = scene(fit, trial, _PLOTLY_FRAMES)
     steps = [
@@ -169,8 +169,8 @@ def skeleton_figure(fit: Fit, trial: TrialFit) -> go.Figure:
         "sliders": [{"steps": steps, "currentvalue": {"prefix": "time (s): "}, "pad": {"b": 40}}],
         "updatemenus": [{"type": "buttons", "buttons": [play, pause], "direction": "left", "y": 0, "yanchor": "top"}],
     }
-    frames = [go.Frame(name=str(k), data=_traces(shown, k)) for k in range(len(shown.time))]
-    return go.Figure(_traces(shown, 0), layout, frames)
+    frames = [{"name": str(k), "data": _traces(shown, k)} for k in range(len(shown.time))]
+    return Figure(_traces(shown, 0), layout, frames)
 
 
 def _at_once(duration_ms: float) -> dict[str, Any]:
@@ -198,5 +198,5 @@ def _traces(shown: Scene, k: int) -> list[dict[str, Any]]:
 
 
 def _trace(points: np.ndarray, name: str, **settings: Any) -> dict[str, Any]:
-    x, y, z = points.reshape(-1, 3).T.astype(np.float32)
+    x, y, z = compact(points.reshape(-1, 3).T)
     return {"type": "scatter3d", "x": x, "y": z, "z": y, "name": name, **settings}

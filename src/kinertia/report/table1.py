@@ -6,17 +6,20 @@ import io
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
-from kinertia.report.page import rendered
+from kinertia.report.rendering import rendered
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
 from kinertia.trial.rms import rms
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 QUANTITIES = {
     "inertia": ("inertia (kg m2)", "inertia_rms_kgm2", "inertia_max_kgm2"),
@@ -71,6 +74,8 @@ def _short(value: float, digits: int) -> str:
 
 def table1_figure(table: Table1) -> Figure:
     """Error per segment and class of parameter: at the start and after estimation, RMS over draws, logarithmic."""
+    from matplotlib.figure import Figure  # half a second, which the other commands need not wait
+
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, len(_CLASSES))
     segments = list(dict.fromkeys(name.partition(".")[0] for name in table.parameters))

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from kinertia.estimation.forces_used import full_bandwidth
 from kinertia.estimation.result import TrialFit
@@ -17,7 +16,8 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate, panels_of
-from kinertia.report.panels import Panel, compact, small_multiples
+from kinertia.report.figure import Figure, compact
+from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.wording import LITERATURE, Start
 from kinertia.trial.gait_events import GaitEvent, gait_events
 from kinertia.trial.rms import rms, rms_length
@@ -32,7 +32,7 @@ _AXES = ("forward", "upward", "to the right")
 _BAND_SD = 1.96
 
 
-def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> go.Figure:
+def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> Figure:
     """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage, with
     forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
     """
@@ -66,7 +66,7 @@ _MOMENT_AXES = ("forward axis", "vertical", "right axis")
 
 
 def stage_name(stage: str, start: Start, hz: float | None = None) -> str:
-    """A stage of `TrialFit.residuals` or `.moments` in words, with the bandwidth if it is given."""
+    """A stage of `TrialFit.residuals` or `.joint_loads` in words, with the bandwidth if it is given."""
     name = {"literature": start.values, "corrected": f"{start.values}, pelvis corrected"}.get(stage, stage)
     return name if hz is None else f"{name} ({hz:.3g} Hz)"
 
@@ -81,7 +81,7 @@ def _hz(trial: TrialFit, stage: str) -> float:
     return trial.motion_hz if stage == "estimate" else trial.kinematics.cutoff_hz
 
 
-def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> go.Figure:
+def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
     """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated."""
     ik, axis = trial.kinematics.ik, _time_axis(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
@@ -113,22 +113,22 @@ def motion_change(trial: TrialFit) -> np.ndarray:
 
 def moment_figure(
     trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES, start: Start = LITERATURE
-) -> go.Figure:
+) -> Figure:
     """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band."""
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
-    sd = trial.moment_sd
+    sd = trial.joint_load_sd
     panels = []
     for one in panels_of(skeleton):
         if min(one.columns.values()) < 6:
             continue
-        traces = [] if sd is None else _bands(one, trial, sd.to_numpy() / mass_kg, mass_kg, thin)
+        traces = [] if sd is None else _bands(one, trial, sd / mass_kg, mass_kg, thin)
         for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
             name = stage_name(stage, start)
-            traces += _sides(one, name, trial.time, trial.moments[stage].to_numpy() / mass_kg, thin, line)
+            traces += _sides(one, name, trial.time, trial.joint_loads[stage] / mass_kg, thin, line)
         unit = "N m/kg" if one.rotational else "N/kg"
         title = f"{one.title.split(',')[0].removesuffix(' +')} moment ({unit})"
         panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))
-    peak = np.abs(trial.moments["estimate"].to_numpy()[:, 6:]).max() / mass_kg
+    peak = np.abs(trial.joint_loads["estimate"][:, 6:]).max() / mass_kg
     alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
     return small_multiples(panels, alt, axis)
 
@@ -138,7 +138,7 @@ def _bands(one: Coordinate, trial: TrialFit, sd: np.ndarray, mass_kg: float, thi
     traces = []
     for side, column in one.columns.items():
         word, colour = style.SIDES[side]
-        middle, half = trial.moments["estimate"].to_numpy()[:, column] / mass_kg, _BAND_SD * sd[:, column]
+        middle, half = trial.joint_loads["estimate"][:, column] / mass_kg, _BAND_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
         fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
         traces.append({**_curve(trial.time, middle - half, thin), **edge, "showlegend": False})

@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
@@ -187,6 +186,8 @@ def _wobbled(trial: SyntheticTrial, share: float) -> np.ndarray:
 
 def _oscillator(base: np.ndarray, step: float) -> np.ndarray:
     """(n, 3) displacement x of x'' + 2 d w x' + w^2 x = -base, by the bilinear transform, from rest at balance."""
+    from scipy.signal import lfilter  # with scipy.stats, half a second: for whom nothing wobbles, too much
+
     w = 2.0 * np.pi * WOBBLE_HZ
     k = 2.0 / step
     a = np.array(

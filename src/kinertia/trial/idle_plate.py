@@ -11,10 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_propagation
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, nearest_samples
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, nearest_samples
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
@@ -49,10 +48,17 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     nearest = firm[nearest_samples(time[firm], time)] if len(firm) > 1 else np.full(len(time), firm[0])
     stands_out = force[:, 1] > max(offset_n + _ABOVE_NOISE * noise_n, _LEAST_TAIL_N)
     near = np.abs(time - time[nearest]) <= LONGEST_TAIL_S
-    tail = binary_propagation(loaded, mask=loaded | (stands_out & near)) & ~loaded
+    tail = _joining(loaded, loaded | (stands_out & near)) & ~loaded
     point = centre_of_pressure(np.concatenate([force, moment], axis=1)[nearest])
     moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))
     return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n)
+
+
+def _joining(loaded: BoolArray, candidates: BoolArray) -> BoolArray:
+    """The candidates, among which are the loaded samples, that no other sample parts from a loaded one."""
+    stretch = np.cumsum(np.diff(candidates, prepend=False))
+    joins: BoolArray = candidates & np.isin(stretch, stretch[loaded])
+    return joins
 
 
 def _idle(vertical: FloatArray) -> tuple[float, float]:

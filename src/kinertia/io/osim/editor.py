@@ -8,15 +8,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from kinertia.io.osim.reader import INERTIA_TAGS, body_elements, marker_elements
 from kinertia.io.osim.xml import Element, parse, replaced
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Marker
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CHANGE_COLUMNS = ("component", "property", "old", "new")
 
@@ -63,6 +66,8 @@ def write_osim(
         spans.append(_replacement(edit.element, edit.tag, old, new))
         rows.append((edit.element.name, edit.tag, told, new))
     Path(path).write_bytes(replaced(model.content, spans))
+    import pandas as pd
+
     return pd.DataFrame(rows, columns=list(CHANGE_COLUMNS))
 
 

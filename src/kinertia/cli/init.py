@@ -1,0 +1,30 @@
+"""`kinertia init`: a first subject file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.terminal import out
+from kinertia.errors import FileError
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.subject_draft import init_subject
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder with the files of one person.")],
+) -> None:
+    """Write a first subject.toml from the files in a folder.
+
+    [bold]Example[/]
+
+    kinertia init data/subject01
+    """
+    path = folder / "subject.toml"
+    if path.exists():
+        raise FileError(path, "exists already and is left alone; remove it to draft a new one")
+    text = init_subject(folder)
+    write_then_rename(path, text)
+    out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)

@@ -1,0 +1,129 @@
+"""The demo's work: a synthetic person, measured by a synthetic laboratory, estimated, compared with the truth.
+
+The truth differs from the literature as people do and is known to nobody but the comparison at the end: the estimator
+reads the laboratory's files.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kinertia.estimation.estimate import estimate_bsp
+from kinertia.estimation.from_files import read_inputs
+from kinertia.estimation.prepare import Progress
+from kinertia.estimation.result import Fit
+from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import command_line, provenance_of
+from kinertia.io.subject_file import read_subject, with_settings
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.report.files import save_fit
+from kinertia.studies.joint_accuracy import JOINTS
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
+from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
+from kinertia.trial.rms import rms
+
+PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
+"""Force plates at 1000 Hz, cameras at 100 Hz."""
+DURATION_S, START = 2.7, 0.75
+"""A bit over two strides, begun so that one right and one left contact are whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """Fits of synthetic files by both estimators, and the truth behind them.
+
+    Attributes:
+        fit: the simultaneous estimate.
+        two_level: the two-level estimate from the same files.
+        walk: what the person did, and with which BSPs; from it the files were made.
+        subject_file: of the synthetic laboratory.
+    """
+
+    fit: Fit
+    two_level: Fit
+    walk: SyntheticTrial
+    subject_file: Path
+
+    @property
+    def truth(self) -> BodySegmentParameters:
+        """The person's BSPs."""
+        return self.walk.bsp
+
+    @cached_property
+    def moment_errors(self) -> dict[str, tuple[float, float]]:
+        """Per joint, RMS error (N m) of joint moments by the usual way (measured motion, literature BSPs, forces as
+        measured) and by the simultaneous estimate.
+        """
+        trial = self.fit.trials[0]
+        at = np.searchsorted(self.walk.time, trial.time - 1e-9)
+        true = inverse_dynamics(self.walk.skeleton, self.walk.bsp, self.walk.motion.cut(at), self.walk.foot_loads[at])
+        coordinates = self.walk.skeleton.coordinates
+        expected = pd.DataFrame(true, columns=list(coordinates))
+        found = {}
+        for joint, begins in JOINTS.items():
+            names = [n for n in coordinates if n.startswith(begins) and n in trial.moments["estimate"]]
+            before, after = (
+                rms(trial.moments[stage][names].to_numpy() - expected[names].to_numpy())
+                for stage in ("literature", "estimate")
+            )
+            found[joint] = (before, after)
+        return found
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Columns segment, parameter, unit, truth, literature, estimate, sd, two_level."""
+        table = self.fit.bsp[["segment", "parameter", "unit", "literature", "estimate", "sd"]].copy()
+        table.insert(3, "truth", self.truth.to_frame()["value"])
+        return table.assign(two_level=self.two_level.bsp["estimate"])
+
+    def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
+        """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
+        change = source.table() - self.truth.table()
+        distance = np.linalg.norm(change[:, 1:4], axis=1)
+        mass, com, inertia = (rms(part) for part in (change[:, 0], distance, change[:, 4:7]))
+        return mass, com, inertia
+
+
+def run_demo(
+    folder: str | Path,
+    seed: int = 1,
+    noise: LabNoise | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> Demo:
+    """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
+
+    The results of the simultaneous estimate stand in `folder` itself, those of two-level in `folder`/two-level.
+
+    Args:
+        folder: is made if need be.
+        seed: of truth and noise.
+        noise: the default `LabNoise` if None.
+        progress: called as the work goes on.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    folder = Path(folder)
+    with complete_folder(folder) as work:
+        progress("measuring", 0.0)
+        truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
+        subject = unlike_literature(walking_subject(), truth_rng)
+        trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
+        recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
+        wanted = read_subject(write_lab(work / "lab", recordings))
+        static, inputs, marker_set = read_inputs(wanted, progress)
+        provenance = provenance_of(wanted, command_line(["kinertia", "demo", "-o", str(folder)]))
+        fits = []
+        for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
+            settings = with_settings(wanted, method=method).settings
+            fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
+            save_fit(fits[-1], results, provenance)
+        demo = Demo(fits[0], fits[1], trial, folder / "lab" / "subject.toml")
+        demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
+    return demo

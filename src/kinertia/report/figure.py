@@ -1,0 +1,57 @@
+"""A figure as plain data: what plotly.js draws in a report, and what plotly's Python package shows in a notebook.
+
+A report needs no Python package for that. plotly's own objects check every value against a schema, which took a fifth
+of a fit's time; here the tests do so once, for every figure that there is.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Traces and layout, named and nested as in plotly's reference (https://plotly.com/javascript/reference).
+
+    Attributes:
+        data: traces; numbers may be lists, or the arrays that `compact` makes.
+        layout: axes, shapes, annotations, height; `meta.alt` is the text for those who cannot see the figure.
+        frames: of an animation.
+    """
+
+    data: Sequence[Mapping[str, Any]]
+    layout: Mapping[str, Any]
+    frames: Sequence[Mapping[str, Any]] = ()
+
+    @property
+    def alt(self) -> str:
+        """The figure in words."""
+        text: str = self.layout["meta"]["alt"]
+        return text
+
+    def to_json(self) -> str:
+        """Traces and layout as plotly.js reads them.
+
+        Raises:
+            ValueError: a number outside of arrays is not finite, for which JSON has no word.
+        """
+        plain = {"data": self.data, "layout": self.layout}
+        return json.dumps(plain, default=_typed_array, allow_nan=False, separators=(",", ":"))
+
+
+def compact(values: np.ndarray) -> np.ndarray:
+    """Single precision, in which `Figure.to_json` writes arrays: half of what doubles take, and more than eyes see."""
+    return np.asarray(values, dtype=np.float32)
+
+
+def _typed_array(values: object) -> dict[str, str]:
+    """plotly.js' form of a binary array: little-endian, in base64. Here NaN, a gap in a curve, needs no word."""
+    if not (isinstance(values, np.ndarray) and values.dtype == np.float32 and values.ndim == 1):
+        raise TypeError(f"a figure holds lists and one-dimensional arrays of float32, not {values!r}")
+    return {"dtype": "f4", "bdata": base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")}

@@ -1,0 +1,57 @@
+"""Pages from the templates beside this module."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from functools import cache
+from importlib.util import cache_from_source
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from jinja2.bccache import Bucket
+from markupsafe import Markup
+
+from kinertia.io.provenance import VERSION
+from kinertia.report.wording import fixed
+
+
+def rendered(template: str, **content: Any) -> str:
+    """A page from a template."""
+    return _environment().get_template(template).render(version=VERSION, **content)
+
+
+class _CompiledTemplates(jinja2.FileSystemBytecodeCache):
+    """Compiled templates, in the folder of Python's compiled modules, and only where it may write those.
+
+    Compiling takes more time than all the rest of a report.
+    """
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Keep what was compiled, if that is possible."""
+        if not sys.dont_write_bytecode:
+            with suppress(OSError):
+                super().dump_bytecode(bucket)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("kinertia.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+        bytecode_cache=_CompiledTemplates(str(Path(cache_from_source(__file__)).parent)),
+    )
+    environment.globals["asset"] = _asset
+    environment.filters["fixed"] = fixed
+    return environment
+
+
+def _asset(name: str) -> Markup:
+    """A style sheet or script as it is."""
+    loader = _environment().loader
+    assert loader is not None
+    return Markup(loader.get_source(_environment(), name)[0])

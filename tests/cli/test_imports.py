@@ -1,0 +1,41 @@
+"""Every command loads what it uses and no more: half of a fit's time went into modules that it did not need."""
+
+import pytest
+
+from command_line import loaded_by
+
+PICTURES = {"plotly", "matplotlib"}
+SLOW = {*PICTURES, "scipy.stats", "scipy.signal"}
+SYNTHETIC = {"kinertia.studies", "kinertia.synthetic"}
+OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.estimation.prepare_osim"}
+C3D = {"ezc3d", "kinertia.io.c3d"}
+
+
+def test_the_version_is_told_without_loading_the_commands():
+    loaded = loaded_by("--version")
+    assert "kinertia.cli.start" in loaded
+    assert not loaded & {*SLOW, "numpy", "scipy", "pandas", "pydantic", "typer", "rich", "kinertia.cli.app"}
+
+
+def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(measured_walk, tmp_path):
+    loaded = loaded_by("fit", measured_walk / "subject.toml", "-o", tmp_path / "out", "--quiet")
+    assert (tmp_path / "out" / "report.html").is_file()
+    assert loaded >= C3D
+    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, "pandas", "kinertia.cli.check", "kinertia.cli.study"}
+
+
+def test_a_fit_of_text_files_does_not_load_the_reader_of_c3d(demo_run, tmp_path):
+    loaded = loaded_by("fit", demo_run[1] / "lab" / "subject.toml", "-o", tmp_path / "out", "--quiet")
+    assert (tmp_path / "out" / "bsp.csv").is_file()
+    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, *C3D, "pandas"}
+
+
+def test_a_check_loads_no_pictures_or_studies(measured_walk, tmp_path):
+    loaded = loaded_by("check", measured_walk / "subject.toml", "-o", tmp_path / "out", "--quiet")
+    assert (tmp_path / "out" / "check.html").is_file()
+    assert not loaded & {*SLOW, *SYNTHETIC, "kinertia.cli.fit"}
+
+
+@pytest.mark.parametrize("command", ["demo", "init", "crossval", "plan", "study"])
+def test_help_waits_for_nothing_slow(command):
+    assert not loaded_by(command, "--help") & SLOW
