@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg.blas import dtrsm
+from scipy.linalg.lapack import dpotrf
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,10 @@ class BlockBand:
             numpy.linalg.LinAlgError: it is not positive definite.
         """
         factors, carried = np.empty_like(diagonal), np.empty_like(below)
-        factors[0] = np.linalg.cholesky(diagonal[0])
+        factors[0] = _cholesky(diagonal[0])
         for i in range(1, len(diagonal)):
-            carried[i - 1] = solve_triangular(factors[i - 1], below[i - 1].T, lower=True, check_finite=False).T
-            factors[i] = np.linalg.cholesky(diagonal[i] - carried[i - 1] @ carried[i - 1].T)
+            carried[i - 1] = _times_inverse_transpose(factors[i - 1], below[i - 1])
+            factors[i] = _cholesky(diagonal[i] - carried[i - 1] @ carried[i - 1].T)
         return cls(factors, carried)
 
     def forward(self, right: np.ndarray) -> np.ndarray:
@@ -44,7 +45,7 @@ class BlockBand:
         result = np.empty_like(right)
         for i in range(len(right)):
             known = right[i] if i == 0 else right[i] - self.below[i - 1] @ result[i - 1]
-            result[i] = solve_triangular(self.diagonal[i], known, lower=True, check_finite=False)
+            result[i] = _solved(self.diagonal[i], known)
         return result
 
     def backward(self, right: np.ndarray) -> np.ndarray:
@@ -53,7 +54,7 @@ class BlockBand:
         last = len(right) - 1
         for i in range(last, -1, -1):
             known = right[i] if i == last else right[i] - self.below[i].T @ result[i + 1]
-            result[i] = solve_triangular(self.diagonal[i], known, lower=True, trans="T", check_finite=False)
+            result[i] = _solved(self.diagonal[i], known, transposed=True)
         return result
 
     def inverse_blocks(self) -> tuple[np.ndarray, np.ndarray]:
@@ -61,7 +62,7 @@ class BlockBand:
         diagonal, below = np.empty_like(self.diagonal), np.empty_like(self.below)
         unit = np.eye(self.diagonal.shape[1])
         for i in range(len(diagonal) - 1, -1, -1):
-            half = solve_triangular(self.diagonal[i], unit, lower=True, check_finite=False)
+            half = _solved(self.diagonal[i], unit)
             if i == len(diagonal) - 1:
                 diagonal[i] = half.T @ half
                 continue
@@ -69,3 +70,26 @@ class BlockBand:
             below[i] = -diagonal[i + 1] @ carried
             diagonal[i] = half.T @ half - carried.T @ below[i]
         return diagonal, below
+
+
+# BLAS and LAPACK take matrices column by column: a row-wise matrix is its own transpose there, and is not copied
+
+
+def _cholesky(matrix: np.ndarray) -> np.ndarray:
+    factor, failed = dpotrf(matrix.T, lower=0, clean=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    result: np.ndarray = factor.T
+    return result
+
+
+def _solved(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+    """L^-1 right, or L^-T right."""
+    result: np.ndarray = dtrsm(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed)).T
+    return result
+
+
+def _times_inverse_transpose(lower: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """left L^-T."""
+    result: np.ndarray = dtrsm(1.0, lower.T, left.T, side=0, lower=0, trans_a=1).T
+    return result

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 from math import comb
 
@@ -84,7 +85,7 @@ class GaussianPrior:
         """
         information = np.linalg.inv(covariance)
         data, right = information - self.precision, information @ mean - self.pull
-        variances, chances = _components(priors)
+        variances, chances = _components(tuple(priors))
         spread = np.linalg.inv(data + np.eye(len(priors)) / variances[:, None, :])
         centres = spread @ right
         weight = np.log(chances) + 0.5 * (
@@ -99,19 +100,21 @@ class GaussianPrior:
         return GaussianPrior(information - data, information @ middle - right)
 
 
-def _components(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
+@cache
+def _components(priors: tuple[SoundOrFaulty, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Variances (n, k) and chances (n,) of the likeliest ways to be sound or faulty: all, or those of few faults."""
-    variances: list[np.ndarray] = []
-    chances: list[float] = []
     uncertain = [i for i, prior in enumerate(priors) if prior.faulty_share > 0.0]
-    sound = np.array([prior.sound_sd for prior in priors])
-    faulty = np.array([prior.faulty_sd for prior in priors])
-    share = np.array([prior.faulty_share for prior in priors])
+    off: list[np.ndarray] = []
     for faults in range(len(uncertain) + 1):
-        if len(chances) + comb(len(uncertain), faults) > _MOST_COMPONENTS:
+        count = comb(len(uncertain), faults)
+        if sum(map(len, off)) + count > _MOST_COMPONENTS:
             break
-        for chosen in combinations(uncertain, faults):
-            off = np.isin(np.arange(len(priors)), chosen)
-            variances.append(np.square(np.where(off, faulty, sound)))
-            chances.append(float(np.prod(np.where(off, share, 1.0 - share))))
-    return np.array(variances), np.array(chances)
+        chosen = np.array(list(combinations(uncertain, faults)), dtype=int).reshape(count, faults)
+        some = np.zeros((count, len(priors)), dtype=bool)
+        np.put_along_axis(some, chosen, True, axis=1)
+        off.append(some)
+    every = np.concatenate(off)
+    sound, faulty, share = (
+        np.array([getattr(prior, name) for prior in priors]) for name in ("sound_sd", "faulty_sd", "faulty_share")
+    )
+    return np.square(np.where(every, faulty, sound)), np.where(every, share, 1.0 - share).prod(axis=1)
