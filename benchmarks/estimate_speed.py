@@ -15,6 +15,7 @@ from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from measured_trials import table
+from pinocchio_skeleton import pinocchio_model
 from synthetic_walks import BANDWIDTH, FIRST_SEED, kinematics_of
 
 
@@ -52,7 +53,7 @@ def timed(duration_s: float) -> Timing:
 
 def bare_calls(trial: SyntheticTrial) -> float:
     """Seconds of Pinocchio's Jacobian, RNEA derivatives and regressor over all frames, best of three."""
-    model = trial.skeleton.model_with(trial.bsp)
+    model = pinocchio_model(trial.skeleton, trial.bsp)
     data, best = model.createData(), np.inf
     rows = list(zip(trial.motion.q, trial.motion.qd, trial.motion.qdd, strict=True))
     for _ in range(3):

@@ -1,53 +1,9 @@
-"""A skeleton as a Pinocchio model: the oracle of the rigid-body core, built from the joints and not from our tree."""
+"""Pinocchio as the oracle of the rigid-body core; tests that need it are skipped where it has no wheels."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-
-import numpy as np
 import pytest
-
-from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.skeleton import Axis, Skeleton
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio has no wheels for this system")
 
+from pinocchio_skeleton import axis_forces, pinocchio_model  # noqa: E402
 
-def pinocchio_model(skeleton: Skeleton, *parts: BodySegmentParameters | None) -> pin.Model:
-    """The model with these parameters, and those that the skeleton carries; locked axes are part of the placements."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, -skeleton.gravity_m_s2, 0.0])
-    carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
-    for joint in skeleton.joints:
-        parent = carrier[joint.parent]
-        place = offset[joint.parent] * pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
-        for axis in joint.axes:
-            if axis.coordinate in skeleton.locked:
-                place = place * _placed_by(axis, skeleton.locked[axis.coordinate])
-                continue
-            kind = pin.JointModelRevoluteUnaligned if axis.kind == "rotation" else pin.JointModelPrismaticUnaligned
-            parent = model.addJoint(parent, kind(*axis.direction), place, f"{axis.coordinate}:{model.njoints}")
-            place = pin.SE3.Identity()
-        far = pin.SE3(np.asarray(joint.child_rotation), np.asarray(joint.child_translation))
-        carrier[joint.child], offset[joint.child] = parent, place * far.inverse()
-    for part in (*parts, skeleton.carried):
-        for segment, *body in (
-            () if part is None else zip(part.segments, part.mass_kg, part.com_m, part.inertia_kgm2, strict=True)
-        ):
-            model.appendBodyToJoint(carrier[segment], pin.Inertia(*body), offset[segment])
-    return model
-
-
-def axis_forces(model: pin.Model, motion: Sequence[np.ndarray]) -> np.ndarray:
-    """(n, a) forces of the axes for places, rates and accelerations, each (n, a)."""
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *rows) for rows in zip(*motion, strict=True)])
-
-
-def _placed_by(axis: Axis, value: float) -> pin.SE3:
-    direction = np.array(axis.direction)
-    if axis.function is not None:
-        value = float(axis.function(np.array([value]))[0])
-    if axis.kind == "translation":
-        return pin.SE3(np.eye(3), direction * value)
-    return pin.SE3(pin.exp3(direction * value), np.zeros(3))
+__all__ = ["axis_forces", "pin", "pinocchio_model"]

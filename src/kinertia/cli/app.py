@@ -59,6 +59,7 @@ _MODULES = {
     "crossval": "plan",
     "plan": "plan",
     "study": "study",
+    "warm-up": "warm_up",
 }
 """Module of every command, which has its name there; in the order of `kinertia --help`."""
 
@@ -75,11 +76,11 @@ def application(only: str | None = None) -> typer.Typer:
     )
     app.callback()(_root)
     for name in _MODULES if only is None else (only,):
-        command = getattr(import_module(f"kinertia.cli.{_MODULES[name]}"), name)
+        command = getattr(import_module(f"kinertia.cli.{_MODULES[name]}"), name.replace("-", "_"))
         if isinstance(command, typer.Typer):
             app.add_typer(command, name=name)
         else:
-            app.command()(command)
+            app.command(name)(command)
     return app
 
 

@@ -48,8 +48,18 @@ class _TimeLeftColumn(TimeRemainingColumn):
 def shown_progress() -> Iterator[Callable[[str, float], None]]:
     """Progress of the stage at work: a bar with the time left on a terminal, a line per stage elsewhere.
 
-    Yields a function that takes the stage's name and its share done.
+    Yields a function that takes the stage's name and its share done. What has not been compiled on this machine is
+    compiled first.
     """
+    from kinertia.cli.warm_up import compile_once
+
+    with _shown_progress() as progress:
+        compile_once(progress)
+        yield progress
+
+
+@contextmanager
+def _shown_progress() -> Iterator[Callable[[str, float], None]]:
     seen: list[str] = []
     if out.quiet:
         yield lambda stage, share: None

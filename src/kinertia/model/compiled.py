@@ -1,4 +1,4 @@
-"""Functions that Numba compiles to machine code, once per machine.
+"""Functions that Numba compiles to machine code, once per machine: `kinertia warm-up`, or whatever runs first.
 
 What runs over the frames of a trial is compiled, and kept in a folder that names its sources: whoever changes a line
 of a compiled function, or installs another version, compiles anew and never runs what an older line gave. The folder
@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,6 +24,8 @@ from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_COMPLETE = "complete"
+"""File that says so."""
 SOURCES = (
     "model/compiled.py",
     "model/spatial.py",
@@ -60,6 +63,21 @@ def cache_folder() -> Path:
     name = f"kinertia-{text.hexdigest()[:16]}"
     places = (Path(__file__).parent / "__pycache__", _user_cache() / "kinertia", Path(tempfile.gettempdir()))
     return next((place / name for place in places if _writable(place / name)), places[-1] / name)
+
+
+def is_compiled() -> bool:
+    """Whether everything has been compiled on this machine, in the present state of the sources."""
+    return (cache_folder() / _COMPLETE).exists()
+
+
+def set_compiled() -> None:
+    """Note that everything has been compiled, and drop what earlier states of the sources left beside it."""
+    folder = cache_folder()
+    with suppress(OSError):
+        (folder / _COMPLETE).touch()
+        for other in folder.parent.glob("kinertia-*"):
+            if other != folder and folder.parent.name == "__pycache__":
+                shutil.rmtree(other, ignore_errors=True)
 
 
 def _user_cache() -> Path:

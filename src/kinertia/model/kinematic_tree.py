@@ -51,30 +51,40 @@ def place_axes(
     base, turn, unit, here = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for j in range(len(at)):
         parent = tree.parent[j]
-        if parent < 0:
-            base[:] = tree.rotation[j]
-            here[:] = tree.translation[j]
-        else:
-            _product(rotation[parent], tree.rotation[j], base)
-            _moved(rotation[parent], tree.translation[j], translation[parent], here)
-        x, y, z = tree.direction[j]
+        for r in range(3):
+            if parent < 0:
+                here[r] = tree.translation[j, r]
+            else:
+                here[r] = translation[parent, r]
+                for c in range(3):
+                    here[r] += rotation[parent, r, c] * tree.translation[j, c]
+            for c in range(3):
+                if parent < 0:
+                    base[r, c] = tree.rotation[j, r, c]
+                else:
+                    base[r, c] = 0.0
+                    for k in range(3):
+                        base[r, c] += rotation[parent, r, k] * tree.rotation[j, k, c]
+        x, y, z = tree.direction[j, 0], tree.direction[j, 1], tree.direction[j, 2]
         for r in range(3):
             unit[r] = base[r, 0] * x + base[r, 1] * y + base[r, 2] * z
         if tree.slides[j]:
-            rotation[j] = base
             for r in range(3):
                 translation[j, r] = here[r] + unit[r] * at[j]
                 axes[j, r], axes[j, 3 + r] = unit[r], 0.0
+                for c in range(3):
+                    rotation[j, r, c] = base[r, c]
             continue
         # Rodrigues' formula
-        s, c = np.sin(at[j]), np.cos(at[j])
-        o = 1.0 - c
-        turn[0, 0], turn[0, 1], turn[0, 2] = c + o * x * x, o * x * y - s * z, o * x * z + s * y
-        turn[1, 0], turn[1, 1], turn[1, 2] = o * x * y + s * z, c + o * y * y, o * y * z - s * x
-        turn[2, 0], turn[2, 1], turn[2, 2] = o * x * z - s * y, o * y * z + s * x, c + o * z * z
-        _product(base, turn, rotation[j])
-        translation[j] = here
-        axes[j, 3:] = unit
+        sine, cosine = np.sin(at[j]), np.cos(at[j])
+        o = 1.0 - cosine
+        turn[0, 0], turn[0, 1], turn[0, 2] = cosine + o * x * x, o * x * y - sine * z, o * x * z + sine * y
+        turn[1, 0], turn[1, 1], turn[1, 2] = o * x * y + sine * z, cosine + o * y * y, o * y * z - sine * x
+        turn[2, 0], turn[2, 1], turn[2, 2] = o * x * z - sine * y, o * y * z + sine * x, cosine + o * z * z
+        for r in range(3):
+            translation[j, r], axes[j, 3 + r] = here[r], unit[r]
+            for c in range(3):
+                rotation[j, r, c] = base[r, 0] * turn[0, c] + base[r, 1] * turn[1, c] + base[r, 2] * turn[2, c]
         axes[j, 0] = here[1] * unit[2] - here[2] * unit[1]
         axes[j, 1] = here[2] * unit[0] - here[0] * unit[2]
         axes[j, 2] = here[0] * unit[1] - here[1] * unit[0]
@@ -90,13 +100,21 @@ def place_segments(
 ) -> None:
     """Frames of all segments, written to `rotation` (s, 3, 3) and `translation` (s, 3), from those of the axes."""
     for s in range(len(tree.carrier)):
-        carrier = tree.carrier[s]
-        if carrier < 0:
-            rotation[s] = tree.segment_rotation[s]
-            translation[s] = tree.segment_translation[s]
-        else:
-            _product(axis_rotation[carrier], tree.segment_rotation[s], rotation[s])
-            _moved(axis_rotation[carrier], tree.segment_translation[s], axis_translation[carrier], translation[s])
+        j = tree.carrier[s]
+        for r in range(3):
+            if j < 0:
+                translation[s, r] = tree.segment_translation[s, r]
+            else:
+                translation[s, r] = axis_translation[j, r]
+                for c in range(3):
+                    translation[s, r] += axis_rotation[j, r, c] * tree.segment_translation[s, c]
+            for c in range(3):
+                if j < 0:
+                    rotation[s, r, c] = tree.segment_rotation[s, r, c]
+                else:
+                    rotation[s, r, c] = 0.0
+                    for k in range(3):
+                        rotation[s, r, c] += axis_rotation[j, r, k] * tree.segment_rotation[s, k, c]
 
 
 @compiled
@@ -110,19 +128,3 @@ def poses(tree: KinematicTree, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
         place_axes(tree, at[k], axis_rotation, axis_translation, axes[k])
         place_segments(tree, axis_rotation, axis_translation, rotation[k], translation[k])
     return rotation, translation, axes
-
-
-@compiled
-def _product(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
-    """out = first @ second of two rotations."""
-    for r in range(3):
-        for c in range(3):
-            out[r, c] = first[r, 0] * second[0, c] + first[r, 1] * second[1, c] + first[r, 2] * second[2, c]
-
-
-@compiled
-def _moved(rotation: np.ndarray, local: np.ndarray, origin: np.ndarray, out: np.ndarray) -> None:
-    """out = rotation @ local + origin."""
-    for r in range(3):
-        turned = rotation[r, 0] * local[0] + rotation[r, 1] * local[1] + rotation[r, 2] * local[2]
-        out[r] = origin[r] + turned

@@ -34,7 +34,7 @@ def regressor(
                 continue
             _in_segment(frame.velocity[carrier], frame.acceleration[carrier], rotation[s], translation[s], w, e, b)
             _own_regressor(w, e, b, own)
-            _to_ground(rotation[s], translation[s] - about[k], own, result[k, :, s])
+            _to_ground(rotation[s], translation[s], about[k], own, result[k, :, s])
     return result
 
 
@@ -49,9 +49,10 @@ def _in_segment(
     b: np.ndarray,
 ) -> None:
     """Angular velocity w, angular acceleration e, and acceleration b of the origin, in the segment's axes."""
-    vx, vy, vz, wx, wy, wz = velocity
-    ax, ay, az, ex, ey, ez = acceleration
-    x, y, z = at
+    vx, vy, vz, wx, wy, wz = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
+    ax, ay, az = acceleration[0], acceleration[1], acceleration[2]
+    ex, ey, ez = acceleration[3], acceleration[4], acceleration[5]
+    x, y, z = at[0], at[1], at[2]
     hx, hy, hz = vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
     origin = (
         ax + ey * z - ez * y + wy * hz - wz * hy,
@@ -94,12 +95,13 @@ def _own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray)
 
 
 @compiled
-def _to_ground(rotation: np.ndarray, arm: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
-    """out = (6, 10) the same in ground axes, about a point from which the segment's origin is at `arm`."""
+def _to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
+    """out = (6, 10) the same in ground axes and about another point, for a segment whose origin is at `at`."""
+    x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
     for c in range(10):
         for r in range(3):
             out[r, c] = rotation[r, 0] * own[0, c] + rotation[r, 1] * own[1, c] + rotation[r, 2] * own[2, c]
             out[3 + r, c] = rotation[r, 0] * own[3, c] + rotation[r, 1] * own[4, c] + rotation[r, 2] * own[5, c]
-        out[3, c] += arm[1] * out[2, c] - arm[2] * out[1, c]
-        out[4, c] += arm[2] * out[0, c] - arm[0] * out[2, c]
-        out[5, c] += arm[0] * out[1, c] - arm[1] * out[0, c]
+        out[3, c] += y * out[2, c] - z * out[1, c]
+        out[4, c] += z * out[0, c] - x * out[2, c]
+        out[5, c] += x * out[1, c] - y * out[0, c]

@@ -162,19 +162,21 @@ def _times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray
 @compiled
 def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.ndarray, bias: np.ndarray) -> None:
     """B of one body, whose momentum (1, 6) is I V."""
-    v, w, h = velocity[j, :3], velocity[j, 3:], inertia[j, 1:4]
-    moments = inertia[j, 4:].reshape(3, 3)
-    turn = np.zeros((3, 3))
-    turn[0, 1], turn[0, 2], turn[1, 2] = -w[2], w[1], -w[0]
-    turn[1, 0], turn[2, 0], turn[2, 1] = w[2], -w[1], w[0]
+    x, y, z = velocity[j, 3], velocity[j, 4], velocity[j, 5]
+    turn = np.empty((3, 3))
+    turn[0, 0], turn[0, 1], turn[0, 2] = 0.0, -z, y
+    turn[1, 0], turn[1, 1], turn[1, 2] = z, 0.0, -x
+    turn[2, 0], turn[2, 1], turn[2, 2] = -y, x, 0.0
     # [v] [H] + [H] [v] = v H^T + H v^T - 2 (v . H) 1
-    twice = 2.0 * (v[0] * h[0] + v[1] * h[1] + v[2] * h[2])
+    twice = 0.0
+    for r in range(3):
+        twice += 2.0 * velocity[j, r] * inertia[j, 1 + r]
     for r in range(3):
         bias[j, r] = momentum[0, r]
         for c in range(3):
-            value = -(h[r] * v[c] + v[r] * h[c])
+            value = -inertia[j, 1 + r] * velocity[j, c] - velocity[j, r] * inertia[j, 1 + c]
             for k in range(3):
-                value += turn[r, k] * moments[k, c] - moments[r, k] * turn[k, c]
+                value += turn[r, k] * inertia[j, 4 + 3 * k + c] - inertia[j, 4 + 3 * r + k] * turn[k, c]
             bias[j, 3 + 3 * r + c] = value + twice if r == c else value
     bias[j, 4] += momentum[0, 5]
     bias[j, 5] -= momentum[0, 4]
@@ -272,7 +274,7 @@ def root_load(
         _load(bodies, frame, True)
         _sum_up(tree.parent, frame, True)
         _columns(frame, column)
-        ax, ay, az = about[k]
+        ax, ay, az = about[k, 0], about[k, 1], about[k, 2]
         for j in range(count):
             for order in range(3):
                 fx, fy, fz = column[order, j, 0], column[order, j, 1], column[order, j, 2]
@@ -280,7 +282,7 @@ def root_load(
                 by[order, k, 3, j] = column[order, j, 3] - (ay * fz - az * fy)
                 by[order, k, 4, j] = column[order, j, 4] - (az * fx - ax * fz)
                 by[order, k, 5, j] = column[order, j, 5] - (ax * fy - ay * fx)
-        load[k] = _whole(tree.parent, frame.force)
+        _whole(tree.parent, frame.force, load, k)
         fx, fy, fz = load[k, 0], load[k, 1], load[k, 2]
         load[k, 3] -= ay * fz - az * fy
         load[k, 4] -= az * fx - ax * fz
@@ -289,13 +291,12 @@ def root_load(
 
 
 @compiled
-def _whole(parent: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """(6,) sum over the axes that stand on the ground."""
-    total = np.zeros(6)
+def _whole(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -> None:
+    """out[k] = (6,) sum over the axes that stand on the ground."""
     for j in range(len(parent)):
         if parent[j] < 0:
-            total += force[j]
-    return total
+            for r in range(6):
+                out[k, r] += force[j, r]
 
 
 @compiled
@@ -312,7 +313,7 @@ def axis_forces(
         _sum_up(tree.parent, frame, False)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
-        load[k] = _whole(tree.parent, frame.force)
+        _whole(tree.parent, frame.force, load, k)
     return tau, load
 
 

@@ -212,17 +212,16 @@ def _place(markers: _Markers, k: int, placed: _Placed) -> None:
     a, here = len(markers.column), k % 3
     rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
     place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])
+    places, errors, turned = placed.places[here], placed.errors[here], placed.turned[here]
     for m in range(len(markers.carrier)):
         j = markers.carrier[m]
-        place_marker(rotation[j], translation[j], markers.local[m], placed.places[here, m])
-        seen = markers.own[k, m] > 0.0
+        place_marker(rotation[j], translation[j], markers.local[m], places[m])
         for r in range(3):
-            placed.errors[here, m, r] = markers.measured[k, m, r] - placed.places[here, m, r] if seen else 0.0
+            errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.own[k, m] > 0.0 else 0.0
             for i in range(3):
-                total = 0.0
+                turned[m, r, i] = 0.0
                 for h in range(3):
-                    total += rotation[j, r, h] * markers.turned[m, h, i]
-                placed.turned[here, m, r, i] = total
+                    turned[m, r, i] += rotation[j, r, h] * markers.turned[m, h, i]
 
 
 @compiled
@@ -388,27 +387,35 @@ def _to_splines(
     right: np.ndarray,
 ) -> None:
     """Weigh the terms of an interval with the splines that are active, two by two."""
-    n, count, c, at = len(first), end - start, right.shape[1], first[start]
-    weight = np.zeros((_TOGETHER, _TOGETHER, 3, count))
+    n, size, c, at = len(first), len(band), right.shape[1], first[start]
+    later = np.zeros(_TOGETHER)
     for k in range(start, end):
-        later = np.zeros(_TOGETHER)
+        own, row = values[k], k - start
+        now, after = interval.squares[0, row], interval.squares[1, row]
+        turned, across, gradient = interval.squares[2, row], interval.across[row], interval.gradient[row]
+        for i in range(_TOGETHER):
+            later[i] = 0.0
         if k + 1 < n:
-            later[first[k + 1] - at : first[k + 1] - at + 6] = values[k + 1]
+            for i in range(6):
+                later[first[k + 1] - at + i] = values[k + 1, i]
+        for i in range(_TOGETHER):
+            here = own[i] if i < 6 else 0.0
+            for j in range(i, min(_TOGETHER, size - at)):
+                there = own[j] if j < 6 else 0.0
+                _add_rows(here * there, now, here * later[j], after, there * later[i], turned, band[at + i, j - i])
         for i in range(6):
-            for j in range(_TOGETHER):
-                if j < 6:
-                    weight[i, j, 0, k - start] = values[k, i] * values[k, j]
-                weight[i, j, 1, k - start] += values[k, i] * later[j]
-                weight[j, i, 2, k - start] += values[k, i] * later[j]
-    size = len(band)
-    squares = np.ascontiguousarray(interval.squares[:, :count]).reshape(3 * count, c * c)
-    for i in range(_TOGETHER):
-        reach = min(_TOGETHER - i, size - at - i)
-        if reach <= 0:
-            break
-        pairs = np.ascontiguousarray(weight[i, i : i + reach]).reshape(reach, 3 * count)
-        band[at + i, :reach] += np.dot(pairs, squares).reshape(reach, c, c)
-    active = np.ascontiguousarray(values[start:end].T)
-    right[at : at + 6] += np.dot(active, interval.gradient[:count])
-    across = interval.across[:count].reshape(count, -1)
-    border[at : at + 6] += np.dot(active, across).reshape(6, c, -1)
+            for j in range(c):
+                right[at + i, j] += own[i] * gradient[j]
+                for s in range(border.shape[2]):
+                    border[at + i, j, s] += own[i] * across[j, s]
+
+
+@compiled
+def _add_rows(
+    a: float, first: np.ndarray, b: float, second: np.ndarray, c: float, third: np.ndarray, out: np.ndarray
+) -> None:
+    """out += a first + b second + c third, of rows (k k,) and a matrix (k, k)."""
+    k = len(out)
+    for i in range(k):
+        for j in range(k):
+            out[i, j] += a * first[i * k + j] + b * second[i * k + j] + c * third[i * k + j]
