@@ -28,6 +28,7 @@ kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
+kinertia warm-up              compile now what the first fit would compile
 
 Every command says more with --help, and has an example there.
 
@@ -61,7 +62,7 @@ _MODULES = {
     "study": "study",
     "warm-up": "warm_up",
 }
-"""Module of every command, which has its name there; in the order of `kinertia --help`."""
+"""Module of every command, which has its name there (with underscores); in the order of `kinertia --help`."""
 
 
 def application(only: str | None = None) -> typer.Typer:

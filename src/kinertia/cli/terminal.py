@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kinertia.checks.verdict import Verdict
+from kinertia.cli.compiling import compile_once
 
 # names of files and trials may contain what rich takes for markup
 out = Console(markup=False, emoji=False, highlight=False)
@@ -51,8 +52,6 @@ def shown_progress() -> Iterator[Callable[[str, float], None]]:
     Yields a function that takes the stage's name and its share done. What has not been compiled on this machine is
     compiled first.
     """
-    from kinertia.cli.warm_up import compile_once
-
     with _shown_progress() as progress:
         compile_once(progress)
         yield progress
