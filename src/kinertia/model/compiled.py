@@ -19,9 +19,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba.core import config
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 _COMPLETE = "complete"
@@ -41,15 +38,19 @@ SOURCES = (
 
 def compiled(function: F) -> F:
     """The function as machine code; division by zero gives inf or nan, as NumPy has it."""
-    with _kept_in(cache_folder()):
-        result: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
-    return result
+    return _compiled(function, forceinline=False)
 
 
 def inlined(function: F) -> F:
     """As `compiled`, for small functions in inner loops: their code stands where they are called."""
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: F, forceinline: bool) -> F:
+    import numba  # so that commands which compute nothing do not load it
+
     with _kept_in(cache_folder()):
-        result: F = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
+        result: F = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=forceinline)(function)
     return result
 
 
@@ -101,6 +102,8 @@ def _writable(folder: Path) -> bool:
 @contextmanager
 def _kept_in(folder: Path) -> Iterator[None]:
     """Numba reads the folder while it decorates a function; other packages' functions stay where they are."""
+    from numba.core import config
+
     before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
     try:
         yield
