@@ -17,6 +17,7 @@ import numpy as np
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, block_diagonal, dynamic_by_table
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, root_regressor
+from kinertia.motion.frames_at_once import pieces
 
 MEASURED, INFORMED = 0.75, 0.25
 """Information from which a parameter counts as measured, as informed."""
@@ -101,8 +102,9 @@ def base_parameters(
     rounding = _ROUNDING * float(singular[0])
     count = int((singular > rounding).sum())
     parts = [
-        np.linalg.qr(_scaled_regressor(skeleton, bsp, motion, sd) @ scale, mode="r")
+        np.linalg.qr(_scaled_regressor(skeleton, bsp, motion.cut(some), sd) @ scale, mode="r")
         for motion, sd in zip(motions, root_sd, strict=True)
+        for some in pieces(len(motion.q))
     ]
     _, gains, vectors = np.linalg.svd(np.concatenate(parts), full_matrices=False)
     gains = np.pad(gains, (0, max(0, count - len(gains))))[:count]

@@ -15,6 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion import marker_sums
+from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.marker_sums import damped_steps
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.trial.data import Markers
@@ -109,12 +110,12 @@ def solve_ik(
         _carry_on(model, measured[coarse], q_coarse, stop)
         q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
         q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
-    converged = np.zeros(len(q), dtype=bool)
-    q[fine], converged[fine], normal = _best_fit(model, measured[fine], q[fine], stop)
-    errors = np.full(measured.shape[:2], np.nan)
-    errors[fine] = _misses(model, measured[fine], q[fine])
+    converged, errors = np.zeros(len(q), dtype=bool), np.full(measured.shape[:2], np.nan)
+    for some in (fine[piece] for piece in pieces(len(fine))):
+        fitted, converged[some], normal = _best_fit(model, measured[some], q[some], stop)
+        errors[some] = _misses(model, measured[some], fitted)
+        q[some] = np.where(_uninformed(normal), np.nan, fitted)
     q[~placed] = np.nan
-    q[fine] = np.where(_uninformed(normal), np.nan, q[fine])
     q[:, :6] = model.root.turned_back(q[:, :6])
     if consecutive:
         _unwrap(q, model)

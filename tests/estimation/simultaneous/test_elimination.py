@@ -12,7 +12,6 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous, root_of_covariance
 from kinertia.estimation.simultaneous.stretches import stretches
-from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem
 

@@ -21,6 +21,7 @@ from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.repetition import Repetition, repeats
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.settings import ForceCutoff
@@ -153,10 +154,11 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     measured = kinematics.trial.markers.arranged(skeleton.labels)[frames]
     measured[~solved] = np.nan
     known = np.where(np.isfinite(q), q, bridged)
-    pose = skeleton.pose(known)
-    errors = measured - skeleton.marker_positions(pose)
-    turned = pose.rotation[:, skeleton.marker_segments].transpose(0, 1, 3, 2)
-    local = (turned @ errors[..., None])[..., 0]
+    local = np.empty_like(measured)
+    for some in pieces(len(known)):
+        pose = skeleton.pose(known[some])
+        turned = pose.rotation[:, skeleton.marker_segments].transpose(0, 1, 3, 2)
+        local[some] = (turned @ (measured[some] - skeleton.marker_positions(pose))[..., None])[..., 0]
     # what a marker is off its place in the segment all the time is calibration, not noise
     shown = np.isfinite(local).any(axis=0)
     displaced = np.where(shown, np.nanmean(np.where(shown, local, 0.0), axis=0), np.nan)

@@ -31,12 +31,11 @@ from kinertia.model.log_cholesky import (
 )
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, root_regressor, root_terms
+from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
 
 COEFFICIENT_SD = 1.0
 """Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
-_FRAMES_AT_ONCE = 1000
-"""Of the root equations, whose derivatives take more memory than the normal equations."""
 
 
 @dataclass(frozen=True)
@@ -327,9 +326,8 @@ class MapProblem:
         columns = (self.moving, self.still)
         add_markers(normal, layout.in_markers, basis, stretch, skeleton, trial.markers[near], q, noise, *columns)
         dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
-        for begin in range(0, len(dynamic), _FRAMES_AT_ONCE):
-            frames = dynamic[begin : begin + _FRAMES_AT_ONCE]
-            terms = self._root_terms(k, skeleton, coefficients, static, frames)
+        for piece in pieces(len(dynamic)):
+            terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])
             add_root(normal, layout.in_root, basis, start, terms)
         moved = (coefficients - self.start[k])[own]
         normal.band[: len(moved), 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2

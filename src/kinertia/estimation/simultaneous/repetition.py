@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.motion.frames_at_once import pieces
+
 _UNLIKE, _REPEATING = 0.05, 0.3
 """Correlations below which errors count as unlike, and above which they count as coming back."""
 _AS_ALIKE = 0.9
@@ -26,6 +28,9 @@ chance, or because two trials cut from one have frames in common.
 """
 _WHITE = 0.1
 """Share of the variance that one frame shares with the next below which errors are the cameras' noise."""
+
+_COLUMNS_AT_ONCE = 16
+"""Spectra are four times larger than what they are of."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +150,10 @@ def _correlation(errors: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.
     n, m = len(errors), len(other)
     power = np.sqrt(np.square(errors).mean() * np.square(other).mean()) * n * errors.shape[1]
     size = n + m - 1
-    spectrum = (np.fft.rfft(errors, size, axis=0).conj() * np.fft.rfft(other, size, axis=0)).sum(axis=1)
+    spectrum = np.zeros(size // 2 + 1, dtype=complex)
+    for some in pieces(errors.shape[1], _COLUMNS_AT_ONCE):
+        ours, theirs = (np.fft.rfft(each[:, some], size, axis=0) for each in (errors, other))
+        spectrum += (ours.conj() * theirs).sum(axis=1)
     alike = np.roll(np.fft.irfft(spectrum, size), n - 1)
     lags = np.arange(1 - n, m)
     overlap = np.minimum(n, m - lags) - np.maximum(0, -lags)

@@ -109,24 +109,39 @@ class _Found(NamedTuple):
 
 def _searched(problem: MapProblem) -> _Found:
     """Gauss-Newton steps from the beginning until one is short."""
-    instruments = GaussianPrior.of(problem.instruments)
-    damping, iterations, converged = _FIRST_DAMPING, 0, False
-    here = problem.at(problem.beginning, damping)
-    begin, scale = here.cost, np.zeros(problem.layout.size)
-    while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
+    state = _State(problem.at(problem.beginning, _FIRST_DAMPING), GaussianPrior.of(problem.instruments))
+    begin, iterations = state.here.cost, 0
+    while iterations < _MAX_ITERATIONS and not state.converged and state.damping < _STUCK:
         iterations += 1
-        eliminated = _eliminated(problem, here, damping)
-        if iterations > 1 and damping <= _FIRST_DAMPING:
-            instruments = _judged(problem, here, eliminated, instruments)
-        under = here.under(instruments, problem.layout.instruments)
-        scale = np.maximum(scale, np.diag(under.information) + sum(np.diag(normal.static) for normal in here.normals))
-        there, promised, moved_sd = _step(problem, under, eliminated, damping, scale)
-        kept = (under.cost - there.under(instruments, problem.layout.instruments).cost) / promised
-        converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
-        if kept > 0.0:
-            here = there
-        damping = _next_damping(damping, kept)
-    return _Found(here.under(instruments, problem.layout.instruments), converged, iterations, begin)
+        state = _iterated(problem, state, iterations > 1)
+    return _Found(state.here.under(state.instruments, problem.layout.instruments), state.converged, iterations, begin)
+
+
+class _State(NamedTuple):
+    """What one iteration leaves to the next: the point, the instruments' Gaussian, the damping, the largest diagonal of
+    the information so far (S,), and whether the step was short. All else that it made, which is large, is gone by then.
+    """
+
+    here: Linearised
+    instruments: GaussianPrior
+    damping: float = _FIRST_DAMPING
+    scale: np.ndarray | float = 0.0
+    converged: bool = False
+
+
+def _iterated(problem: MapProblem, state: _State, judging: bool) -> _State:
+    """After one Gauss-Newton step; the instruments' Gaussian is made anew if `judging`, and if the damping is small."""
+    here, instruments, damping, scale, _ = state
+    places = problem.layout.instruments
+    eliminated = _eliminated(problem, here, damping)
+    if judging and damping <= _FIRST_DAMPING:
+        instruments = _judged(problem, here, eliminated, instruments)
+    under = here.under(instruments, places)
+    scale = np.maximum(scale, np.diag(under.information) + sum(np.diag(normal.static) for normal in here.normals))
+    there, promised, moved_sd = _step(problem, under, eliminated, damping, scale)
+    kept = (under.cost - there.under(instruments, places).cost) / promised
+    converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
+    return _State(there if kept > 0.0 else here, instruments, _next_damping(damping, kept), scale, converged)
 
 
 def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instruments: GaussianPrior) -> GaussianPrior:
