@@ -1,5 +1,7 @@
 """Fixtures shared by the tests."""
 
+import builtins
+import importlib.util
 from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest import mock
@@ -15,6 +17,7 @@ from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.result import Fit
 from kinertia.io.recording import read_recording
+from kinertia.report import extras
 from kinertia.settings import Settings, Subject
 from quick_two_level import given_back
 from walks import fit_arguments
@@ -152,3 +155,24 @@ def fit(demo_run):
 def two_level(demo_run):
     """The demo's two-level fit, without error bars."""
     return demo_run[0].two_level
+
+
+@pytest.fixture
+def without(monkeypatch):
+    """A machine on which a package is not installed."""
+
+    def remove(name):
+        real_spec, real_import = importlib.util.find_spec, builtins.__import__
+
+        def spec(wanted, *args):
+            return None if wanted == name else real_spec(wanted, *args)
+
+        def imported(wanted, *args, **kwargs):
+            if wanted.split(".")[0] == name:
+                raise ImportError(wanted)
+            return real_import(wanted, *args, **kwargs)
+
+        monkeypatch.setattr(extras, "find_spec", spec)
+        monkeypatch.setattr(builtins, "__import__", imported)
+
+    return remove
