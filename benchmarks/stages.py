@@ -247,9 +247,9 @@ The package's walk, 27 axes; Pinocchio's calls in a bare loop over the frames, w
 
 ## The estimate
 
-Observation, optimisation and error bars, from coordinates on, of a synthetic walk with skin motion at 100 Hz; bare calls
-are Pinocchio's Jacobian, RNEA derivatives and regressor. Most of it is linear algebra: elimination of the motion, error bars
-of joint moments.
+Observation, optimisation and error bars, from coordinates on, of a synthetic walk with skin motion at 100 Hz; bare
+calls are Pinocchio's Jacobian, RNEA derivatives and regressor. Most of it is linear algebra: elimination of the
+motion, error bars of joint moments.
 
 {speed_section([timed(duration) for duration in ESTIMATED_S])}
 

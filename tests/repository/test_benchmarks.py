@@ -58,6 +58,7 @@ def test_page_of_speed(shared_data, tmp_path, monkeypatch):
         ).groups()
         assert min(float(once), float(twice), float(growth)) >= 0
     assert re.search(r"\| inverse kinematics, gait2354 walk \| [\d.]+ \| [\d.]+ \| \d+ \|", page)
+    assert re.search(r"\| 1 s \| 81 \| \d+ \|", page)
     assert re.search(r"\| \*\*root load, derivatives and regressor\*\* \| [\d.]+ \| [\d.]+ \| [\d.]+ \|", page)
 
 
