@@ -116,7 +116,7 @@ def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
     for segment in np.unique(skeleton.marker_segments):
         own = skeleton.marker_segments == segment
         freedom = np.maximum(count[own] - 1, 0).sum()
-        if uncertainty:
+        if freedom:
             result[own] = np.sqrt(alike[own] * np.square(apart[:, own]).sum() / freedom)
     return result
 
