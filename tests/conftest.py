@@ -24,6 +24,7 @@ settings.register_profile("kinertia", deadline=None)
 settings.load_profile("kinertia")
 
 FEW_EVALUATIONS = 30
+LIMITS = ("kinertia.estimation.two_level._MAX_EVALUATIONS", "kinertia.estimation.two_level._FREE_EVALUATIONS")
 
 
 @pytest.fixture(scope="session")
@@ -127,7 +128,8 @@ def measured_demo(tmp_path_factory) -> MeasuredDemo:
 @pytest.fixture
 def few_evaluations(monkeypatch):
     """Stops the estimate early: enough for tests of everything around it."""
-    monkeypatch.setattr("kinertia.estimation.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS)
+    for limit in LIMITS:
+        monkeypatch.setattr(limit, FEW_EVALUATIONS)
 
 
 @pytest.fixture(scope="session")
@@ -138,7 +140,7 @@ def short_fit(measured_walk):
         TrialInput(replace(walk, name=name), window, 0.25)
         for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
     ]
-    with mock.patch("kinertia.estimation.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
+    with mock.patch(LIMITS[0], FEW_EVALUATIONS), mock.patch(LIMITS[1], FEW_EVALUATIONS):
         return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
 
 
