@@ -25,7 +25,8 @@ def test_errors_of_the_truth_are_zero():
     assert errors(trial.bsp, trial.bsp) == (0.0, 0.0, 0.0)
 
 
-def test_page():
+def test_page(monkeypatch):
+    monkeypatch.setattr("study_noise.study_walk", lambda: study_walk(0.6))
     draw = study_draw(0, two_level=False)
     outcome = calibrated(LARGEST, 0, duration_s=0.8)
     values = {name: np.arange(3.0) for name in ("whole", "first half", "second half", "halves")}

@@ -75,7 +75,7 @@ def add_root(normal: NormalEquations, columns: slice, basis: MotionBasis, root: 
     normal.static[columns, columns] += flat.T @ flat
     normal.static_right[columns] -= flat.T @ left.ravel()
     normal.cost += 0.5 * float(np.square(left).sum())
-    rows = by_splines(basis.values[:, root.frames], root.q, root.qd, root.qdd)
+    rows = by_splines(np.ascontiguousarray(basis.values[:, root.frames]), root.q, root.qd, root.qdd)
     starts = np.searchsorted(basis.first[root.frames], np.arange(size - 4))
     for first, (start, end) in enumerate(pairwise(starts)):
         if start == end:
