@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
+from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, moment_derivatives
-from kinertia.estimation.simultaneous.normal_equations import reduced
 from kinertia.estimation.simultaneous.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.solver import _deviations, _eliminated, _step, root_of_covariance
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -100,7 +100,7 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
     expected = np.sqrt(
         np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + of_impacts(problem, coefficients, static)
     )
-    part = reduced(problem.normal(0, coefficients, static), 0.0)
+    part = reduced(problem.trial_normal(0, coefficients, static), 0.0)
     root = root_of_covariance(prior_information(problem, static) + part.information)
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     found = joint_moment_sd(problem, 0, coefficients, static, part, root)
@@ -129,8 +129,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
     in_trial = pair.in_trial(0, here.point)
     by = dense_derivative(problem, coefficients, in_trial)
     n = coefficients.size
-    motion = inverse(dense_band(here.normals[0].band))
-    carried = -motion @ here.normals[0].border.reshape(n, s)
+    motion = inverse(dense_band(here.normals[0].last.band))
+    carried = -motion @ here.normals[0].last.border.reshape(n, s)
     through = by[..., n:] + by[..., :n] @ carried
     expected = np.einsum("dri,ij,drj->dr", by[..., :n], motion / 2.0, by[..., :n], optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
@@ -159,11 +159,11 @@ def dense_pair(pair, here) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
         chain = np.zeros((s, ends[-1]))
         chain[:, :s] = np.eye(s)
         chain[pair.layout.locals, own] = np.diag(pair.displacement_sd_m[k])
-        across = normal.border.reshape(-1, s) @ chain
+        across = normal.last.border.reshape(-1, s) @ chain
         information += chain.T @ normal.static @ chain
         information[moving] += across
         information[:, moving] += across.T
-        information[moving, moving] += dense_band(normal.band)
+        information[moving, moving] += dense_band(normal.last.band)
         information[own, own] += np.eye(wide)
         right += chain.T @ normal.static_right
         right[moving] += normal.right.ravel()

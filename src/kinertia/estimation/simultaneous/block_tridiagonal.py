@@ -16,11 +16,12 @@ from scipy.linalg.lapack import dpotrf
 
 @dataclass(frozen=True)
 class BlockBand:
-    """Lower Cholesky factor of a block tridiagonal matrix.
+    """Lower Cholesky factor of a block tridiagonal matrix, or of its first b blocks.
 
     Attributes:
         diagonal: (b, k, k) lower triangular blocks on the diagonal.
-        below: (b - 1, k, k) blocks below it.
+        below: (b - 1, k, k) blocks below it; where the matrix goes on, (b, k, k), the last being below the last of
+            `diagonal`.
     """
 
     diagonal: np.ndarray
@@ -28,16 +29,18 @@ class BlockBand:
 
     @classmethod
     def factor(cls, diagonal: np.ndarray, below: np.ndarray) -> BlockBand:
-        """Factor the matrix with these diagonal (b, k, k) and sub-diagonal (b - 1, k, k) blocks.
+        """Factor the matrix with these diagonal (b, k, k) and sub-diagonal (b - 1, k, k) blocks, or (b, k, k) where it
+        goes on.
 
         Raises:
             numpy.linalg.LinAlgError: it is not positive definite.
         """
         factors, carried = np.empty_like(diagonal), np.empty_like(below)
-        factors[0] = _cholesky(diagonal[0])
-        for i in range(1, len(diagonal)):
-            carried[i - 1] = _times_inverse_transpose(factors[i - 1], below[i - 1])
-            factors[i] = _cholesky(diagonal[i] - carried[i - 1] @ carried[i - 1].T)
+        for i in range(len(diagonal)):
+            left = diagonal[i] - carried[i - 1] @ carried[i - 1].T if i else diagonal[i]
+            factors[i] = _cholesky(left)
+            if i < len(below):
+                carried[i] = _times_inverse_transpose(factors[i], below[i])
         return cls(factors, carried)
 
     def forward(self, right: np.ndarray) -> np.ndarray:
@@ -48,27 +51,29 @@ class BlockBand:
             result[i] = _solved(self.diagonal[i], known)
         return result
 
-    def backward(self, right: np.ndarray) -> np.ndarray:
-        """Solve L^T x = right; right is (b, k, m)."""
-        result = np.empty_like(right)
-        last = len(right) - 1
-        for i in range(last, -1, -1):
-            known = right[i] if i == last else right[i] - self.below[i].T @ result[i + 1]
-            result[i] = _solved(self.diagonal[i], known, transposed=True)
+    def backward(self, right: np.ndarray, after: np.ndarray | None = None) -> np.ndarray:
+        """Solve L^T x = right; right is (b, k, m), and `after` (k, m) the solution's next block where it goes on."""
+        result, known = np.empty_like(right), after
+        for i in range(len(right) - 1, -1, -1):
+            left = right[i] if known is None else right[i] - self.below[i].T @ known
+            result[i] = _solved(self.diagonal[i], left, transposed=True)
+            known = result[i]
         return result
 
-    def inverse_blocks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Blocks of the inverse on the diagonal (b, k, k) and below it (b - 1, k, k), by Takahashi's recursion."""
-        diagonal, below = np.empty_like(self.diagonal), np.empty_like(self.below)
+    def inverse_blocks(self, after: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Blocks of the inverse on the diagonal (b, k, k) and below it, as many as of `below`, by Takahashi's
+        recursion; `after` (k, k) is the next block on its diagonal where the matrix goes on.
+        """
+        diagonal, below, next_one = np.empty_like(self.diagonal), np.empty_like(self.below), after
         unit = np.eye(self.diagonal.shape[1])
         for i in range(len(diagonal) - 1, -1, -1):
             half = _solved(self.diagonal[i], unit)
-            if i == len(diagonal) - 1:
-                diagonal[i] = half.T @ half
-                continue
-            carried = self.below[i] @ half
-            below[i] = -diagonal[i + 1] @ carried
-            diagonal[i] = half.T @ half - carried.T @ below[i]
+            diagonal[i] = half.T @ half
+            if next_one is not None:
+                carried = self.below[i] @ half
+                below[i] = -next_one @ carried
+                diagonal[i] -= carried.T @ below[i]
+            next_one = diagonal[i]
         return diagonal, below
 
 

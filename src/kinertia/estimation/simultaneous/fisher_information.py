@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
-from kinertia.estimation.simultaneous.normal_equations import reduced
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import root_of_covariance
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -42,7 +42,7 @@ class Information:
     def of_trials(self) -> tuple[np.ndarray, ...]:
         """Per trial (S, S) information on the static unknowns, motion eliminated."""
         problem = self.problem
-        normals = (problem.normal(k, start, problem.start_static) for k, start in enumerate(problem.start))
+        normals = (problem.trial_normal(k, start, problem.start_static) for k, start in enumerate(problem.start))
         return tuple(reduced(normal, 0.0).information for normal in normals)
 
     @cached_property

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Reduced, by_splines
+from kinertia.estimation.simultaneous.elimination import Factored, Reduced
+from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem, by_body
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Pose, Skeleton
@@ -67,22 +68,20 @@ def joint_moment_sd(
         root: (S, S) root of the posterior covariance of the static unknowns.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
-    parts = problem.full(basis.evaluate(coefficients), static)
-    motion = _MotionSpread.of(eliminated, coefficients.shape[1], root)
     variance, impact = np.empty((2, len(frames), coefficients.shape[1]))
-    reactions = problem.reactions(k, static)
-    for start in range(0, len(frames), _FRAMES_AT_ONCE):
-        chosen = frames[start : start + _FRAMES_AT_ONCE]
-        by = moment_derivatives(problem, k, [part[chosen] for part in parts], static, reactions, chosen)
-        still = by.static @ root[problem.layout.in_root]
-        through = by_splines(basis.values[:, chosen], by.q, by.qd, by.qdd).reshape(*by.q.shape[:2], -1)
-        impact[start : start + len(chosen)] = by.impact
-        for first in np.unique(basis.first[chosen]):
-            rows = np.flatnonzero(basis.first[chosen] == first)
-            own, carried = motion.active(int(first))
-            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1) / problem.trials[k].repeats
-            spread += np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
-            variance[start + rows] = spread
+    reactions, spread = problem.reactions(k, static), None
+    for part in eliminated.backwards():
+        spread = _MotionSpread.of(part, coefficients.shape[1], root, spread)
+        begin, end = np.searchsorted(frames, [part.stretch.frames.start, part.stretch.frames.stop])
+        for start in range(begin, end, _FRAMES_AT_ONCE):
+            rows = slice(start, min(start + _FRAMES_AT_ONCE, end))
+            chosen = frames[rows]
+            motion = problem.full(basis.evaluate(coefficients, chosen), static)
+            by = moment_derivatives(problem, k, motion, static, reactions, chosen)
+            still = by.static @ root[problem.layout.in_root]
+            through = by_splines(basis.values[:, chosen], by.q, by.qd, by.qdd).reshape(*by.q.shape[:2], -1)
+            variance[rows] = spread.of_moments(basis.first[chosen], through, still, problem.trials[k].repeats)
+            impact[rows] = by.impact
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
     variance += uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
     return np.sqrt(np.maximum(variance, 0.0))
@@ -168,25 +167,50 @@ def _load_derivative(pose: Pose, moves: np.ndarray, load: np.ndarray) -> np.ndar
 
 @dataclass(frozen=True)
 class _MotionSpread:
-    """How uncertain neighbouring spline coefficients are, and how they go with the static unknowns.
+    """How uncertain neighbouring spline coefficients of a stretch are, and how they go with the static unknowns.
 
     Attributes:
+        start: the first of the splines.
         diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k) of their covariance if the static
-            unknowns were known.
+            unknowns were known; with the first block after the stretch.
         carried: (splines, c, S) how far one deviation of each independent part of the static unknowns carries them.
     """
 
+    start: int
     diagonal: np.ndarray
     below: np.ndarray
     carried: np.ndarray
 
     @classmethod
-    def of(cls, eliminated: Reduced, c: int, root: np.ndarray) -> _MotionSpread:
-        band, size = eliminated.band, len(root)
-        carried = band.backward(eliminated.border).reshape(-1, size) @ root
-        return cls(*band.inverse_blocks(), carried.reshape(-1, c, size))
+    def of(cls, part: Factored, c: int, root: np.ndarray, after: _MotionSpread | None) -> _MotionSpread:
+        """Of a stretch, with this root (S, S) of the static unknowns' covariance; `after` is the next stretch's."""
+        known = (None, None) if after is None else (after.carried[:SPLINES_PER_BLOCK], after.diagonal[0])
+        diagonal, below = part.band.inverse_blocks(known[1])
+        flat = None if known[0] is None else known[0].reshape(-1, len(root))
+        carried = part.band.backward(part.border @ root, flat).reshape(-1, c, len(root))
+        if after is not None:
+            diagonal = np.append(diagonal, after.diagonal[:1], axis=0)
+            carried = np.append(carried, after.carried[:SPLINES_PER_BLOCK], axis=0)
+        return cls(part.stretch.splines.start, diagonal, below, carried)
 
-    def active(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+    def of_moments(self, first: np.ndarray, through: np.ndarray, still: np.ndarray, repeats: float) -> np.ndarray:
+        """(d, c) variances of moments.
+
+        Args:
+            first: (d,) the first active spline of each frame.
+            through: (d, c, 6 c) derivatives by the coefficients of the active splines.
+            still: (d, c, S) what a deviation of each independent part of the static unknowns adds by itself.
+            repeats: how often errors come back: what is left of the motion is that of the errors alone.
+        """
+        variance = np.empty(through.shape[:2])
+        for spline in np.unique(first):
+            rows = np.flatnonzero(first == spline)
+            own, carried = self._active(int(spline) - self.start)
+            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1) / repeats
+            variance[rows] = spread + np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
+        return variance
+
+    def _active(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """(6 c, 6 c) covariance and (6 c, S) of the six splines from `first` on."""
         block, offset = divmod(first, SPLINES_PER_BLOCK)
         pair = np.block(

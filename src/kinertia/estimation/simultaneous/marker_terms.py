@@ -22,6 +22,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
+from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled
 from kinertia.model.kinematic_tree import KinematicTree, place_axes
 from kinertia.model.skeleton import Skeleton
@@ -117,6 +118,7 @@ def add_markers(
     normal: NormalEquations,
     columns: slice,
     basis: MotionBasis,
+    stretch: Stretch,
     skeleton: Skeleton,
     measured: np.ndarray,
     q: np.ndarray,
@@ -124,15 +126,16 @@ def add_markers(
     moving: np.ndarray,
     still: np.ndarray,
 ) -> None:
-    """Add the terms of the markers of one trial, at the coordinates q, to its normal equations.
+    """Add the terms of the markers in one stretch of a trial, at the coordinates q, to its normal equations.
 
     Args:
         normal: zero, or with other terms.
         columns: of the static unknowns, those that markers depend on.
         basis: of the motion.
+        stretch: of the trial.
         skeleton: with static coordinates free.
-        measured: (n, m, 3) m; NaN where not seen.
-        q: (n, c) rad and m.
+        measured: (n, m, 3) m, in the stretch with its neighbours; NaN where not seen.
+        q: (n, c) rad and m, in the same frames.
         deviation: (m,) of each marker's errors, m, and their correlation between neighbouring frames.
         moving, still: columns of q that move in time, and that do not.
     """
@@ -155,7 +158,10 @@ def add_markers(
     )
     border = normal.border[..., columns]
     static = _Static(normal.static[columns, columns], normal.static_right[columns], np.zeros(1))
-    _add(markers, basis.first, basis.values[0], len(still), normal.band, border, normal.right, static)
+    near = stretch.with_neighbours
+    own = (stretch.frames.start - near.start, stretch.frames.stop - near.start)
+    first, values = basis.first[near] - stretch.splines.start, basis.values[0][near]
+    _add(markers, first, values, own, len(still), normal.band, border, normal.right, static)
     normal.cost += 0.5 * float(static.cost[0])
 
 
@@ -164,23 +170,28 @@ def _add(
     markers: _Markers,
     first: np.ndarray,
     values: np.ndarray,
+    own: tuple[int, int],
     still: int,
     band: np.ndarray,
     border: np.ndarray,
     right: np.ndarray,
     static: _Static,
 ) -> None:
-    """All frames, interval by interval; `first` and `values` are the motion basis'."""
+    """Frames own[0] to own[1] - 1, interval by interval, and each with the next; `first` and `values` are the motion
+    basis'.
+    """
     n, m = markers.own.shape
+    start, stop = own
     c, a, s = band.shape[2], len(markers.column), border.shape[2]
     placed = _Placed(np.empty((3, a, 6)), np.empty((3, m, 3)), np.empty((3, m, 3)), np.empty((3, m, 3, 3)))
     most = _longest_run(first)
     interval = _Interval(np.empty((3, most, c * c)), np.zeros((most + 1, c, s)), np.empty((most, c)))
-    _place(markers, 0, placed)
-    start = 0
-    while start < n:
+    if start > 0:
+        _place(markers, start - 1, placed)
+    _place(markers, start, placed)
+    while start < stop:
         end = start + 1
-        while end < n and first[end] == first[start]:
+        while end < stop and first[end] == first[start]:
             end += 1
         interval.squares[:] = 0.0
         interval.gradient[:] = 0.0
@@ -194,6 +205,9 @@ def _add(
         _to_splines(first, values, start, end, interval, band, border, right)
         interval.across[0] = interval.across[end - start]
         start = end
+    if stop < n:
+        # of the frame after them, only what it has in common with the last
+        _to_border(first[stop], values[stop], interval.across[0], border)
 
 
 @compiled
@@ -406,8 +420,16 @@ def _to_splines(
         for i in range(6):
             for j in range(c):
                 right[at + i, j] += own[i] * gradient[j]
-                for s in range(border.shape[2]):
-                    border[at + i, j, s] += own[i] * across[j, s]
+        _to_border(at, own, across, border)
+
+
+@compiled
+def _to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarray) -> None:
+    """Weigh terms (c, s) of a frame with the six splines from `at` on."""
+    for i in range(6):
+        for j in range(across.shape[0]):
+            for s in range(across.shape[1]):
+                border[at + i, j, s] += weights[i] * across[j, s]
 
 
 @compiled

@@ -42,10 +42,10 @@ class MotionBasis:
         self.active = self.first[:, None] + np.arange(_ACTIVE)
         self.knots = knots
 
-    def evaluate(self, coefficients: np.ndarray) -> list[np.ndarray]:
-        """Coordinates and their first two derivatives, each (n, c), of coefficients (size, c)."""
-        active = coefficients[self.active]
-        return [np.einsum("na,nac->nc", values, active) for values in self.values]
+    def evaluate(self, coefficients: np.ndarray, frames: slice | np.ndarray = slice(None)) -> list[np.ndarray]:
+        """Coordinates and their first two derivatives, each (n, c), of coefficients (size, c), at these frames."""
+        active = coefficients[self.active[frames]]
+        return [np.einsum("na,nac->nc", values[frames], active) for values in self.values]
 
     def fit(self, q: np.ndarray) -> np.ndarray:
         """(size, c) least-squares coefficients of q (n, c); NaN rows of a column are left out."""

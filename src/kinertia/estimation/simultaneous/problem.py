@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.elimination import TrialNormal, summed
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
+from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     dynamic_jacobian,
@@ -32,6 +35,8 @@ from kinertia.motion.ground_reactions import GroundReactions
 
 COEFFICIENT_SD = 1.0
 """Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
+_FRAMES_AT_ONCE = 1000
+"""Of the root equations, whose derivatives take more memory than the normal equations."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +170,7 @@ class Linearised:
     """
 
     point: Point
-    normals: tuple[NormalEquations, ...]
+    normals: tuple[TrialNormal, ...]
     information: np.ndarray
     right: np.ndarray
     cost: float
@@ -209,6 +214,7 @@ class MapProblem:
         self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
         self.start_static[self.layout.coordinates] = [skeleton.locked[name] for name in calibration.coordinates]
         self.start_static[self.layout.locals] = skeleton.marker_locals.ravel()
+        self.stretches = stretches_of_trials(self.bases, len(self.moving), self.layout.size)
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
@@ -261,9 +267,10 @@ class MapProblem:
         right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
         return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
 
-    def at(self, point: Point) -> Linearised:
-        """Cost and normal equations at a point."""
-        normals = tuple(self.normal(k, part, self.in_trial(k, point)) for k, part in enumerate(point.coefficients))
+    def at(self, point: Point, damping: float = 0.0) -> Linearised:
+        """Cost and normal equations at a point; it saves time to tell with which damping they will be solved."""
+        rows = enumerate(point.coefficients)
+        normals = tuple(self.trial_normal(k, part, self.in_trial(k, point), damping) for k, part in rows)
         information, right, cost = self.prior_terms(point.static)
         cost += sum(0.5 * float(own @ own) for own in point.displaced)
         return Linearised(point, normals, information, right, cost + sum(normal.cost for normal in normals))
@@ -302,27 +309,40 @@ class MapProblem:
         plates = self.plate_values(static)[ground.among(self.plates)]
         return ground.corrected_reactions(plates, float(static[self.layout.clock]))
 
-    def normal(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> NormalEquations:
-        """Normal equations of trial k."""
+    def trial_normal(self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0) -> TrialNormal:
+        """Normal equations of trial k, to be solved with this damping."""
+        return summed(self.stretches[k], partial(self.normal, k, coefficients, static), damping)
+
+    def normal(
+        self, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch | None = None
+    ) -> NormalEquations:
+        """Normal equations of a stretch of trial k, or of all of it."""
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
-        parts = self.full(basis.evaluate(coefficients), static)
+        stretch = stretch or Stretch.whole(basis)
+        near, own, start = stretch.with_neighbours, stretch.splines, stretch.splines.start
         skeleton = self.placed(static)
-        normal = NormalEquations.zero(basis.size, len(self.moving), layout.size)
+        normal = NormalEquations.zero(stretch.size, len(self.moving), layout.size)
         noise = (trial.marker_sd, trial.marker_autocorrelation)
+        q = self.full(basis.evaluate(coefficients, near), static)[0]
         columns = (self.moving, self.still)
-        add_markers(normal, layout.in_markers, basis, skeleton, trial.markers, parts[0], noise, *columns)
-        add_root(normal, layout.in_root, basis, self._root_terms(k, skeleton, parts, static))
-        moved = coefficients - self.start[k]
-        normal.band[:, 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2
-        normal.right -= moved / COEFFICIENT_SD**2
+        add_markers(normal, layout.in_markers, basis, stretch, skeleton, trial.markers[near], q, noise, *columns)
+        dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
+        for begin in range(0, len(dynamic), _FRAMES_AT_ONCE):
+            frames = dynamic[begin : begin + _FRAMES_AT_ONCE]
+            terms = self._root_terms(k, skeleton, coefficients, static, frames)
+            add_root(normal, layout.in_root, basis, start, terms)
+        moved = (coefficients - self.start[k])[own]
+        normal.band[: len(moved), 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2
+        normal.right[: len(moved)] -= moved / COEFFICIENT_SD**2
         normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
         return normal
 
-    def _root_terms(self, k: int, skeleton: Skeleton, parts: Sequence[np.ndarray], static: np.ndarray) -> RootTerms:
-        """The root equations at the dynamic frames."""
+    def _root_terms(
+        self, k: int, skeleton: Skeleton, coefficients: np.ndarray, static: np.ndarray, frames: np.ndarray
+    ) -> RootTerms:
+        """The root equations at some of the dynamic frames."""
         trial, layout = self.trials[k], self.layout
-        frames = np.flatnonzero(trial.dynamic)
-        q, qd, qdd = (part[frames] for part in parts)
+        q, qd, qdd = self.full(self.bases[k].evaluate(coefficients, frames), static)
         motion = Motion(q, qd, qdd)
         root = skeleton.root
         terms = root_terms(skeleton, self.bsp(static), motion, root.centre(q))

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.elimination import Reduced, reduced
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
-from kinertia.estimation.simultaneous.normal_equations import Reduced, reduced
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
@@ -76,6 +76,7 @@ CONVERGED = 1.0
 _FIRST_DAMPING = 1e-5
 """Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
 information: 1e-3 would hold the first steps back."""
+_LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 40
@@ -89,10 +90,29 @@ def estimate_simultaneous(
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
+    found = _searched(problem)
+    covariance, moment_sd = _deviations(problem, found.under)
+    cost = (found.begin, found.under.cost)
+    return _result(problem, found.under.point, covariance, moment_sd, found.converged, found.iterations, cost)
+
+
+class _Found(NamedTuple):
+    """Where the search ended, under the instruments' last Gaussian; whether short of its limit, after how many steps,
+    and from which cost.
+    """
+
+    under: Linearised
+    converged: bool
+    iterations: int
+    begin: float
+
+
+def _searched(problem: MapProblem) -> _Found:
+    """Gauss-Newton steps from the beginning until one is short."""
     instruments = GaussianPrior.of(problem.instruments)
-    here = problem.at(problem.beginning)
-    begin, damping, iterations, converged = here.cost, _FIRST_DAMPING, 0, False
-    scale = np.zeros(problem.layout.size)
+    damping, iterations, converged = _FIRST_DAMPING, 0, False
+    here = problem.at(problem.beginning, damping)
+    begin, scale = here.cost, np.zeros(problem.layout.size)
     while iterations < _MAX_ITERATIONS and not converged and damping < _STUCK:
         iterations += 1
         eliminated = _eliminated(problem, here, damping)
@@ -105,10 +125,8 @@ def estimate_simultaneous(
         converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
         if kept > 0.0:
             here = there
-        damping = max(damping * _change_of_damping(kept), 1e-9)
-    under = here.under(instruments, problem.layout.instruments)
-    covariance, moment_sd = _deviations(problem, under)
-    return _result(problem, here.point, covariance, moment_sd, converged, iterations, (begin, under.cost))
+        damping = _next_damping(damping, kept)
+    return _Found(here.under(instruments, problem.layout.instruments), converged, iterations, begin)
 
 
 def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instruments: GaussianPrior) -> GaussianPrior:
@@ -152,11 +170,10 @@ def _eliminated(problem: MapProblem, here: Linearised, damping: float) -> Elimin
     return Eliminated(parts, [Displaced.of(part.information, part.right, places, sd, own) for part, sd, own in rows])
 
 
-def _change_of_damping(kept: float) -> float:
-    """Factor on the damping after a step that lowered the cost by this share of what it promised."""
-    if kept > 0.75:
-        return 0.1
-    return 1.0 if kept > 0.25 else 10.0
+def _next_damping(damping: float, kept: float) -> float:
+    """The damping after a step that lowered the cost by this share of what it promised."""
+    factor = 0.1 if kept > 0.75 else 1.0 if kept > 0.25 else 10.0
+    return max(damping * factor, _LEAST_DAMPING)
 
 
 def root_of_covariance(information: np.ndarray) -> np.ndarray:
@@ -185,16 +202,15 @@ def _step(
     coefficients, moved = [], []
     promised = 0.5 * float(here.right @ step)
     for k, (part, normal) in enumerate(zip(parts, here.normals, strict=True)):
-        size, c = normal.right.shape
         old, own = here.point.displaced[k], displaced[k].step(step)
         in_trial = step.copy()
         in_trial[problem.layout.locals] += problem.displacement_sd_m[k] * own
-        move = part.band.backward(part.motion - part.border @ in_trial[:, None]).reshape(-1, c)[:size]
+        move = part.motion_step(in_trial)
         coefficients.append(here.point.coefficients[k] + move)
         moved.append(old + own)
         promised += 0.5 * float(normal.static_right @ in_trial + (normal.right * move).sum() - old @ own)
     point = Point(tuple(coefficients), here.point.static + problem.shortened(step), tuple(moved))
-    return problem.at(point), promised, moved_sd
+    return problem.at(point, _next_damping(damping, 1.0)), promised, moved_sd
 
 
 def _result(

@@ -1,0 +1,157 @@
+"""Memory and seconds of walks of minutes, from markers to error bars: writes docs/long-trials.md.
+
+    python benchmarks/long_trials.py
+
+Every length runs in a process of its own, which has nothing else in its memory. One stride on a treadmill, made exactly
+as the other synthetic walks, is repeated; skin motion comes back with every stride, the cameras' noise does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import solve_kinematics
+from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
+from kinertia.trial.data import FootLoads, Markers, Trial
+from measured_trials import table
+from synthetic_walks import BANDWIDTH, FIRST_SEED
+
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "long-trials.md"
+MINUTES = (0.5, 1.0, 3.0, 10.0)
+RATE_HZ, FRAMES = 100.0, 124
+"""Frames to a stride: it takes a whole number of them, at a pace that differs from the recorded one by 1 %."""
+_CAMERA_SD_M = 0.0005
+
+
+@dataclass(frozen=True)
+class Long:
+    """What a walk of so many minutes took.
+
+    Attributes:
+        kinematics_s, estimate_s: seconds.
+        before_mb, kinematics_mb, estimate_mb: most memory until the data are there, until inverse kinematics and
+            smoothing are done, and until the end.
+        iterations: Gauss-Newton steps.
+    """
+
+    minutes: float
+    frames: int
+    kinematics_s: float
+    estimate_s: float
+    before_mb: float
+    kinematics_mb: float
+    estimate_mb: float
+    iterations: int
+
+
+def stride(person_seed: int = FIRST_SEED) -> tuple[SyntheticTrial, BspPrior, Markers, np.ndarray]:
+    """A stride on a treadmill: its trial, the literature's prior, its markers with skin motion, and the loads on the
+    feet, all as they come back a stride later.
+    """
+    rng = np.random.default_rng(person_seed)
+    person = unlike_literature(walking_subject(), rng)
+    pace = walk(person).time[-1] * RATE_HZ / FRAMES
+    trial = walk(person, FRAMES / RATE_HZ, RATE_HZ, trapezoid=False, pace=float(pace))
+    skin = SkinMotion.draw(trial.skeleton, trial.motion.q, rng)
+    markers = skin.moved(trial.markers, trial.skeleton, trial.motion.q)
+    q = trial.motion.q
+    forward = (q[-1, 0] - q[0, 0]) * np.arange(len(q)) / FRAMES
+    back = np.stack([-forward, *np.zeros((2, len(q)))], axis=1)[:, None]
+    loads = trial.foot_loads.copy()
+    loads[..., 3:] += np.cross(back, loads[..., :3])
+    return trial, literature_prior(person.literature), replace(markers, positions=markers.positions + back), loads
+
+
+def long_walk(minutes: float) -> tuple[Skeleton, BspPrior, Trial]:
+    """The stride again and again."""
+    trial, prior, markers, loads = stride()
+    frames = np.arange(round(60.0 * minutes * RATE_HZ))
+    clock = frames / RATE_HZ
+    rng = np.random.default_rng(FIRST_SEED)
+    seen = camera_noise(Markers(clock, markers.labels, markers.positions[frames % FRAMES]), _CAMERA_SD_M, rng)
+    feet = FootLoads(clock, loads[frames % FRAMES, :, :3], loads[frames % FRAMES, :, 3:])
+    return trial.skeleton, prior, Trial("walk", seen, feet, np.ones(len(frames), dtype=bool))
+
+
+def measured(minutes: float) -> Long:
+    """In this process."""
+    skeleton, prior, trial = long_walk(minutes)
+    marks = [(time.perf_counter(), _most_mb())]
+    kinematics = solve_kinematics(skeleton, trial, 0.0, BANDWIDTH.motion_hz)
+    marks.append((time.perf_counter(), _most_mb()))
+    fitted = fit_simultaneous(skeleton, prior, [kinematics], BANDWIDTH)
+    marks.append((time.perf_counter(), _most_mb()))
+    (begun, before), (solved, kinematics_mb), (ended, estimate_mb) = marks
+    spent = (solved - begun, ended - solved, before, kinematics_mb, estimate_mb)
+    return Long(minutes, len(trial.markers.time), *spent, fitted.result.iterations)
+
+
+def in_own_process(minutes: float) -> Long:
+    """The same, where nothing else is in memory."""
+    told = subprocess.run([sys.executable, __file__, "--alone", str(minutes)], check=True, capture_output=True)
+    return Long(**json.loads(told.stdout))
+
+
+def _most_mb() -> float:
+    """Most memory that this process has held."""
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def document(walks: list[Long]) -> str:
+    """The text of docs/long-trials.md."""
+    rows = [
+        [
+            f"{w.minutes:g} min",
+            str(w.frames),
+            f"{w.before_mb:.0f}",
+            f"{w.kinematics_mb:.0f}",
+            f"{w.estimate_mb:.0f}",
+            f"{w.kinematics_s:.1f}",
+            f"{w.estimate_s:.1f}",
+            str(w.iterations),
+            f"{1e3 * w.estimate_s / w.frames:.2f}",
+        ]
+        for w in walks
+    ]
+    headings = ["walk", "frames", "data (MB)", "kinematics (MB)", "estimate (MB)"]
+    headings += ["kinematics (s)", "estimate (s)", "steps", "ms a frame"]
+    return f"""# Long trials
+
+A synthetic walk on a treadmill at 100 Hz, 41 markers and 27 coordinates, one thread. Memory is the most that the
+process has held until the data are there (the programs themselves included), until inverse kinematics and smoothing are
+done, and until the end. This page is written by `python benchmarks/long_trials.py`; do not edit it by hand.
+
+{table(headings, rows)}
+"""
+
+
+def main() -> None:
+    """Measure and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser.add_argument("--alone", type=float, help="so many minutes, in this process, as JSON")
+    parser.add_argument("--minutes", type=float, nargs="+", default=MINUTES)
+    given = parser.parse_args()
+    if given.alone:
+        print(json.dumps(asdict(measured(given.alone))))
+        return
+    text = document([in_own_process(minutes) for minutes in given.minutes])
+    DOCUMENT.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""A trial in stretches: of its normal equations, which grow with its length, only so much is in memory at once.
+
+Splines see only their neighbours. Those of one stretch can be eliminated as soon as all frames that touch them are
+summed, and what follows needs of them one block only (`elimination`). The frames of a stretch touch its own splines and
+the first block of the next stretch, which gets its other terms from its own frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
+
+TOGETHER_BYTES = 2**27
+"""Trials whose normal equations are together no larger, a minute of gait, are one stretch each: nothing is computed
+twice. Beyond it memory counts for more than time. What is made of them takes some four times as much in passing."""
+_SHARE = 16
+"""Of it that a stretch of longer trials takes."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Neighbouring splines of a trial, and the frames whose first active spline is one of them.
+
+    Attributes:
+        splines: its own.
+        touched: those that its frames touch: its own and, before the trial's last stretch, a block of the next.
+        frames: indices.
+    """
+
+    splines: slice
+    touched: slice
+    frames: slice
+
+    @classmethod
+    def whole(cls, basis: MotionBasis) -> Stretch:
+        """All of a trial."""
+        return cls(slice(0, basis.size), slice(0, basis.size), slice(0, len(basis.first)))
+
+    @property
+    def size(self) -> int:
+        """How many splines its frames touch."""
+        result: int = self.touched.stop - self.touched.start
+        return result
+
+    @property
+    def is_last(self) -> bool:
+        """Nothing comes after it."""
+        return self.touched == self.splines
+
+    @property
+    def with_neighbours(self) -> slice:
+        """Its frames, the one before and the one after them, where there are such."""
+        return slice(max(self.frames.start - 1, 0), self.frames.stop + 1)
+
+
+def stretches(basis: MotionBasis, most: int) -> tuple[Stretch, ...]:
+    """The trial in whole blocks of at most so many splines; one stretch if it has no more."""
+    size, whole = basis.size, SPLINES_PER_BLOCK
+    each = max(most // whole, 1) * whole
+    # the last has more than the block that the one before it touches
+    starts = [0] if size <= most else list(range(0, size - whole, each))
+    ends = [*starts[1:], size]
+    frames = np.searchsorted(basis.first, [*starts, size]).tolist()
+    return tuple(
+        Stretch(slice(start, end), slice(start, min(end + whole, size)), slice(frames[i], frames[i + 1]))
+        for i, (start, end) in enumerate(zip(starts, ends, strict=True))
+    )
+
+
+def stretches_of_trials(bases: Sequence[MotionBasis], coordinates: int, static: int) -> list[tuple[Stretch, ...]]:
+    """Each trial's, for so many coordinates and static unknowns."""
+    most = TOGETHER_BYTES // NormalEquations.bytes_per_spline(coordinates, static)
+    if sum(basis.size for basis in bases) > most:
+        most //= _SHARE
+    return [stretches(basis, most) for basis in bases]

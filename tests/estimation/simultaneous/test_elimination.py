@@ -1,0 +1,127 @@
+"""A trial cut into stretches says what it says in one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kinertia.estimation.simultaneous.stretches as limits
+from kinertia.estimation.simultaneous.elimination import reduced
+from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.solver import estimate_simultaneous, root_of_covariance
+from kinertia.estimation.simultaneous.stretches import stretches
+from kinertia.synthetic.walk import walk, walking_subject
+from small_problem import point, small_ground, small_problem
+
+DAMPING = 1e-3
+
+
+def close(found: np.ndarray, expected: np.ndarray, share: float = 1e-9) -> None:
+    np.testing.assert_allclose(found, expected, rtol=share, atol=share * np.abs(expected).max())
+
+
+def longer_problem() -> MapProblem:
+    """A second of walking: 25 splines, more than four blocks; markers with gaps, frames that are not dynamic."""
+    problem = small_problem()
+    trial = walk(walking_subject(), 1.0, 50.0, trapezoid=False)
+    trial = replace(trial, skeleton=problem.skeleton)
+    rng = np.random.default_rng(0)
+    markers = trial.markers.positions + rng.normal(0.0, 0.01, trial.markers.positions.shape)
+    markers[2, 1] = markers[20:26, 3] = np.nan
+    dynamic = np.ones(len(trial.time), dtype=bool)
+    dynamic[:2] = dynamic[-1] = dynamic[30] = False
+    observation = replace(
+        problem.trials[0],
+        time=trial.time,
+        markers=markers,
+        q=trial.motion.q,
+        dynamic=dynamic,
+        ground=small_ground(trial, rng),
+    )
+    return MapProblem(problem.skeleton, problem.prior, problem.calibration, [observation], 0.05)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return longer_problem()
+
+
+@pytest.fixture(scope="module", params=[1, 2, 3])
+def cut(request):
+    """The same in stretches of at most so many blocks of splines."""
+    problem = longer_problem()
+    problem.stretches = [stretches(basis, 6 * request.param) for basis in problem.bases]
+    assert len(problem.stretches[0]) == {1: 4, 2: 2, 3: 2}[request.param]
+    return problem
+
+
+@pytest.fixture(scope="module")
+def here(whole):
+    (coefficients,), static = point(whole)
+    return coefficients, static
+
+
+def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
+    expected, found = whole.normal(0, *here), cut.trial_normal(0, *here)
+    close(found.static, expected.static)
+    close(found.static_right, expected.static_right)
+    close(found.right, expected.right)
+    assert found.cost == pytest.approx(expected.cost, rel=1e-12)
+    band, border = np.zeros_like(expected.band), np.zeros_like(expected.border)
+    for stretch in cut.stretches[0]:
+        part = cut.normal(0, *here, stretch)
+        band[stretch.touched] += part.band
+        border[stretch.touched] += part.border
+    close(band, expected.band)
+    close(border, expected.border)
+
+
+@pytest.mark.parametrize("told", [DAMPING, 0.0], ids=["damping known beforehand", "made anew"])
+def test_elimination_and_step_are_those_of_the_whole(whole, cut, here, told):
+    expected = reduced(whole.trial_normal(0, *here), DAMPING)
+    found = reduced(cut.trial_normal(0, *here, told), DAMPING)
+    close(found.information, expected.information)
+    close(found.right, expected.right)
+    step = np.random.default_rng(0).normal(0.0, 1e-3, len(here[1]))
+    close(found.motion_step(step), expected.motion_step(step))
+
+
+def test_deviations_of_moments_are_those_of_the_whole(whole, cut, here):
+    expected, found = (reduced(each.trial_normal(0, *here), 0.0) for each in (whole, cut))
+    root = root_of_covariance(expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2))
+    sd = [joint_moment_sd(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, found))]
+    close(sd[1], sd[0])
+
+
+def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
+    """Two trials, whose stretches are as short as can be."""
+    given = (whole.skeleton, whole.prior, whole.calibration, [whole.trials[0], small_problem().trials[0]], 0.05)
+    expected = estimate_simultaneous(*given)
+    monkeypatch.setattr(limits, "TOGETHER_BYTES", 1)
+    found = estimate_simultaneous(*given)
+    assert found.iterations == expected.iterations
+    assert found.cost == pytest.approx(expected.cost, rel=1e-9)
+    close(found.bsp.table(), expected.bsp.table())
+    close(found.bsp_covariance, expected.bsp_covariance)
+    for k in range(2):
+        close(found.motions[k].qdd, expected.motions[k].qdd)
+        close(found.moment_sd[k], expected.moment_sd[k])
+
+
+@pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])
+def test_stretches_share_splines_and_frames_out(splines):
+    basis = MotionBasis(np.linspace(0.0, 1.0, 4 * splines), 1.0 / (splines - 5))
+    assert basis.size == splines
+    parts = stretches(basis, 12)
+    assert [part.is_last for part in parts] == [False] * (len(parts) - 1) + [True]
+    own = [spline for part in parts for spline in range(part.splines.start, part.splines.stop)]
+    assert own == list(range(splines))
+    frames = [frame for part in parts for frame in range(part.frames.start, part.frames.stop)]
+    assert frames == list(range(len(basis.first)))
+    for part in parts:
+        active = basis.active[part.frames]
+        # markers see the frame after theirs, too
+        assert active.min() >= part.touched.start
+        assert active.max() + (not part.is_last) < part.touched.stop
