@@ -14,7 +14,6 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from calibration_errors import DISTURBANCES, Calibrated, calibrated, calibration_section
-from estimate_speed import speed_section, timed
 from kinertia.report.accuracy import JOINT_CAPTION, accuracy_markdown, moments_markdown
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from measured_walks import measured_section, measured_walk
@@ -134,14 +133,6 @@ What breaks the bars breaks those of the measured parameters first: an uncalibra
 84 %, uncalibrated hips 15 mm off to 92 %. The wide bars of the others hold whatever happens. Axes
 5 degrees off and wobbling thighs do little to them in the smooth synthetic walk, which has no impacts; axes 5 degrees
 off make the bars of ankle moments too narrow (81 %), hips 15 mm off those of hip flexion (81 %).
-
-## Speed
-
-The estimate from coordinates on (observation, optimisation, error bars), one thread, synthetic walk with skin motion at
-100 Hz; bare calls are Pinocchio's Jacobian, RNEA derivatives and regressor. Deviations of all joint moments take a
-fifth of the time. Only ratios travel to another machine.
-
-{sections["speed"]}
 """
 
 
@@ -156,7 +147,7 @@ def _calibrated(case: tuple[str, int]) -> Calibrated:
 
 def main() -> None:
     """Run everything and write the page; what needs the measured trials is left out where they are absent."""
-    sections = {"speed": speed_section([timed(10.0), timed(20.0)]), "people": str(PEOPLE)}
+    sections = {"people": str(PEOPLE)}
     laboratories = run_accuracy(SCENARIOS, PEOPLE)
     sections |= {"error_bars": accuracy_markdown(laboratories), "moments": moments_markdown(laboratories)}
     people = range(5)

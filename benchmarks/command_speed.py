@@ -62,18 +62,23 @@ def measured(runs: int) -> tuple[dict[str, tuple[float, float]], int]:
     return {name: (min(one[name][0] for one in times), min(one[name][1] for one in times)) for name in lines}, size
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
-    parser.add_argument("--runs", type=int, default=5, help="the best of so many runs counts")
-    found, size = measured(parser.parse_args().runs)
+def command_section(runs: int) -> str:
+    """Seconds of every command on the clock and of the processor, over those of the yardstick; the report's size."""
+    found, size = measured(runs)
     clock, processor = next(iter(found.values()))
     rows = [
         [name, f"{one[0]:.2f}", f"{one[0] / clock:.2f}", f"{one[1]:.2f}", f"{one[1] / processor:.2f}"]
         for name, one in found.items()
     ]
-    print(table(["process", "clock (s)", "ratio", "processor (s)", "ratio"], rows))
-    print(f"\nreport.html: {size / 1e6:.2f} MB")
+    heading = ["process", "clock (s)", "ratio", "processor (s)", "ratio"]
+    return f"{table(heading, rows)}\n\nThe fit's report has {size / 1e6:.2f} MB."
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser.add_argument("--runs", type=int, default=5, help="the best of so many runs counts")
+    print(command_section(parser.parse_args().runs))
 
 
 if __name__ == "__main__":

@@ -20,8 +20,12 @@ from typing import Any
 import numpy as np
 import opensim
 import pandas as pd
+import pinocchio
 from threadpoolctl import threadpool_limits
 
+from command_speed import command_section
+from core_speed import core_section
+from estimate_speed import speed_section, timed
 from kinertia.estimation.prepare import calibrate
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
@@ -47,6 +51,8 @@ SETUPS = {
 }
 WINDOW_S = {"gait2354": (0.0, 2.5), "rajagopal": (0.5, 1.9)}
 """Stretches in which all ground contact is measured: they can be repeated back and forth."""
+ESTIMATED_S = (10.0, 20.0)
+"""Lengths of the synthetic walks that are estimated."""
 STAGES = ("read", "calibration", "inverse kinematics", "smoothing", "two-level evaluation", "inverse dynamics")
 
 
@@ -232,6 +238,26 @@ column is the longest's divided by the shortest's. Calibration looks at ten fram
 two-level evaluation is the residual and its derivative with respect to 49 parameters.
 
 {table(["stage", *(f"{k}x (ms)" for k in lengths), f"{lengths[-1]}x / {lengths[0]}x"], scaling)}
+
+## The rigid-body core next to Pinocchio {pinocchio.__version__}
+
+The package's walk, 27 axes; Pinocchio's calls in a bare loop over the frames, without copying anything out.
+
+{core_section(runs)}
+
+## The estimate
+
+Observation, optimisation and error bars, from coordinates on, of a synthetic walk with skin motion at 100 Hz; bare
+calls are Pinocchio's Jacobian, RNEA derivatives and regressor. Most of it is linear algebra: elimination of the
+motion, error bars of joint moments.
+
+{speed_section([timed(duration) for duration in ESTIMATED_S])}
+
+## The command
+
+Whole processes with compiled functions in the cache, next to importing what they stand on.
+
+{command_section(runs)}
 """
 
 

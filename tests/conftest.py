@@ -1,20 +1,26 @@
 """Fixtures shared by the tests."""
 
+import builtins
+import importlib.util
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest import mock
 
 import pytest
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 
 import osim_models
 from command_line import Outcome, fitted, run
+from kinertia.cli.compiling import compile_once
 from kinertia.cli.measured_demo import FILES, run_measured_demo
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.result import Fit
 from kinertia.io.recording import read_recording
+from kinertia.report import extras
 from kinertia.settings import Settings, Subject
 from quick_two_level import given_back
 from walks import fit_arguments
@@ -23,7 +29,18 @@ from walks import fit_arguments
 settings.register_profile("kinertia", deadline=None)
 settings.load_profile("kinertia")
 
+# one BLAS thread, as long computations have it: here and, by the environment, in processes that tests start
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+threadpool_limits(1, user_api="blas")
+
 FEW_EVALUATIONS = 30
+LIMITS = ("kinertia.estimation.two_level._MAX_EVALUATIONS", "kinertia.estimation.two_level._FREE_EVALUATIONS")
+
+
+def pytest_sessionstart(session):
+    """Compile before the workers start, which would each do so, and only once on a machine."""
+    if not hasattr(session.config, "workerinput") and not session.config.option.collectonly:
+        compile_once(lambda stage, share: print(f"{stage} (a minute)") if share == 0.0 else None)
 
 
 @pytest.fixture(scope="session")
@@ -127,7 +144,8 @@ def measured_demo(tmp_path_factory) -> MeasuredDemo:
 @pytest.fixture
 def few_evaluations(monkeypatch):
     """Stops the estimate early: enough for tests of everything around it."""
-    monkeypatch.setattr("kinertia.estimation.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS)
+    for limit in LIMITS:
+        monkeypatch.setattr(limit, FEW_EVALUATIONS)
 
 
 @pytest.fixture(scope="session")
@@ -138,7 +156,7 @@ def short_fit(measured_walk):
         TrialInput(replace(walk, name=name), window, 0.25)
         for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
     ]
-    with mock.patch("kinertia.estimation.two_level._MAX_EVALUATIONS", FEW_EVALUATIONS):
+    with mock.patch(LIMITS[0], FEW_EVALUATIONS), mock.patch(LIMITS[1], FEW_EVALUATIONS):
         return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
 
 
@@ -152,3 +170,24 @@ def fit(demo_run):
 def two_level(demo_run):
     """The demo's two-level fit, without error bars."""
     return demo_run[0].two_level
+
+
+@pytest.fixture
+def without(monkeypatch):
+    """A machine on which a package is not installed."""
+
+    def remove(name):
+        real_spec, real_import = importlib.util.find_spec, builtins.__import__
+
+        def spec(wanted, *args):
+            return None if wanted == name else real_spec(wanted, *args)
+
+        def imported(wanted, *args, **kwargs):
+            if wanted.split(".")[0] == name:
+                raise ImportError(wanted)
+            return real_import(wanted, *args, **kwargs)
+
+        monkeypatch.setattr(extras, "find_spec", spec)
+        monkeypatch.setattr(builtins, "__import__", imported)
+
+    return remove

@@ -61,17 +61,24 @@ def test_demo_from_end_to_end(tmp_path):
     assert residuals["estimate"] < residuals["corrected"] < residuals["literature"]
 
 
-def test_same_seed_same_files(tmp_path, quick_estimator):
-    folders = [tmp_path / name for name in ("one", "again", "other")]
-    for folder, seed in zip(folders, (1, 1, 2), strict=True):
-        demo_module.run_demo(folder, seed)
-    texts = [(folder / "lab" / "walk.trc").read_text() for folder in folders]
-    assert texts[0] == texts[1] != texts[2]
+def test_same_seed_same_files(tmp_path, demo_run, monkeypatch):
+    measured = {}
+
+    def stop(wanted, progress):
+        folder = wanted.trials[0].markers.parent
+        measured.setdefault(seed, (folder / "walk.trc").read_text())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(demo_module, "read_inputs", stop)
+    for seed in (1, 2):
+        with pytest.raises(KeyboardInterrupt):
+            demo_module.run_demo(tmp_path / "out", seed)
+    assert measured[1] == (demo_run[1] / "lab" / "walk.trc").read_text() != measured[2]
 
 
-def test_files_hold_nothing_of_the_truth(tmp_path, quick_estimator):
+def test_files_hold_nothing_of_the_truth(demo_run):
     """Whoever reads the laboratory's files starts from the literature for the skeleton they give."""
-    result = demo_module.run_demo(tmp_path / "out")
+    result, _ = demo_run
     wanted = read_subject(result.subject_file)
     static, inputs, marker_set = read_inputs(wanted)
     ready = prepare(wanted.subject, static, inputs, wanted.settings, marker_set)
@@ -104,9 +111,9 @@ def test_demo_refuses_a_folder_that_is_a_file(tmp_path):
     assert "is a file" in outcome.err
 
 
-def test_joint_moments_against_the_truth(tmp_path, quick_estimator):
+def test_joint_moments_against_the_truth(demo_run):
     """The estimate is better at hip and back; with its motion and forces replaced by the truth it is exact."""
-    result = demo_module.run_demo(tmp_path / "out")
+    result, _ = demo_run
     errors = result.moment_errors
     for joint in ("hip flexion", "lumbar extension"):
         usual, estimate = errors[joint]

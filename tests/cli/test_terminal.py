@@ -1,13 +1,29 @@
 """Terminals and pipes that are not UTF-8, as on Windows: a letter that they lack never ends a command."""
 
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 NAME = "größe→ 歩行"
+SEVERAL = """
+import json, sys
+from kinertia.cli.start import main
+for arguments in json.loads(sys.argv[1]):
+    sys.argv = ["kinertia", *arguments]
+    try:
+        main()
+    except SystemExit as end:
+        for stream in (sys.stdout, sys.stderr):
+            print(END, end.code or 0, file=stream, flush=True)
+"""
+"""Runs command lines one after the other: starting Python takes longer than they do."""
+END = "--- ended with"
 
 
 def _kinertia(encoding, *arguments):
@@ -22,28 +38,46 @@ def encoding(request):
     return request.param
 
 
-def test_help(encoding):
-    done = _kinertia(encoding, "--help")
-    assert done.returncode == 0, done.stderr
-    assert "Body segment parameters from gait" in done.stdout
-
-
-def test_results_with_letters_that_it_lacks(encoding, tmp_path, measured_walk):
-    folder = tmp_path / NAME
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, measured_walk):
+    folder = tmp_path_factory.mktemp("terminal") / NAME
     folder.mkdir()
     shutil.copyfile(measured_walk / "walk.c3d", folder / f"{NAME}.c3d")
-    done = _kinertia(encoding, "check", folder / f"{NAME}.c3d", "-o", folder / "out")
-    assert "Traceback" not in done.stderr
-    assert done.returncode in (0, 1)
-    assert f"page in {folder / 'out' / 'check.html'}".encode(encoding, "replace").decode(encoding) in done.stdout
+    return folder
 
 
-def test_errors_with_letters_that_it_lacks(encoding, tmp_path):
-    done = _kinertia(encoding, "check", tmp_path / f"{NAME}.c3d")
-    assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].startswith("error: ")
-    assert "no such file" in done.stderr
-    assert "Traceback" not in done.stderr
+@pytest.fixture(scope="module")
+def done(encoding, folder):
+    """Help, results and an error: status and what stood on both streams."""
+    lines = ["--help"], ["check", str(folder / f"{NAME}.c3d"), "-o", str(folder / "out")], ["check", f"{NAME}.c3d"]
+    command = [sys.executable, "-c", f"END = {END!r}{SEVERAL}", json.dumps(lines)]
+    ended = subprocess.run(
+        command, env=os.environ | {"PYTHONIOENCODING": encoding}, capture_output=True, encoding=encoding, check=False
+    )
+    assert ended.returncode == 0, ended.stderr
+    streams = [re.split(rf"{END} (\d+)\n", stream)[:-1] for stream in (ended.stdout, ended.stderr)]
+    return [
+        SimpleNamespace(returncode=int(status), stdout=out, stderr=err)
+        for out, status, err in zip(streams[0][::2], streams[0][1::2], streams[1][::2], strict=True)
+    ]
+
+
+def test_help(done):
+    assert done[0].returncode == 0, done[0].stderr
+    assert "Body segment parameters from gait" in done[0].stdout
+
+
+def test_results_with_letters_that_it_lacks(encoding, done, folder):
+    assert "Traceback" not in done[1].stderr
+    assert done[1].returncode in (0, 1)
+    assert f"page in {folder / 'out' / 'check.html'}".encode(encoding, "replace").decode(encoding) in done[1].stdout
+
+
+def test_errors_with_letters_that_it_lacks(done):
+    assert done[2].returncode == 2
+    assert done[2].stderr.splitlines()[-1].startswith("error: ")
+    assert "no such file" in done[2].stderr
+    assert "Traceback" not in done[2].stderr
 
 
 @pytest.mark.slow

@@ -74,8 +74,8 @@ def test_the_trial_is_not_turned_and_markers_stay(prepared, gait2354, walk):
     assert kinematics.turned_deg == 0.0
     np.testing.assert_array_equal(kinematics.trial.markers.positions, walk.markers.positions)
     np.testing.assert_array_equal(prepared.skeleton.marker_locals, gait2354.skeleton.marker_locals)
-    assert prepared.freedom.marker_sd_m is None
-    assert not prepared.freedom.centres
+    assert prepared.uncertainty.marker_sd_m is None
+    assert not prepared.uncertainty.centres
 
 
 def test_loads_act_on_the_heaviest_body_of_each_foot(prepared):
@@ -83,10 +83,10 @@ def test_loads_act_on_the_heaviest_body_of_each_foot(prepared):
 
 
 def test_light_bodies_are_held_and_all_are_kept(prepared, gait2354):
-    assert prepared.freedom.held.segments == ("talus_r", "toes_r", "talus_l", "toes_l")
-    assert set(prepared.prior.mean.segments) | set(prepared.freedom.held.segments) == set(gait2354.bsp.segments)
+    assert prepared.uncertainty.held.segments == ("talus_r", "toes_r", "talus_l", "toes_l")
+    assert set(prepared.prior.mean.segments) | set(prepared.uncertainty.held.segments) == set(gait2354.bsp.segments)
     assert "talus_r (tibia_r), toes_r (calcn_r)" in noted(prepared.notes, "bodies that weigh less than 0.5 kg")
-    assert prepared.prior.mass_kg + prepared.freedom.held_kg == pytest.approx(72.6)
+    assert prepared.prior.mass_kg + prepared.uncertainty.held_kg == pytest.approx(72.6)
 
 
 def test_of_bodies_that_move_as_one_the_heaviest_is_estimated(rajagopal):
@@ -130,9 +130,9 @@ def test_masses_are_those_of_the_person(gait2354, walk):
 
 def test_calibration_moves_markers_and_frees_joint_centres(gait2354, walk):
     ready = prepare_osim(SUBJECT, gait2354, [TrialInput(walk)], Settings(), True)
-    assert set(ready.freedom.centres) == {f"{j}/offset_{a}" for j in ("hip_r", "hip_l", "back") for a in "xyz"}
+    assert set(ready.uncertainty.centres) == {f"{j}/offset_{a}" for j in ("hip_r", "hip_l", "back") for a in "xyz"}
     assert ready.kinematics[0].ik.marker_rms_m < 0.010
-    assert ready.freedom.marker_sd_m > 0
+    assert ready.uncertainty.marker_sd_m > 0
 
 
 def test_offsets_move_a_joint_along_its_parents_axes(rajagopal):

@@ -21,10 +21,7 @@ def theirs(opensim, function, x: float, order: int) -> float:
     at = opensim.Vector(1, float(x))
     if order == 0:
         return function.calcValue(at)
-    components = opensim.StdVectorInt()
-    for _ in range(order):
-        components.append(0)
-    return function.calcDerivative(components, at)
+    return function.calcDerivative([0] * order, at)  # its own StdVectorInt may be taken for ezc3d's
 
 
 def filled(function, points):

@@ -97,3 +97,10 @@ def test_command_prints_and_writes(table, tmp_path, monkeypatch):
     assert asked == {"repeats": 2, "seed": 9, "frames": len(study_trial().time)}
     assert "published" in outcome.out
     assert json.loads((tmp_path / "out" / "table1.json").read_text())["seed"] == 9
+
+
+def test_table1_without_matplotlib_has_everything_but_the_picture(table, without, tmp_path):
+    without("matplotlib")
+    folder = save_table1(table, tmp_path / "out")
+    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "table1.csv", "table1.json"]
+    assert 'id="segments"' not in (folder / "report.html").read_text(encoding="utf-8")

@@ -49,6 +49,8 @@ def test_page_of_measured_trials(fit_of):
 def test_page_of_speed(shared_data, tmp_path, monkeypatch):
     stages = pytest.importorskip("stages")
     monkeypatch.setattr(stages, "WINDOW_S", {"gait2354": (0.0, 0.6)})
+    monkeypatch.setattr(stages, "ESTIMATED_S", (0.8,))
+    monkeypatch.setattr(stages, "command_section", lambda runs: "")
     page = stages.document(runs=1, lengths=(1, 2), names=("gait2354",))
     for stage in stages.STAGES:
         (once, twice, growth) = re.search(
@@ -56,6 +58,8 @@ def test_page_of_speed(shared_data, tmp_path, monkeypatch):
         ).groups()
         assert min(float(once), float(twice), float(growth)) >= 0
     assert re.search(r"\| inverse kinematics, gait2354 walk \| [\d.]+ \| [\d.]+ \| \d+ \|", page)
+    assert re.search(r"\| 1 s \| 81 \| \d+ \|", page)
+    assert re.search(r"\| \*\*root load, derivatives and regressor\*\* \| [\d.]+ \| [\d.]+ \| [\d.]+ \|", page)
 
 
 def test_a_process_is_timed_whole_and_may_not_fail():

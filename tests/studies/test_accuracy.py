@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,11 +20,15 @@ from kinertia.studies.accuracy import (
 from kinertia.studies.joint_accuracy import JointErrors
 from kinertia.synthetic.faults import CAMERA_SD_M, Faults, measured, tilted
 from kinertia.synthetic.walk import walk, walking_subject
+from one_process import in_one_process
+
+SHORT_S = 1.3
+"""About a stride."""
 
 
 @pytest.fixture(scope="module")
 def trial():
-    return walk(walking_subject(), 1.3, trapezoid=False)
+    return walk(walking_subject(), SHORT_S, trapezoid=False)
 
 
 def made_up(scale: float, seed: int = 0) -> Draw:
@@ -63,8 +68,10 @@ def test_what_an_estimate_at_the_bound_can_attain():
 
 
 def test_draws_do_not_depend_on_the_number_of_processes():
-    one, two = (run_accuracy({"artefact": PROOF["artefact"]}, 2, seed=4, workers=workers) for workers in (1, 2))
-    assert one == two
+    """None of its own, and two."""
+    short = replace(PROOF["artefact"], walk_s=SHORT_S)
+    alone = [run_draw(4, (short, number)) for number in range(2)]
+    assert run_accuracy({"artefact": short}, 2, seed=4, workers=2)["artefact"] == summarised(short.title, alone)
 
 
 @pytest.mark.slow
@@ -74,9 +81,10 @@ def test_people_are_the_same_in_every_scenario():
     assert not np.allclose(draws[0].errors, draws[1].errors)
 
 
+@in_one_process()
 def test_bars_hold_short_form():
     """Eight people: cover cannot be told better than to some percent."""
-    found = run_accuracy({"artefact": PROOF["artefact"]}, 8)["artefact"]
+    found = run_accuracy({"artefact": replace(PROOF["artefact"], walk_s=SHORT_S)}, 8)["artefact"]
     assert found.converged == 1.0
     for name in CLASSES:
         accuracy = found.classes[name]
@@ -94,7 +102,7 @@ def test_bars_hold_short_form():
 @pytest.mark.slow
 @pytest.mark.parametrize("key", PROOF)
 def test_bars_hold(key):
-    found = run_accuracy({key: PROOF[key]}, 40, workers=1)[key]
+    found = run_accuracy({key: PROOF[key]}, 40)[key]
     for name in CLASSES:
         assert 0.92 < found.classes[name].cover < 0.98
         assert 0.85 < found.classes[name].ratio < 1.15
@@ -157,8 +165,9 @@ def test_calibration_errors_move_everything(trial):
     assert 0.0 < abs(share - 1.0) < 0.08
 
 
+@in_one_process()
 def test_command(tmp_path, monkeypatch):
-    chosen = {key: SCENARIOS[key] for key in ("study_calibration", "gain")}
+    chosen = {key: replace(SCENARIOS[key], walk_s=SHORT_S) for key in ("study_calibration", "gain")}
     monkeypatch.setattr("kinertia.cli.study.SCENARIOS", chosen)
     outcome = run("study", "accuracy", "--draws", 2, "--workers", 2, "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err

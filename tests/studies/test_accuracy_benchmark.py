@@ -9,7 +9,6 @@ from threadpoolctl import threadpool_limits
 import accuracy
 from bsp_errors import errors
 from calibration_errors import LARGEST, calibrated, calibration_section
-from estimate_speed import speed_section, timed
 from pooling import pooling_section
 from study_noise import study_draw, study_section
 from synthetic_walks import study_walk
@@ -26,12 +25,12 @@ def test_errors_of_the_truth_are_zero():
     assert errors(trial.bsp, trial.bsp) == (0.0, 0.0, 0.0)
 
 
-def test_page():
+def test_page(monkeypatch):
+    monkeypatch.setattr("study_noise.study_walk", lambda: study_walk(0.6))
     draw = study_draw(0, two_level=False)
     outcome = calibrated(LARGEST, 0, duration_s=0.8)
     values = {name: np.arange(3.0) for name in ("whole", "first half", "second half", "halves")}
     sds = {"whole": np.ones(3), "first half": np.full(3, 2.0), "second half": np.full(3, 2.0), "halves": np.ones(3)}
-    timing = timed(1.0)
     page = accuracy.document(
         {
             "draws": "1",
@@ -39,7 +38,6 @@ def test_page():
             "calibration": calibration_section({"all three": [outcome]}),
             "measured": "",
             "pooling": pooling_section(values, sds),
-            "speed": speed_section([timing]),
             "people": "2",
             "moments": "",
             "error_bars": "| mass (kg) |",
@@ -50,4 +48,3 @@ def test_page():
     assert "| at best | 1 | 2 | 3 |" in page
     assert "those of either half for 100 % of the BSPs" in page
     assert re.search(r"\| all three \| [\d.]+ / [\d.]+ \([\d.]+\)", page)
-    assert re.search(rf"\| 1 s \| 101 \| {timing.iterations} \|", page)

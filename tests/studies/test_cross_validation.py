@@ -13,6 +13,7 @@ from kinertia.studies.cross_validation import cross_validate, frozen
 from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, walk, walking_subject
 
+WALK_S, RATE_HZ = 2.7, 60.0
 SUBJECT = Subject(name="walker", sex=SEX, mass_kg=MASS_KG, height_m=HEIGHT_M)
 
 
@@ -27,7 +28,7 @@ def recordings(person):
     """Two walks of the same person, begun at different times of the stride."""
     noise = LabNoise(skin="none", camera_sd_m=0.002)
     return [
-        record(person, walk(person, 2.7, 100.0, start), noise, np.random.default_rng(k))
+        record(person, walk(person, WALK_S, RATE_HZ, start), noise, np.random.default_rng(k))
         for k, start in enumerate((0.75, 0.25))
     ]
 
@@ -57,7 +58,7 @@ def test_one_trial_cannot_be_held_out(recordings):
 
 
 def test_command(person, tmp_path):
-    lab = record(person, walk(person, 2.7, 100.0, 0.75), PERFECT, np.random.default_rng(0))
+    lab = record(person, walk(person, WALK_S, RATE_HZ, 0.75), PERFECT, np.random.default_rng(0))
     subject = write_lab(tmp_path / "lab", lab)
     alone = run("crossval", subject, "-o", tmp_path / "out")
     assert alone.status == 2

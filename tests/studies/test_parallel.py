@@ -1,5 +1,6 @@
 """Work in processes of its own."""
 
+import multiprocessing
 import os
 import sys
 
@@ -8,8 +9,11 @@ import pytest
 from kinertia.studies.parallel import in_parallel, process_count
 
 
-def test_results_are_in_the_order_of_the_cases():
-    assert in_parallel(abs, [-3, 1, -2], workers=2) == [3, 1, 2]
+def test_results_are_in_the_order_of_the_cases_and_no_process_is_left():
+    shares = []
+    assert in_parallel(abs, [-3, 1, -2], workers=2, progress=shares.append) == [3, 1, 2]
+    assert shares == pytest.approx([0, 1 / 3, 2 / 3, 1])
+    assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize(

@@ -99,8 +99,13 @@ def test_standing_feet_stay():
     assert np.abs(turned - turned[0]).max() < 0.35
 
 
-def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
-    found = plan_synthetic()
+@pytest.fixture(scope="module")
+def found():
+    """The plan for the package's motions."""
+    return plan_synthetic()
+
+
+def test_walking_shows_more_than_squats_and_three_motions_more_than_one(found):
     mean = {names: found.information(names).mean() for names in found.sd}
     assert min(mean["walk",], mean["fast walk",]) > mean["squat",]
     best = [names for names in found.sd if len(names) == 3]
@@ -108,7 +113,9 @@ def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
     assert mean[best[0]] > max(mean[name,] for name in best[0])
 
 
-def test_command(tmp_path):
+def test_command(tmp_path, found, monkeypatch):
+    """All but the seconds of planning."""
+    monkeypatch.setattr("kinertia.studies.plan.plan_synthetic", lambda: found)
     outcome = run("plan", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     table = pd.read_csv(tmp_path / "out" / "plan.csv")

@@ -1,11 +1,21 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import kinertia.studies.sensitivity as sensitivity_study
 from command_line import run
-from kinertia.studies.sensitivity import AMPLITUDES, CONDITIONS, SHOWN, WITH_SQUATS, Sensitivity, run_sensitivity
+from kinertia.studies.sensitivity import (
+    AMPLITUDES,
+    CONDITIONS,
+    SHOWN,
+    STRIDE_S,
+    WITH_SQUATS,
+    Sensitivity,
+    run_sensitivity,
+)
+from one_process import in_one_process
 
 
 def made_up() -> Sensitivity:
@@ -32,11 +42,13 @@ def test_conditions_change_one_thing_at_a_time():
 
 @pytest.fixture
 def few_conditions(monkeypatch):
-    kept = {key: CONDITIONS[key] for key in ("study x 0.25", "study x 2")}
+    kept = {key: replace(CONDITIONS[key], walk_s=STRIDE_S) for key in ("study x 0.25", "study x 2")}
     monkeypatch.setattr(sensitivity_study, "CONDITIONS", kept)
 
 
-def test_noise_makes_errors_larger(few_conditions):
+@pytest.mark.usefixtures("few_conditions")
+@in_one_process()
+def test_noise_makes_errors_larger():
     found = run_sensitivity(4)
     small, large = found.errors["study x 0.25"], found.errors["study x 2"]
     assert small.shape == (7 * len(SHOWN),)

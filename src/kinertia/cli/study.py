@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
 from kinertia.report.accuracy import HEADINGS, JOINT_CAPTION, JOINT_HEADINGS, accuracy_rows, joint_rows, save_accuracy
+from kinertia.report.extras import HOW, has_matplotlib
 from kinertia.report.sensitivity import save_sensitivity
 from kinertia.report.table1 import save_table1, table1_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
@@ -52,7 +54,7 @@ def table1(
         table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     _report_table1(table, source.deviation)
     save_table1(table, output)
-    out.print(f"results in {output}: report.html, table1.json, table1.csv, table1.png")
+    _say_where(output, ("report.html", "table1.json", "table1.csv"), "table1.png")
 
 
 def _report_table1(table: Table1, deviation: np.ndarray) -> None:
@@ -127,4 +129,12 @@ def sensitivity(
         out.print(f"small errors up to twice the amplitude of {title}: {listed}")
     out.print(f"shown by no condition: {', '.join(found.never()) or 'none'}")
     save_sensitivity(found, output)
-    out.print(f"results in {output}: sensitivity.md, sensitivity.png, sensitivity.json, sensitivity.csv")
+    _say_where(output, ("sensitivity.md", "sensitivity.json", "sensitivity.csv"), "sensitivity.png")
+
+
+def _say_where(output: Path, files: Sequence[str], picture: str) -> None:
+    """The files of the results, and how to have the picture, too, where matplotlib is missing."""
+    drawn = has_matplotlib()
+    out.print(f"results in {output}: {', '.join([*files, picture] if drawn else files)}", soft_wrap=True)
+    if not drawn:
+        out.print(f"no {picture}: matplotlib is not installed; install it: {HOW}", soft_wrap=True)

@@ -11,9 +11,10 @@ def warm_up(quiet: Quiet = False) -> None:
     """Compile beforehand what the first fit would compile.
 
     Kinertia's calculations are compiled once on a machine, which takes about
-    half a minute. A command that computes does it when it must; an
-    administrator can do it for all users of an installation that only he may
-    write to, and a cluster before its jobs start.
+    half a minute; a command that computes does it when it must. The result is
+    kept beside the package or, where that cannot be written to, in your cache:
+    run this once as the owner of an installation that others may only read,
+    and on a cluster before the jobs start.
 
     [bold]Example[/]
 

@@ -106,7 +106,7 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         *turning_warnings(ready.skeleton, ready.kinematics),
         *outcome.warnings,
         *fit_warnings(
-            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.freedom.source
+            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.uncertainty.source
         ),
     )
     return Fit(
@@ -170,7 +170,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
     check_masses(known(ready.subject.mass_kg), by_force)
     bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.freedom)
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.uncertainty)
     result = fitted.result
     parts = (fitted.skeletons, fitted.motions, fitted.foot_loads, result.reactions, result.moment_sd, ready.kinematics)
     estimates = [

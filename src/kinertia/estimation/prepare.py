@@ -10,7 +10,7 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
 from kinertia.estimation.input_checks import check_same_person, check_visible, complete_subject, known
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
@@ -58,7 +58,7 @@ class Prepared:
         skeleton: calibrated model.
         literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
         prior: how far the person's may be from them.
-        freedom: what else the simultaneous estimate may move.
+        uncertainty: what else the simultaneous estimate may move.
         file: the OpenSim model that the skeleton is from, if it is.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
@@ -74,7 +74,7 @@ class Prepared:
     skeleton: Skeleton
     literature: BodySegmentParameters
     prior: BspPrior
-    freedom: Freedom
+    uncertainty: ModelUncertainty
     file: OsimModel | None
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
@@ -169,7 +169,7 @@ def prepare(
         skeleton=skeleton,
         literature=literature,
         prior=literature_prior(literature),
-        freedom=GAIT27_FREEDOM.with_axes() if settings.joint_axes else GAIT27_FREEDOM,
+        uncertainty=GAIT27_UNCERTAINTY.with_axes() if settings.joint_axes else GAIT27_UNCERTAINTY,
         file=None,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),

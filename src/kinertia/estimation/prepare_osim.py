@@ -17,7 +17,7 @@ from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, Freedom
+from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported import OsimModel
@@ -65,7 +65,7 @@ def prepare_osim(
     own, factor = at_mass(model.bsp, known(subject.mass_kg))
     prior, held = parted(skeleton, own)
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
-    freedom = Freedom(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
+    uncertainty = ModelUncertainty(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
 
     kinematics, seconds = [], []
     for k, trial in enumerate(trials):
@@ -85,9 +85,9 @@ def prepare_osim(
     return Prepared(
         subject=subject,
         skeleton=skeleton,
-        literature=freedom.whole(prior.mean),
+        literature=uncertainty.whole(prior.mean),
         prior=prior,
-        freedom=freedom,
+        uncertainty=uncertainty,
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),

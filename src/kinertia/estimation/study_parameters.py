@@ -88,7 +88,7 @@ class ParameterVector:
 
     def bsp(self, theta: npt.ArrayLike) -> BodySegmentParameters:
         """Body segment parameters with this theta; the left mirrors the right under symmetry."""
-        table = self._symmetrised(self.reference)
+        table = self._own_table.copy()
         table[:, :_STUDY] = self._grouped(theta) * self._signs
         return BodySegmentParameters.from_table(self.reference.segments, table)
 
@@ -99,6 +99,11 @@ class ParameterVector:
         jacobian = np.zeros((len(blocks), 10, len(self.names) // _STUDY, _STUDY))
         jacobian[np.arange(len(blocks)), :, self._group, :] = blocks
         return jacobian.reshape(10 * len(blocks), len(self.names))
+
+    @cached_property
+    def _own_table(self) -> FloatArray:
+        # (s, 10) of the reference
+        return self._symmetrised(self.reference)
 
     @cached_property
     def _signs(self) -> FloatArray:
@@ -119,5 +124,6 @@ class ParameterVector:
         table = bsp.table()
         if self.symmetric:
             paired = partners(bsp.segments) != np.arange(len(bsp.segments))
-            table[paired] = 0.5 * (table[paired] + bsp.mirrored().table()[paired])
+            mirrored = table[partners(bsp.segments)] * MIRROR_SIGNS
+            table[paired] = 0.5 * (table[paired] + mirrored[paired])
         return table

@@ -37,6 +37,7 @@ MIRROR_SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
 """Factor on each of `PARAMETERS` that turns a right segment into a left one."""
 
 _ROUNDING = 1e-6
+_ASYMMETRY = 1e-9
 _TABLE_ROWS, _TABLE_COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # ixx iyy izz ixy ixz iyz
 _PIN_ROWS, _PIN_COLUMNS = [0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]  # Ixx Ixy Iyy Ixz Iyz Izz
 
@@ -80,14 +81,14 @@ class BodySegmentParameters:
             expected = (len(segments), *shape)
             if array.shape != expected:
                 raise ValueError(f"{name} has shape {array.shape}; {expected} was expected")
-            for segment, values in zip(segments, array, strict=True):
-                if not np.isfinite(values).all():
-                    raise ValueError(f"{name} of segment '{segment}' is not finite")
+            if not (finite := np.isfinite(array).all(axis=tuple(range(1, array.ndim)))).all():
+                raise ValueError(f"{name} of segment '{segments[np.argmin(finite)]}' is not finite")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        for segment, inertia in zip(segments, self.inertia_kgm2, strict=True):
-            if not np.allclose(inertia, inertia.T, rtol=0.0, atol=1e-9 * np.abs(inertia).max()):
-                raise ValueError(f"inertia_kgm2 of segment '{segment}' is not symmetric")
+        skew = np.abs(self.inertia_kgm2 - self.inertia_kgm2.transpose(0, 2, 1)).max(axis=(1, 2))
+        symmetric = skew <= _ASYMMETRY * np.abs(self.inertia_kgm2).max(axis=(1, 2))
+        if not symmetric.all():
+            raise ValueError(f"inertia_kgm2 of segment '{segments[np.argmin(symmetric)]}' is not symmetric")
 
     @property
     def total_mass_kg(self) -> float:
@@ -198,7 +199,11 @@ class BodySegmentParameters:
 
     def physically_consistent(self) -> npt.NDArray[np.bool_]:
         """(s,) whether mass > 0 and pseudo-inertia positive definite: a body of positive density exists."""
-        return np.array([not self._problems(i) for i in range(len(self.segments))], dtype=bool)
+        moments = np.diagonal(self.inertia_kgm2, axis1=1, axis2=2)
+        excess = moments - np.roll(moments, -1, axis=1) - np.roll(moments, -2, axis=1)
+        smallest = np.linalg.eigvalsh(second_moments(self.inertia_kgm2))[:, 0]
+        possible: npt.NDArray[np.bool_] = (self.mass_kg > 0) & (moments > 0).all(axis=1) & (smallest > 0)
+        return possible & (excess < 0).all(axis=1)
 
     def inconsistencies(self) -> list[str]:
         """One sentence for each physical condition that a segment violates; empty if all are consistent."""

@@ -56,7 +56,7 @@ def table_jacobian(theta: np.ndarray) -> np.ndarray:
 
 
 def dynamic_jacobian(theta: np.ndarray) -> np.ndarray:
-    """(s, 10, 10): derivative of each segment's dynamic parameters (Pinocchio's order) by its own ten."""
+    """(s, 10, 10): derivative of each segment's dynamic parameters, in their usual order, by its own ten."""
     rows = theta.reshape(-1, 10)
     result: np.ndarray = dynamic_by_table(np.exp(rows[:, 0]), rows[:, 1:4]) @ table_jacobian(theta)
     return result

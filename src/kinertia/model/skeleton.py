@@ -123,7 +123,7 @@ class Skeleton:
     start: Mapping[str, float] = field(default_factory=dict)
     carried: BodySegmentParameters | None = None
 
-    @property
+    @cached_property
     def segments(self) -> tuple[str, ...]:
         """Names of all segments, root first."""
         return tuple(joint.child for joint in self.joints)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import bsp_figure, information_figure
+from kinertia.report.extras import expect_plotly
 from kinertia.report.figure import Figure
 from kinertia.report.marker_figures import gap_figure, marker_figure
 from kinertia.report.skeleton_view import skeleton_figure
@@ -18,7 +19,12 @@ if TYPE_CHECKING:
 
 
 def as_plotly(figure: Figure) -> go.Figure:
-    """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed."""
+    """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed.
+
+    Raises:
+        KinertiaError: plotly is not installed.
+    """
+    expect_plotly()
     import plotly.graph_objects as go
 
     return go.Figure(figure.data, figure.layout, figure.frames)

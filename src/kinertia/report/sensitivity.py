@@ -11,6 +11,7 @@ import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
+from kinertia.report.extras import has_matplotlib
 from kinertia.studies.sensitivity import (
     AMPLITUDES,
     CONDITIONS,
@@ -75,7 +76,9 @@ For these the literature's value stands; their error bars say so.
 ## Conditions and parameters
 
 {table}
+{picture}"""
 
+_PICTURE = """
 ![RMS error of every parameter in every condition, over that of the literature](sensitivity.png)
 """
 
@@ -98,6 +101,7 @@ def sensitivity_markdown(found: Sensitivity) -> str:
     for i, name in enumerate(found.parameters):
         rows.append([name, *(f"{found.errors[key][i]:.2f}" for key in _COLUMNS)])
     return _PAGE.format(
+        picture=_PICTURE if has_matplotlib() else "",
         draws=found.draws,
         percent=100.0 / np.sqrt(2.0 * found.draws),
         count=len(found.parameters),
@@ -131,5 +135,6 @@ def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
         (work / "sensitivity.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         (work / "sensitivity.md").write_text(sensitivity_markdown(found), encoding="utf-8")
         sensitivity_frame(found).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")
-        sensitivity_figure(found).savefig(work / "sensitivity.png", dpi=110)
+        if has_matplotlib():
+            sensitivity_figure(found).savefig(work / "sensitivity.png", dpi=110)
     return Path(folder)

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
+from kinertia.report.extras import has_matplotlib
 from kinertia.report.rendering import rendered
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
 from kinertia.trial.rms import rms
@@ -101,10 +102,10 @@ def table1_figure(table: Table1) -> Figure:
 
 
 def save_table1(table: Table1, folder: str | Path) -> Path:
-    """Write `table1.json`, `table1.csv`, `table1.png` and `report.html` into a folder; returns the folder."""
-    figure = table1_figure(table)
-    svg = io.StringIO()
-    figure.savefig(svg, format="svg", metadata={"Date": None})
+    """Write `table1.json`, `table1.csv`, `report.html` and, with matplotlib, `table1.png` into a folder; returns it."""
+    figure, svg = table1_figure(table) if has_matplotlib() else None, io.StringIO()
+    if figure is not None:
+        figure.savefig(svg, format="svg", metadata={"Date": None})
     picture = svg.getvalue()
     page = rendered(
         "table1.html.j2",
@@ -114,7 +115,7 @@ def save_table1(table: Table1, folder: str | Path) -> Path:
         trial=table.trial,
         headings=list(CONDITIONS.values()),
         rows=table1_rows(table),
-        picture=Markup(picture[picture.index("<svg") :]),
+        picture=Markup(picture[max(picture.find("<svg"), 0) :]),
     )
     with complete_folder(folder) as work:
         (work / "table1.json").write_text(
@@ -122,5 +123,6 @@ def save_table1(table: Table1, folder: str | Path) -> Path:
         )
         table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")
         (work / "report.html").write_text(page, encoding="utf-8")
-        figure.savefig(work / "table1.png", dpi=150)
+        if figure is not None:
+            figure.savefig(work / "table1.png", dpi=150)
     return Path(folder)

@@ -87,7 +87,7 @@ def cross_validate(
     for k, held in enumerate(trials):
         progress("held out", k / len(trials))
         others = [other for other in trials if other is not held]
-        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidth, ready.freedom).result.bsp
+        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidth, ready.uncertainty).result.bsp
         explained = (_explained(ready, bsp, held, bandwidth) for bsp in (ready.prior.mean, estimate))
         found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(found)
@@ -99,7 +99,7 @@ def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
 
 
 def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, bandwidth: Bandwidth) -> Explained:
-    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], bandwidth, ready.freedom)
+    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], bandwidth, ready.uncertainty)
     (motion,), (loads,) = fitted.motions, fitted.foot_loads
     model = fitted.skeleton
     left = residual(model, fitted.bsp, motion, loads.sum(axis=1))

@@ -58,5 +58,7 @@ def _one_thread() -> None:
 
     Ctrl-C is for the process that waits.
     """
+    import scipy.linalg  # noqa: F401  # the libraries of NumPy and SciPy: only what is loaded can be limited
+
     threadpool_limits(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)

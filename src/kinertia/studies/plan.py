@@ -22,7 +22,7 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior, observed, used_skeleton
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.skeleton import Skeleton
@@ -91,7 +91,7 @@ def plan(ready: Prepared | None = None, cutoff_hz: float | Literal["gcv"] = "gcv
     """
     if ready is None:
         return plan_synthetic()
-    return plan_measured(ready.skeleton, ready.prior, ready.kinematics, cutoff_hz, ready.freedom)
+    return plan_measured(ready.skeleton, ready.prior, ready.kinematics, cutoff_hz, ready.uncertainty)
 
 
 @one_blas_thread
@@ -100,15 +100,15 @@ def plan_measured(
     prior: BspPrior,
     trials: Sequence[Kinematics],
     cutoff_hz: float | Literal["gcv"],
-    freedom: Freedom = GAIT27_FREEDOM,
+    uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
 ) -> Plan:
     """Predicted standard deviations from measured trials of one person with different names; as `fit_simultaneous`."""
     bandwidth = Bandwidth.of(trials, cutoff_hz)
-    used = used_skeleton(skeleton, trials, freedom)
+    used = used_skeleton(skeleton, trials, uncertainty)
 
     def told(chosen: Sequence[int]) -> Information:
-        seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, freedom)
-        calibration = calibration_prior(used, freedom)
+        seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, uncertainty)
+        calibration = calibration_prior(used, uncertainty)
         return Information(MapProblem(used, prior, calibration, seen.alone, bandwidth.spacing_s), seen.repeats)
 
     everything = tuple(range(len(trials)))

@@ -11,7 +11,7 @@ from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR, fit_simultaneous
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, JOINT_CENTRE_SD_M
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.report.files import save_fit
 from kinertia.settings import Settings, Subject
@@ -88,7 +88,10 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
     prior = literature_prior(walking_subject().literature)
     with threadpool_limits(1, user_api="blas"):
         outcome = fit_simultaneous(
-            off.skeleton, prior, [kinematics_of(off, noisy, trial.foot_loads)], freedom=GAIT27_FREEDOM.with_axes()
+            off.skeleton,
+            prior,
+            [kinematics_of(off, noisy, trial.foot_loads)],
+            uncertainty=GAIT27_UNCERTAINTY.with_axes(),
         )
     told = outcome.posterior.calibration
     for name, put_in in wrong.items():
@@ -158,9 +161,9 @@ def test_markers_that_stay_do_so_in_every_trial(trial):
     wrong = replace(trial, skeleton=trial.skeleton.with_places(places))
     markers = [camera_noise(trial.markers, sd_m, rng) for sd_m in (0.001, 0.002)]
     kinematics = [kinematics_of(wrong, each, trial.foot_loads) for each in markers]
-    prior, staying = literature_prior(walking_subject().literature), replace(GAIT27_FREEDOM, marker_sd_m=None)
+    prior, staying = literature_prior(walking_subject().literature), replace(GAIT27_UNCERTAINTY, marker_sd_m=None)
     with threadpool_limits(1, user_api="blas"):
-        outcome = fit_simultaneous(wrong.skeleton, prior, kinematics, freedom=staying)
+        outcome = fit_simultaneous(wrong.skeleton, prior, kinematics, uncertainty=staying)
     for skeleton in (outcome.skeleton, *outcome.skeletons):
         np.testing.assert_array_equal(skeleton.marker_locals, wrong.skeleton.marker_locals)
 

@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_FREEDOM, Freedom
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import MarkerNoise, Observations, observe
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
@@ -110,7 +110,7 @@ def fit_simultaneous(
     prior: BspPrior,
     trials: Sequence[Kinematics],
     bandwidth: Bandwidth | None = None,
-    freedom: Freedom = GAIT27_FREEDOM,
+    uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -119,25 +119,25 @@ def fit_simultaneous(
         prior: of the body segment parameters, and the total mass of its segments by the scale.
         trials: kinematics of the trials.
         bandwidth: of motion and forces; found from the trials if None.
-        freedom: what may move beside these segments.
+        uncertainty: what may move beside these segments.
     """
     bandwidth = bandwidth or Bandwidth.of(trials)
-    used = used_skeleton(skeleton, trials, freedom)
-    seen = observed(used, prior, trials, bandwidth, freedom)
+    used = used_skeleton(skeleton, trials, uncertainty)
+    seen = observed(used, prior, trials, bandwidth, uncertainty)
     together = seen.together
-    calibration = calibration_prior(used, freedom)
+    calibration = calibration_prior(used, uncertainty)
     result = estimate_simultaneous(used, prior, calibration, together, bandwidth.spacing_s)
     found = result.skeleton.carrying(None)
-    if freedom.marker_sd_m is None:
+    if uncertainty.marker_sd_m is None:
         found = found.with_markers(used.markers)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
-    covariance, before = (freedom.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
+    covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, freedom, result),
+        _calibration(used, uncertainty, result),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -146,44 +146,50 @@ def fit_simultaneous(
     )
     return SimultaneousFit(
         result,
-        freedom.whole(result.bsp),
+        uncertainty.whole(result.bsp),
         found,
         tuple(found.with_places(found.marker_locals + moved) for moved in result.displacements_m),
         posterior,
         motions,
         loads,
         bandwidth,
-        tuple(_warnings(prior, freedom, result, posterior, trials)),
+        tuple(_warnings(prior, uncertainty, result, posterior, trials)),
     )
 
 
-def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], freedom: Freedom) -> Skeleton:
+def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], uncertainty: ModelUncertainty) -> Skeleton:
     """The skeleton with the markers that any of the trials shows, and the segments that are held."""
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    return used.carrying(freedom.held)
+    return used.carrying(uncertainty.held)
 
 
 def observed(
-    skeleton: Skeleton, prior: BspPrior, trials: Sequence[Kinematics], bandwidth: Bandwidth, freedom: Freedom
+    skeleton: Skeleton,
+    prior: BspPrior,
+    trials: Sequence[Kinematics],
+    bandwidth: Bandwidth,
+    uncertainty: ModelUncertainty,
 ) -> Observations:
     """What the estimate sees of trials of a `used_skeleton`."""
-    staying = freedom.marker_sd_m is None
-    return observe(skeleton, trials, prior.mass_kg + freedom.held_kg, bandwidth, staying)
+    staying = uncertainty.marker_sd_m is None
+    return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidth, staying)
 
 
-def calibration_prior(skeleton: Skeleton, freedom: Freedom = GAIT27_FREEDOM) -> CalibrationPrior:
+def calibration_prior(skeleton: Skeleton, uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY) -> CalibrationPrior:
     """How far a calibrated skeleton with these markers, plates and clock may be off."""
-    places = np.full(len(skeleton.markers), freedom.marker_sd_m or _STAYING_SD_M)
-    return CalibrationPrior(freedom.coordinates, places, PLATE_PRIOR, FLOOR_PRIOR, CLOCK_PRIOR_S)
+    places = np.full(len(skeleton.markers), uncertainty.marker_sd_m or _STAYING_SD_M)
+    return CalibrationPrior(uncertainty.coordinates, places, PLATE_PRIOR, FLOOR_PRIOR, CLOCK_PRIOR_S)
 
 
-def _calibration(skeleton: Skeleton, freedom: Freedom, result: SimultaneousResult) -> dict[str, dict[str, float | str]]:
+def _calibration(
+    skeleton: Skeleton, uncertainty: ModelUncertainty, result: SimultaneousResult
+) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
-        told = {"value": change, "prior_sd": freedom.coordinates[name], "sd": sd}
-        found[name] = {**told, "unit": "rad" if name in freedom.axes else "m"}
+        told = {"value": change, "prior_sd": uncertainty.coordinates[name], "sd": sd}
+        found[name] = {**told, "unit": "rad" if name in uncertainty.axes else "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
@@ -207,7 +213,7 @@ SHOWN_UNIT = {
 
 def _warnings(
     prior: BspPrior,
-    freedom: Freedom,
+    uncertainty: ModelUncertainty,
     result: SimultaneousResult,
     posterior: Posterior,
     trials: Sequence[Kinematics],
@@ -230,7 +236,7 @@ def _warnings(
     ]
     if far:
         found.append(
-            f"the data contradict the model: {', '.join(far)} prior SDs from {freedom.source}; a wrong joint, "
+            f"the data contradict the model: {', '.join(far)} prior SDs from {uncertainty.source}; a wrong joint, "
             f"plate or marker is more likely than an unusual body"
         )
     return found

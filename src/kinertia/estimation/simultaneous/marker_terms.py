@@ -153,8 +153,8 @@ def add_markers(
         local,
         np.ascontiguousarray(skeleton.tree.segment_rotation[skeleton.marker_segments]),
         np.ascontiguousarray(measured),
-        information.own,
-        information.next,
+        np.ascontiguousarray(information.own),
+        np.ascontiguousarray(information.next),
     )
     border = normal.border[..., columns]
     static = _Static(normal.static[columns, columns], normal.static_right[columns], np.zeros(1))

@@ -17,7 +17,7 @@ MARKER_SD_M = 0.005
 
 
 @dataclass(frozen=True, eq=False)
-class Freedom:
+class ModelUncertainty:
     """Joint centres and markers that may move, and segments that are not estimated.
 
     Attributes:
@@ -39,7 +39,7 @@ class Freedom:
         """All static coordinates that may move -> prior deviation, m or rad."""
         return {**self.centres, **self.axes}
 
-    def with_axes(self) -> Freedom:
+    def with_axes(self) -> ModelUncertainty:
         """The same with the axes of knees, ankles and elbows of the 27-DOF model free."""
         return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
 
@@ -60,7 +60,7 @@ class Freedom:
         return np.pad(covariance, (0, 0 if self.held is None else 10 * len(self.held.segments)))
 
 
-GAIT27_FREEDOM = Freedom(
+GAIT27_UNCERTAINTY = ModelUncertainty(
     dict.fromkeys((*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS), JOINT_CENTRE_SD_M),
     MARKER_SD_M,
     None,

@@ -81,7 +81,7 @@ def add_root(normal: NormalEquations, columns: slice, basis: MotionBasis, start:
     normal.static[columns, columns] += flat.T @ flat
     normal.static_right[columns] -= flat.T @ left.ravel()
     normal.cost += 0.5 * float(np.square(left).sum())
-    rows = by_splines(basis.values[:, root.frames], root.q, root.qd, root.qdd)
+    rows = by_splines(np.ascontiguousarray(basis.values[:, root.frames]), root.q, root.qd, root.qdd)
     intervals = np.unique(knots)
     ends = np.searchsorted(knots, intervals, side="right")
     for first, (begin, end) in zip(intervals - start, pairwise([0, *ends]), strict=True):

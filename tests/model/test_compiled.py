@@ -1,0 +1,85 @@
+"""Where compiled functions are kept, and when they are compiled anew."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import kinertia
+from kinertia.model import compiled
+
+PACKAGE = Path(kinertia.__file__).parent
+FOLDER = "from kinertia.model.compiled import cache_folder; print(cache_folder())"
+
+
+@pytest.fixture
+def installation(tmp_path):
+    """A copy of the package without anything compiled."""
+    copy = tmp_path / "site" / "kinertia"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
+
+
+def run(installation: Path, program: str, **environment: str) -> str:
+    everything = {**os.environ, "PYTHONPATH": str(installation.parent), **environment}
+    done = subprocess.run([sys.executable, "-c", program], env=everything, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_all_files_with_compiled_functions_are_among_the_sources():
+    """A change in any of them must not run what an older state of it gave."""
+    users = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if "@compiled\n" in (text := path.read_text(encoding="utf-8")) or "@inlined\n" in text
+    }
+    assert users | {"model/compiled.py"} == set(compiled.SOURCES)
+
+
+def test_a_change_of_any_source_leads_to_another_folder(installation):
+    before = run(installation, FOLDER)
+    assert Path(before).parent == installation / "model" / "__pycache__"
+    source = installation / "motion" / "marker_sums.py"
+    source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    assert run(installation, FOLDER) != before
+
+
+@pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may write everywhere")
+def test_an_installation_that_may_only_be_read_keeps_them_in_the_users_cache(installation, tmp_path):
+    (installation / "model").chmod(0o555)
+    folder = run(installation, FOLDER, XDG_CACHE_HOME=str(tmp_path / "cache"), HOME=str(tmp_path))
+    assert Path(folder).parent in (tmp_path / "cache" / "kinertia", tmp_path / "Library" / "Caches" / "kinertia")
+
+
+@pytest.mark.parametrize("place", ["cache", "temporary"])
+def test_where_the_package_cannot_be_written_to(monkeypatch, place):
+    """The user's cache, or where there is none either, the folder for temporary files."""
+    expected = {"cache": compiled._user_cache() / "kinertia", "temporary": Path(compiled.tempfile.gettempdir())}[place]
+    compiled.cache_folder.cache_clear()
+    monkeypatch.setattr(compiled, "_writable", lambda folder: folder.parent == expected)
+    try:
+        assert compiled.cache_folder().parent == expected
+    finally:
+        compiled.cache_folder.cache_clear()
+
+
+def test_folders_of_older_states_go_when_all_is_compiled(monkeypatch, tmp_path):
+    here, other = (tmp_path / "__pycache__" / name for name in ("kinertia-new", "kinertia-old"))
+    for folder in (here, other):
+        folder.mkdir(parents=True)
+    monkeypatch.setattr(compiled, "cache_folder", lambda: here)
+    assert not compiled.is_compiled()
+    compiled.set_compiled()
+    assert compiled.is_compiled()
+    assert not other.exists()
+
+
+def test_other_packages_functions_are_kept_where_they_were():
+    from numba.core import config
+
+    before = config.CACHE_DIR
+    compiled.compiled(lambda x: x)
+    assert before == config.CACHE_DIR

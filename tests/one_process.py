@@ -1,0 +1,27 @@
+"""Studies in the process of the test: starting others takes longer than short studies do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from unittest import mock
+
+
+def _one_by_one(task, cases, workers=None, progress=lambda share: None):
+    """In place of `in_parallel`."""
+    progress(0.0)
+    found = []
+    for case in cases:
+        found.append(task(case))
+        progress(len(found) / len(cases))
+    return found
+
+
+@contextmanager
+def in_one_process() -> Iterator[None]:
+    """As a context, or as a decorator of a test."""
+    with (
+        mock.patch("kinertia.studies.accuracy.in_parallel", _one_by_one),
+        mock.patch("kinertia.studies.table1.in_parallel", _one_by_one),
+    ):
+        yield
