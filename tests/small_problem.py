@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,12 @@ from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, Calibration
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.gait27 import HIP_OFFSETS
+from kinertia.model.skeleton import Skeleton
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
-from pinocchio_model import axis_forces, pinocchio_model
+from pinocchio_model import axis_forces, pin, pinocchio_model
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
@@ -118,10 +120,7 @@ def point(problem: MapProblem, seed: int = 1) -> tuple[list[np.ndarray], np.ndar
 def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     """All residuals of trial k, each over its deviation, from first principles: no term of `map_terms` is used."""
     trial, layout = problem.trials[k], problem.layout
-    values = dict(zip(problem.calibration.coordinates, static[layout.coordinates], strict=True))
-    positions = static[layout.locals].reshape(-1, 3)
-    placed = [replace(marker, position=p) for marker, p in zip(problem.skeleton.markers, positions, strict=True)]
-    skeleton = problem.skeleton.with_markers(placed).lock(values)
+    skeleton, rigid = _body(problem, tuple(static))
     q, qd, qdd = problem.bases[k].evaluate(coefficients)
     pose = skeleton.pose(q)
     errors = whitened(trial.markers - skeleton.marker_positions(pose), trial.marker_sd, trial.marker_autocorrelation)
@@ -133,12 +132,22 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
         loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])
         loads[i, foot, 4] += free_moment * loads[i, foot, 1]
         loads[i, foot] *= 1.0 + gain
-    forces = axis_forces(pinocchio_model(skeleton, problem.bsp(static)), skeleton.map.motion(q, qd, qdd))
+    forces = axis_forces(rigid, skeleton.map.motion(q, qd, qdd))
     load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
     left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
     moved = (coefficients - problem.bases[k].fit(trial.q)) / COEFFICIENT_SD
     return np.concatenate([errors, left[trial.dynamic].ravel(), moved.ravel()])
+
+
+@lru_cache(maxsize=1)
+def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin.Model]:
+    """Skeleton and Pinocchio model with these static unknowns; kept while only the motion changes."""
+    values, layout = np.array(static), problem.layout
+    locked = dict(zip(problem.calibration.coordinates, values[layout.coordinates], strict=True))
+    positions = values[layout.locals].reshape(-1, 3)
+    skeleton = problem.skeleton.with_places(positions).lock(locked)
+    return skeleton, pinocchio_model(skeleton, problem.bsp(values))
 
 
 def whitened(errors: np.ndarray, sd: np.ndarray, autocorrelation: float) -> np.ndarray:

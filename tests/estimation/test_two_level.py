@@ -137,6 +137,7 @@ def test_masses_are_lost_when_the_centres_of_mass_lie_on_the_axes(model, truth):
     assert rank(model.skeleton, BodySegmentParameters.from_table(truth.segments, table)) < 49
 
 
+@pytest.mark.usefixtures("few_evaluations")
 def test_estimate_with_correction_explains_the_loads_better(model, truth):
     windows = [window_of(model.skeleton, truth, n=12)]
     seen = []

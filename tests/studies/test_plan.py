@@ -99,13 +99,9 @@ def test_standing_feet_stay():
     assert np.abs(turned - turned[0]).max() < 0.35
 
 
-@pytest.fixture(scope="module")
-def found():
-    """The plan for the package's motions."""
-    return plan_synthetic()
-
-
-def test_walking_shows_more_than_squats_and_three_motions_more_than_one(found):
+def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
+    found = plan_synthetic()
+    assert set(MOTIONS) < set(found.table.columns)
     mean = {names: found.information(names).mean() for names in found.sd}
     assert min(mean["walk",], mean["fast walk",]) > mean["squat",]
     best = [names for names in found.sd if len(names) == 3]
@@ -113,13 +109,15 @@ def test_walking_shows_more_than_squats_and_three_motions_more_than_one(found):
     assert mean[best[0]] > max(mean[name,] for name in best[0])
 
 
-def test_command(tmp_path, found, monkeypatch):
-    """All but the seconds of planning."""
+def test_command(tmp_path, prior, monkeypatch):
+    """All but the seconds of planning, which the examples of the pages spend."""
+    sets = [*((name,) for name in MOTIONS), ("walk", "squat")]
+    found = Plan(prior.mean.segments, prior.sd, {names: prior.sd / (1 + len(names)) for names in sets})
     monkeypatch.setattr("kinertia.studies.plan.plan_synthetic", lambda: found)
     outcome = run("plan", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     table = pd.read_csv(tmp_path / "out" / "plan.csv")
-    assert {"walk", "fast walk", "squat", "arm swing", "trunk sway"} < set(table.columns)
+    assert {"walk", "fast walk", "squat", "arm swing", "trunk sway", "walk + squat"} < set(table.columns)
     assert "fast walk" in outcome.out
     again = run("plan", "-o", tmp_path / "out")
     assert again.status == 0, again.err
