@@ -31,6 +31,7 @@ SOURCES = (
     "motion/regressor.py",
     "motion/marker_sums.py",
     "estimation/simultaneous/normal_equations.py",
+    "estimation/simultaneous/knot_interval.py",
     "estimation/simultaneous/marker_terms.py",
 )
 """Files of the package with compiled functions: those call one another."""

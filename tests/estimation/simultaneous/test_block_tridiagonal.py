@@ -34,6 +34,28 @@ def test_factor_and_solutions_agree_with_dense_cholesky(blocks, size):
     np.testing.assert_allclose(dense @ solution, right, atol=1e-10)
 
 
+@pytest.mark.parametrize("cut", [1, 3, 5])
+def test_two_parts_of_a_matrix_do_as_the_whole(cut):
+    """What the first part leaves to the second, and takes back of it."""
+    _, diagonal, below = random_system(6, 4)
+    right = np.random.default_rng(1).normal(size=(6, 4, 3))
+    whole = BlockBand.factor(diagonal, below)
+    first = BlockBand.factor(diagonal[:cut], below[:cut])
+    begun, rest = first.forward(right[:cut]), right[cut:].copy()
+    reach, left = first.below[-1], diagonal[cut:].copy()
+    left[0] -= reach @ reach.T
+    rest[0] -= reach @ begun[-1]
+    second = BlockBand.factor(left, below[cut:])
+    ended = second.backward(second.forward(rest))
+    found = np.concatenate([first.backward(begun, ended[0]), ended])
+    np.testing.assert_allclose(found, whole.backward(whole.forward(right)), atol=1e-12)
+    after, below_after = second.inverse_blocks()
+    before, below_before = first.inverse_blocks(after[0])
+    expected = whole.inverse_blocks()
+    np.testing.assert_allclose(np.concatenate([before, after]), expected[0], atol=1e-12)
+    np.testing.assert_allclose(np.concatenate([below_before, below_after]), expected[1], atol=1e-12)
+
+
 def test_a_matrix_that_is_not_positive_definite_is_refused():
     _, diagonal, below = random_system(4, 3)
     diagonal[2] -= 1e3 * np.eye(3)

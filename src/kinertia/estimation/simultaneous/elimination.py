@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
+
+_Lost: TypeAlias = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Factored:
     left: Carried | None
 
     @property
-    def lost(self) -> tuple[np.ndarray, np.ndarray]:
+    def lost(self) -> _Lost:
         """What it takes of the information on the static unknowns (S, S), and of its right-hand side (S,)."""
         flat = self.border.reshape(-1, self.border.shape[2])
         return flat.T @ flat, flat.T @ self.motion.ravel()
@@ -79,7 +82,7 @@ class TrialNormal:
     last: NormalEquations
     damping: float
     carried: tuple[Carried | None, ...]
-    lost: tuple[np.ndarray, np.ndarray]
+    lost: _Lost
 
 
 @dataclass(frozen=True)
@@ -124,11 +127,11 @@ def summed(stretches: Sequence[Stretch], of: Callable[[Stretch], NormalEquations
         of: makes the normal equations of one.
         damping: share by which the motion's diagonal is to be raised; trials of one stretch do not need to know.
     """
-    carried: list[Carried | None] = [None]
     normal = of(stretches[0])
     c, s = normal.border.shape[1:]
     static, static_right, right, cost = np.zeros((s, s)), np.zeros(s), np.zeros((stretches[-1].splines.stop, c)), 0.0
-    lost, lost_right = np.zeros((s, s)), np.zeros(s)
+    lost: _Lost = (np.zeros((s, s)), np.zeros(s))
+    carried: tuple[Carried | None, ...] = (None,)
     for k, stretch in enumerate(stretches):
         normal = of(stretch) if k else normal
         static += normal.static
@@ -137,20 +140,8 @@ def summed(stretches: Sequence[Stretch], of: Callable[[Stretch], NormalEquations
         cost += normal.cost
         if not stretch.is_last:
             part = factored(normal, stretch, damping, carried[-1])
-            lost, lost_right = (total + more for total, more in zip((lost, lost_right), part.lost, strict=True))
-            carried.append(part.left)
-    return TrialNormal(
-        static,
-        static_right,
-        right,
-        cost,
-        tuple(stretches),
-        of,
-        normal,
-        damping,
-        tuple(carried),
-        (lost, lost_right),
-    )
+            lost, carried = _both(lost, part.lost), (*carried, part.left)
+    return TrialNormal(static, static_right, right, cost, tuple(stretches), of, normal, damping, carried, lost)
 
 
 def reduced(normal: TrialNormal, damping: float) -> Reduced:
@@ -158,8 +149,12 @@ def reduced(normal: TrialNormal, damping: float) -> Reduced:
     if damping != normal.damping and len(normal.stretches) > 1:
         normal = summed(normal.stretches, normal.of, damping)
     last = factored(normal.last, normal.stretches[-1], damping, normal.carried[-1])
-    information, right = (before + own for before, own in zip(normal.lost, last.lost, strict=True))
+    information, right = _both(normal.lost, last.lost)
     return Reduced(normal.static - information, normal.static_right - right, normal, last)
+
+
+def _both(lost: _Lost, more: _Lost) -> _Lost:
+    return lost[0] + more[0], lost[1] + more[1]
 
 
 def factored(normal: NormalEquations, stretch: Stretch, damping: float, carried: Carried | None) -> Factored:

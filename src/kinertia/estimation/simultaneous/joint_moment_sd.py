@@ -184,14 +184,14 @@ class _MotionSpread:
     @classmethod
     def of(cls, part: Factored, c: int, root: np.ndarray, after: _MotionSpread | None) -> _MotionSpread:
         """Of a stretch, with this root (S, S) of the static unknowns' covariance; `after` is the next stretch's."""
-        known = (None, None) if after is None else (after.carried[:SPLINES_PER_BLOCK], after.diagonal[0])
-        diagonal, below = part.band.inverse_blocks(known[1])
-        flat = None if known[0] is None else known[0].reshape(-1, len(root))
-        carried = part.band.backward(part.border @ root, flat).reshape(-1, c, len(root))
-        if after is not None:
-            diagonal = np.append(diagonal, after.diagonal[:1], axis=0)
-            carried = np.append(carried, after.carried[:SPLINES_PER_BLOCK], axis=0)
-        return cls(part.stretch.splines.start, diagonal, below, carried)
+        start, size = part.stretch.splines.start, len(root)
+        if after is None:
+            carried = part.band.backward(part.border @ root)
+            return cls(start, *part.band.inverse_blocks(), carried.reshape(-1, c, size))
+        block, first = after.diagonal[:1], after.carried[:SPLINES_PER_BLOCK]
+        carried = part.band.backward(part.border @ root, first.reshape(-1, size)).reshape(-1, c, size)
+        diagonal, below = part.band.inverse_blocks(block[0])
+        return cls(start, np.append(diagonal, block, axis=0), below, np.append(carried, first, axis=0))
 
     def of_moments(self, first: np.ndarray, through: np.ndarray, still: np.ndarray, repeats: float) -> np.ndarray:
         """(d, c) variances of moments.

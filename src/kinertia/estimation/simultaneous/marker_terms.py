@@ -20,16 +20,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
+from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled
 from kinertia.model.kinematic_tree import KinematicTree, place_axes
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.spatial import inner
 from kinertia.motion.marker_sums import add_force, add_marker, hand_down, met_force, place_marker, swapped
-
-_TOGETHER = SPLINES_PER_BLOCK + 1
 
 
 @dataclass(frozen=True)
@@ -90,20 +89,6 @@ class _Placed(NamedTuple):
     places: np.ndarray
     errors: np.ndarray
     turned: np.ndarray
-
-
-class _Interval(NamedTuple):
-    """Terms of the frames of a knot interval, and of the one after them.
-
-    Attributes:
-        squares: (3, f, c c) J^T W J of each frame with itself, with the next, and the latter transposed.
-        across: (f + 1, c, k + 3 m) J^T W S.
-        gradient: (f, c) J^T W r.
-    """
-
-    squares: np.ndarray
-    across: np.ndarray
-    gradient: np.ndarray
 
 
 class _Static(NamedTuple):
@@ -184,8 +169,8 @@ def _add(
     start, stop = own
     c, a, s = band.shape[2], len(markers.column), border.shape[2]
     placed = _Placed(np.empty((3, a, 6)), np.empty((3, m, 3)), np.empty((3, m, 3)), np.empty((3, m, 3, 3)))
-    most = _longest_run(first)
-    interval = _Interval(np.empty((3, most, c * c)), np.zeros((most + 1, c, s)), np.empty((most, c)))
+    most = longest_run(first)
+    interval = Interval(np.empty((3, most, c * c)), np.zeros((most + 1, c, s)), np.empty((most, c)))
     if start > 0:
         _place(markers, start - 1, placed)
     _place(markers, start, placed)
@@ -202,22 +187,12 @@ def _add(
             _frame(markers, k, k - start, still, placed, interval, static)
             if k + 1 < n:
                 _pair(markers, k, k - start, still, placed, interval, static)
-        _to_splines(first, values, start, end, interval, band, border, right)
+        to_splines(first, values, start, end, interval, band, border, right)
         interval.across[0] = interval.across[end - start]
         start = end
     if stop < n:
         # of the frame after them, only what it has in common with the last
-        _to_border(first[stop], values[stop], interval.across[0], border)
-
-
-@compiled
-def _longest_run(first: np.ndarray) -> int:
-    """The most frames of an interval."""
-    longest, run = 1, 1
-    for k in range(1, len(first)):
-        run = run + 1 if first[k] == first[k - 1] else 1
-        longest = max(longest, run)
-    return longest
+        to_border(first[stop], values[stop], interval.across[0], border)
 
 
 @compiled
@@ -240,7 +215,7 @@ def _place(markers: _Markers, k: int, placed: _Placed) -> None:
 
 @compiled
 def _frame(
-    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: _Interval, static: _Static
+    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
 ) -> None:
     """J^T W J of frame k with itself; J^T W S of marker positions and J^T W r, W r being of three frames."""
     a, m, here = len(markers.column), len(markers.carrier), k % 3
@@ -299,7 +274,7 @@ def _by_place(
     placed: _Placed,
     pull: np.ndarray,
     directions: np.ndarray,
-    interval: _Interval,
+    interval: Interval,
     static: _Static,
 ) -> None:
     """Terms of the markers' positions in their segments: across the coordinates, with themselves, and of r."""
@@ -336,7 +311,7 @@ def _by_place(
 
 @compiled
 def _pair(
-    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: _Interval, static: _Static
+    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
 ) -> None:
     """J^T W J of frame k with the next."""
     a, here, there = len(markers.column), k % 3, (k + 1) % 3
@@ -387,57 +362,3 @@ def _sort(column: np.ndarray, product: np.ndarray, squares: np.ndarray, across: 
                         across[column[i], column[j] - c] += value
                 elif column[j] >= c:
                     square[column[i] - c, column[j] - c] += value
-
-
-@compiled
-def _to_splines(
-    first: np.ndarray,
-    values: np.ndarray,
-    start: int,
-    end: int,
-    interval: _Interval,
-    band: np.ndarray,
-    border: np.ndarray,
-    right: np.ndarray,
-) -> None:
-    """Weigh the terms of an interval with the splines that are active, two by two."""
-    n, size, c, at = len(first), len(band), right.shape[1], first[start]
-    later = np.zeros(_TOGETHER)
-    for k in range(start, end):
-        own, row = values[k], k - start
-        now, after = interval.squares[0, row], interval.squares[1, row]
-        turned, across, gradient = interval.squares[2, row], interval.across[row], interval.gradient[row]
-        for i in range(_TOGETHER):
-            later[i] = 0.0
-        if k + 1 < n:
-            for i in range(6):
-                later[first[k + 1] - at + i] = values[k + 1, i]
-        for i in range(_TOGETHER):
-            here = own[i] if i < 6 else 0.0
-            for j in range(i, min(_TOGETHER, size - at)):
-                there = own[j] if j < 6 else 0.0
-                _add_rows(here * there, now, here * later[j], after, there * later[i], turned, band[at + i, j - i])
-        for i in range(6):
-            for j in range(c):
-                right[at + i, j] += own[i] * gradient[j]
-        _to_border(at, own, across, border)
-
-
-@compiled
-def _to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarray) -> None:
-    """Weigh terms (c, s) of a frame with the six splines from `at` on."""
-    for i in range(6):
-        for j in range(across.shape[0]):
-            for s in range(across.shape[1]):
-                border[at + i, j, s] += weights[i] * across[j, s]
-
-
-@compiled
-def _add_rows(
-    a: float, first: np.ndarray, b: float, second: np.ndarray, c: float, third: np.ndarray, out: np.ndarray
-) -> None:
-    """out += a first + b second + c third, of rows (k k,) and a matrix (k, k)."""
-    k = len(out)
-    for i in range(k):
-        for j in range(k):
-            out[i, j] += a * first[i * k + j] + b * second[i * k + j] + c * third[i * k + j]
