@@ -44,15 +44,15 @@ def made_up(scale: float, seed: int = 0) -> Draw:
 def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
     good, small = (summarised("made up", [made_up(scale, seed) for seed in range(200)]) for scale in (1.0, 2.0))
     for name in (*CLASSES, "measured", "informed", "assumed"):
-        assert good.classes[name].cover == pytest.approx(0.95, abs=0.015)
+        assert good.classes[name].coverage == pytest.approx(0.95, abs=0.015)
         assert good.classes[name].ratio == pytest.approx(1.0, abs=0.04)
-        assert small.classes[name].cover == pytest.approx(0.673, abs=0.03)
+        assert small.classes[name].coverage == pytest.approx(0.673, abs=0.03)
         assert small.classes[name].ratio == pytest.approx(2.0, abs=0.08)
     assert good.classes["measured"].rms == pytest.approx(0.25, rel=0.1)
     assert good.classes["measured"].rms_literature == pytest.approx(1.0, rel=0.1)
     assert good.classes["mass"].better > 0.99
     knee = good.joints["knee"]
-    assert (knee.moment_nm, knee.moment_sd_nm, knee.cover, knee.usual_nm) == pytest.approx((2.0, 3.0, 0.9, 4.0))
+    assert (knee.moment_nm, knee.moment_sd_nm, knee.coverage, knee.usual_nm) == pytest.approx((2.0, 3.0, 0.9, 4.0))
     angles = (knee.angle_rad, knee.angle_ik_rad, knee.change_rad, knee.change_ik_rad)
     assert angles == pytest.approx((0.1, 0.2, 0.05, 0.3))
 
@@ -83,18 +83,18 @@ def test_people_are_the_same_in_every_scenario():
 
 @in_one_process()
 def test_bars_hold_short_form():
-    """Eight people: cover cannot be told better than to some percent."""
+    """Eight people: coverage cannot be told better than to some percent."""
     found = run_accuracy({"artefact": replace(PROOF["artefact"], walk_s=SHORT_S)}, 8)["artefact"]
     assert found.converged == 1.0
     for name in CLASSES:
         accuracy = found.classes[name]
-        assert accuracy.cover > 0.90
+        assert accuracy.coverage > 0.90
         assert 0.75 < accuracy.ratio < 1.25
         assert accuracy.rms < 1.3 * accuracy.bound
     assert found.classes["mass"].rms < found.classes["mass"].rms_literature
     assert found.classes["CoM"].rms < found.classes["CoM"].rms_literature
     for joint in JOINTS:
-        assert found.joints[joint].cover > 0.92
+        assert found.joints[joint].coverage > 0.92
         if joint.startswith(("hip", "lumbar")):
             assert found.joints[joint].moment_nm < 0.9 * found.joints[joint].usual_nm
 
@@ -104,11 +104,11 @@ def test_bars_hold_short_form():
 def test_bars_hold(key):
     found = run_accuracy({key: PROOF[key]}, 40)[key]
     for name in CLASSES:
-        assert 0.92 < found.classes[name].cover < 0.98
+        assert 0.92 < found.classes[name].coverage < 0.98
         assert 0.85 < found.classes[name].ratio < 1.15
         assert found.classes[name].rms < 1.3 * found.classes[name].bound
     for joint in JOINTS:
-        assert found.joints[joint].cover > 0.93
+        assert found.joints[joint].coverage > 0.93
 
 
 def test_faults_are_what_they_say(trial):

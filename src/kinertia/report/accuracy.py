@@ -28,8 +28,8 @@ def accuracy_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     for name, found in scenario.classes.items():
         factor, unit, form = _SHOWN.get(name, (1.0, "prior sd", ".2f"))
         errors = (f"{factor * value:{form}}" for value in (found.rms, found.bound, found.rms_literature))
-        cover = f"{100 * found.cover:.1f} ± {100 * found.cover_sd:.1f} %"
-        rows.append([f"{name} ({unit})", cover, f"{found.ratio:.2f}", *errors, _better(found)])
+        coverage = f"{100 * found.coverage:.1f} ± {100 * found.coverage_sd:.1f} %"
+        rows.append([f"{name} ({unit})", coverage, f"{found.ratio:.2f}", *errors, _better(found)])
     return rows
 
 
@@ -53,7 +53,7 @@ def joint_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     for joint, found in scenario.joints.items():
         angles = (found.angle_rad, found.angle_ik_rad, found.change_rad, found.change_ik_rad)
         moments = [f"{found.moment_nm:.2f}", f"{found.usual_nm:.2f}", f"{found.moment_nm / found.usual_nm:.2f}"]
-        deviation = f"{found.moment_sd_nm:.2f} ({100 * found.cover:.0f} %)"
+        deviation = f"{found.moment_sd_nm:.2f} ({100 * found.coverage:.0f} %)"
         rows.append([joint, *moments, deviation, *(f"{np.degrees(angle):.2f}" for angle in angles)])
     return rows
 

@@ -1,7 +1,7 @@
 """Do the error bars hold? Many people drawn from the literature prior walk, are measured and estimated.
 
 `run_accuracy` draws persons and noise, estimates from what a laboratory would have (`disturbed.measured`), and compares
-errors with error bars: how often the truth lies within 95 % intervals (cover), RMS error over posterior deviation
+errors with error bars: how often the truth lies within 95 % intervals (coverage), RMS error over posterior deviation
 (ratio), and errors against those of the literature. A draw depends on seed, scenario and its number only.
 """
 
@@ -122,8 +122,8 @@ class ClassAccuracy:
     """One class of parameters over all draws of a scenario; those by evidence are in prior deviations.
 
     Attributes:
-        cover: share of parameters within their 95 % interval.
-        cover_sd: its standard error over draws.
+        coverage: share of parameters within their 95 % interval.
+        coverage_sd: its standard error over draws.
         ratio: RMS of error over posterior deviation.
         rms, rms_literature: RMS errors of the estimate and the literature, SI.
         bound: RMS of the Cramér-Rao bound of the estimator's own noise model at the truth, prior included, SI.
@@ -131,8 +131,8 @@ class ClassAccuracy:
         attainable: what this share would be for an estimate at the bound; NaN for classes by evidence.
     """
 
-    cover: float
-    cover_sd: float
+    coverage: float
+    coverage_sd: float
     ratio: float
     rms: float
     rms_literature: float

@@ -40,7 +40,7 @@ class JointErrors:
     Attributes:
         moment: error of the estimate's joint moments, (N m)^2.
         moment_variance: what the estimate says of it.
-        moment_cover: share of frames within the 95 % intervals.
+        moment_coverage: share of frames within the 95 % intervals.
         usual: error of the usual pipeline's joint moments, by USUAL_HZ.
         angle, angle_ik: errors of the joint angles, rad^2, by the estimate and by inverse kinematics.
         change, change_ik: the same after taking off each angle's mean error: what varies in time.
@@ -48,7 +48,7 @@ class JointErrors:
 
     moment: float
     moment_variance: float
-    moment_cover: float
+    moment_coverage: float
     usual: tuple[float, ...]
     angle: float
     angle_ik: float
@@ -61,7 +61,8 @@ class JointAccuracy:
     """One joint over all people: RMS errors.
 
     Attributes:
-        moment_nm, moment_sd_nm, cover: of the joint moments, their posterior deviation, and cover of 95 % intervals.
+        moment_nm, moment_sd_nm: of the joint moments, and their posterior deviation.
+        coverage: of the joint moments by 95 % intervals.
         usual_nm: of the usual pipeline's joint moments, at the best of USUAL_HZ.
         angle_rad, angle_ik_rad: of joint angles by the estimate and by inverse kinematics.
         change_rad, change_ik_rad: the same without each angle's mean error.
@@ -69,7 +70,7 @@ class JointAccuracy:
 
     moment_nm: float
     moment_sd_nm: float
-    cover: float
+    coverage: float
     usual_nm: float
     angle_rad: float
     angle_ik_rad: float
@@ -131,7 +132,7 @@ def joint_errors(
         result[joint] = JointErrors(
             moment=_square(wrong[:, own]),
             moment_variance=_square(moment_sd[:, own]),
-            moment_cover=float(np.mean(np.abs(wrong[:, own]) < WITHIN * moment_sd[:, own])),
+            moment_coverage=float(np.mean(np.abs(wrong[:, own]) < WITHIN * moment_sd[:, own])),
             usual=tuple(_square(each[:, own]) for each in usual),
             angle=_square(off[0][:, own]),
             angle_ik=_square(off[1][:, own]),
@@ -154,7 +155,7 @@ def joint_accuracy(people: Sequence[JointErrors]) -> JointAccuracy:
     return JointAccuracy(
         moment_nm=rms("moment"),
         moment_sd_nm=rms("moment_variance"),
-        cover=float(np.mean([one.moment_cover for one in people])),
+        coverage=float(np.mean([one.moment_coverage for one in people])),
         usual_nm=float(np.sqrt(np.mean([one.usual for one in people], axis=0).min())),
         angle_rad=rms("angle"),
         angle_ik_rad=rms("angle_ik"),
