@@ -22,6 +22,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io.recording import read_recording
 from kinertia.report import extras
 from kinertia.settings import Settings, Subject
+from once import once
 from quick_two_level import given_back
 from walks import fit_arguments
 
@@ -68,8 +69,10 @@ def fit_of(shared_data, tmp_path_factory):
 
     def get(name):
         if name not in done:
-            folder = tmp_path_factory.mktemp(name) / "results" / "out"
-            done[name] = fitted(folder, *fit_arguments(shared_data, name))
+            arguments = fit_arguments(shared_data, name)
+            done[name] = once(
+                tmp_path_factory, f"fit-{name}", lambda made: fitted(made / "results" / "out", *arguments)
+            )
         return done[name]
 
     return get
@@ -81,22 +84,39 @@ def fit_with_model(shared_data, tmp_path_factory):
     done: dict[tuple[str, bool], Path] = {}
 
     def get(name: str, calibrate: bool) -> Path:
-        if (name, calibrate) not in done:
-            folder = tmp_path_factory.mktemp(name)
+        def make(folder: Path) -> Path:
             subject = folder / f"{name}.toml"
             subject.write_text(osim_models.subject_file(shared_data, osim_models.PEOPLE[name], calibrate))
-            done[name, calibrate] = fitted(folder / "out", subject).folder
+            return fitted(folder / "out", subject).folder
+
+        if (name, calibrate) not in done:
+            done[name, calibrate] = once(tmp_path_factory, f"model-{name}-{calibrate}", make)
         return done[name, calibrate]
 
     return get
 
 
 @pytest.fixture(scope="session")
-def demo_run(tmp_path_factory) -> tuple[Demo, Path]:
-    """Outcome of `run_demo` and its folder, with a two-level estimate that stays at its start."""
+def demo_command(tmp_path_factory) -> tuple[Demo, Path, Outcome]:
+    """Outcome of `run_demo`, its folder, and of the command; with a two-level estimate that stays at its start."""
     folder = tmp_path_factory.mktemp("demo") / "out"
-    with mock.patch("kinertia.estimation.estimate.estimate_two_level", given_back):
-        return run_demo(folder), folder
+    kept = []
+
+    def keep(*arguments, **options):
+        kept.append(run_demo(*arguments, **options))
+        return kept[-1]
+
+    two_level = mock.patch("kinertia.estimation.estimate.estimate_two_level", given_back)
+    with two_level, mock.patch("kinertia.cli.demo.run_demo", keep):
+        outcome = run("demo", "-o", folder)
+    assert outcome.status == 0, outcome.err
+    return kept[0], folder, outcome
+
+
+@pytest.fixture(scope="session")
+def demo_run(demo_command) -> tuple[Demo, Path]:
+    """Outcome of `run_demo` and its folder."""
+    return demo_command[:2]
 
 
 @pytest.fixture(scope="session")

@@ -14,13 +14,6 @@ from kinertia.estimation.prepare import prepare
 from kinertia.io.subject_file import read_subject
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.synthetic.walk import unlike_literature, walking_subject
-from quick_two_level import given_back
-
-
-@pytest.fixture
-def quick_estimator(monkeypatch):
-    """The pipeline with an estimator that gives back its start: all but the seconds of iterating."""
-    monkeypatch.setattr("kinertia.estimation.estimate.estimate_two_level", given_back)
 
 
 def check_outcome(outcome, folder):
@@ -48,9 +41,9 @@ def check_outcome(outcome, folder):
     assert "joint moments, RMS error against the truth (N m)" in outcome.out
 
 
-def test_demo_without_the_iterations(tmp_path, quick_estimator):
-    folder = tmp_path / "out"
-    check_outcome(run("demo", "-o", folder), folder)
+def test_demo_without_the_iterations(demo_command):
+    _, folder, outcome = demo_command
+    check_outcome(outcome, folder)
 
 
 @pytest.mark.slow

@@ -50,6 +50,11 @@ def test_prediction_is_what_a_fit_then_reports(prior, trials, planned, chosen):
     assert planned.counts(chosen)["measured"] == pytest.approx((told > 0.75).sum(), abs=3)
 
 
+def test_a_walk_shows_more_than_squats_and_both_more_than_one(planned):
+    walked, squatted, both = (planned.information(names).mean() for names in (("walk",), ("squat",), ("walk", "squat")))
+    assert squatted < walked < both
+
+
 def test_more_recordings_never_say_less(planned):
     both = planned.sd["walk", "squat"]
     for alone in (("walk",), ("squat",)):
@@ -99,6 +104,7 @@ def test_standing_feet_stay():
     assert np.abs(turned - turned[0]).max() < 0.35
 
 
+@pytest.mark.slow
 def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
     found = plan_synthetic()
     assert set(MOTIONS) < set(found.table.columns)

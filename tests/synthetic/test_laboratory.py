@@ -33,9 +33,12 @@ def measured(request, subject, trial):
 
 
 def read_back(folder, measured, kind):
-    # in a process of its own: once opensim has been at work in this one, ezc3d cannot write (both are SWIG modules)
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        wanted = read_subject(pool.apply(write_lab, (folder / "lab", measured, kind)))
+    if kind == "trc":
+        wanted = read_subject(write_lab(folder / "lab", measured, kind))
+    else:
+        # in a process of its own: once opensim has been at work in this one, ezc3d cannot write (both are SWIG modules)
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            wanted = read_subject(pool.apply(write_lab, (folder / "lab", measured, kind)))
     static, (walked,), _ = read_inputs(wanted)
     return wanted, static, walked.recording
 
