@@ -10,6 +10,7 @@ import pytest
 
 import command_speed
 import measured_trials
+from long_trials import document, in_own_process
 
 
 def test_there_and_back_does_not_jump():
@@ -68,3 +69,13 @@ def test_a_process_is_timed_whole_and_may_not_fail():
     assert 0.0 < processor < clock
     with pytest.raises(subprocess.CalledProcessError):
         command_speed.spent([sys.executable, "-c", "raise SystemExit(1)"])
+
+
+@pytest.mark.slow
+def test_three_minutes_take_little_more_memory_than_one():
+    """The normal equations of three minutes alone would be 370 MB, and took 2.4 GB with what was made of them."""
+    pytest.importorskip("resource", reason="no peak of memory on Windows")
+    three = in_own_process(3.0)
+    assert three.frames == 18000
+    assert three.estimate_mb < 1000
+    assert f"| 3 min | 18000 | {three.before_mb:.0f} |" in document([three])

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 
 from kinertia.motion.kinematics import Kinematics
@@ -83,9 +83,9 @@ class GroundReactions:
         return np.concatenate([by_force, by_torque + np.cross(by_point, force) + np.cross(point, by_force)], axis=-1)
 
     @cached_property
-    def _spline(self) -> CubicSpline:
+    def _spline(self) -> BSpline:
         columns = np.stack([self.wrench[..., :3], self.point, self.torque], axis=2)
-        return CubicSpline(self.time, columns, bc_type="natural")
+        return make_interp_spline(self.time, columns, k=3, bc_type="natural")
 
     def impact_at(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) `impact` at the samples nearest to these times."""
