@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 import sys
 
 import pytest
@@ -32,3 +33,21 @@ def test_number_of_processes(monkeypatch, system, cores, wanted, cases, count):
     monkeypatch.setattr(sys, "platform", system)
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     assert process_count(wanted, cases) == count
+
+
+def test_an_interruption_waits_until_the_processes_have_started(monkeypatch):
+    started = []
+
+    def submit(self, task, case):
+        signal.raise_signal(signal.SIGINT)
+        started.append(case)
+
+    monkeypatch.setattr("kinertia.studies.parallel.ProcessPoolExecutor.submit", submit)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            in_parallel(abs, [1, 2])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert started == [1, 2]

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from multiprocessing import get_context
+from types import FrameType
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -38,13 +41,30 @@ def in_parallel(
     # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
     try:
-        futures = [pool.submit(task, case) for case in cases]
+        with _interrupted_later():
+            futures = [pool.submit(task, case) for case in cases]
         for done, future in enumerate(as_completed(futures), start=1):
             future.result()
             progress(done / len(cases))
         return [future.result() for future in futures]
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _interrupted_later() -> Iterator[None]:
+    """Ctrl-C waits until processes have what they start from: of its lack they would complain with tracebacks."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[tuple[int, FrameType | None]] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: caught.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if caught and callable(before):
+        before(*caught[0])
 
 
 def process_count(wanted: int | None, cases: int) -> int:
