@@ -100,7 +100,7 @@ def measured(minutes: float) -> Long:
 
 def in_own_process(minutes: float) -> Long:
     """The same, where nothing else is in memory."""
-    told = subprocess.run([sys.executable, __file__, "--alone", str(minutes)], check=True, capture_output=True)
+    told = subprocess.run([sys.executable, __file__, "--alone", str(minutes)], check=True, stdout=subprocess.PIPE)
     return Long(**json.loads(told.stdout))
 
 
