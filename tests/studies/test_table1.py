@@ -87,10 +87,8 @@ def test_starts_are_off_by_up_to_a_half(one):
 
 @pytest.mark.slow
 def test_bit_for_bit_whatever_the_workers_and_the_number_of_draws(trial):
-    """Draw 0 of two draws in two processes is the only draw in this process."""
-    two = run_table1(trial, repeats=2, seed=1, workers=2)
-    with in_one_process():
-        one = run_table1(trial, repeats=1, seed=1)
+    """Draw 0 of two draws in two processes is the only draw in one process."""
+    one, two = (run_table1(trial, repeats=count, seed=1, workers=count) for count in (1, 2))
     first, alone = table1_json(two)["draws"][0], table1_json(one)["draws"][0]
     assert json.dumps(first) == json.dumps(alone)
     assert two.draws[0].start_errors.tolist() != two.draws[1].start_errors.tolist()
