@@ -41,7 +41,7 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
     exact = replace(
         at_truth(seen, trial),
         marker_sd=np.full_like(seen.marker_sd, _NOTHING_M),
-        marker_autocorrelation=0.0,
+        marker_frames=1.0,
         force_sd=EXACT_N,
         moment_sd=0.3 * EXACT_N,
     )

@@ -77,7 +77,7 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     seen = observation_of(trial, noisy)
     found["simultaneous"] = simultaneous(seen)
     white = np.full_like(seen.marker_sd, np.std(noisy.positions - trial.markers.positions))
-    found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white, marker_autocorrelation=0.0))
+    found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white, marker_frames=1.0))
     found["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
     sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
     found["forces three times as sure"] = simultaneous(sure)
@@ -86,7 +86,7 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     )
     found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
     sharp = observation_of(trial, camera_noise(trial.markers, CAMERA_SD_M, rng))
-    sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_autocorrelation=0.0)
+    sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_frames=1.0)
     found["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
     return {name: errors(bsp, trial.bsp) for name, bsp in found.items()}
 

@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.marker_errors import double_pole
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.gait27 import HIP_OFFSETS
@@ -49,13 +51,23 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
         time=trial.time,
         markers=markers,
         marker_sd=np.linspace(0.01, 0.03, len(KEPT)),
-        marker_autocorrelation=0.8,
+        marker_frames=9.0,
         q=trial.motion.q,
         dynamic=dynamic,
         ground=small_ground(trial, rng),
         force_sd=6.0,
         moment_sd=2.0,
+        skin=small_skin(trial.skeleton, len(trial.time)),
     )
+
+
+def small_skin(skeleton: Skeleton, frames: int) -> SkinPatterns:
+    """Two segments follow two patterns each, one of them with two markers; the others none."""
+    values = np.random.default_rng(3).normal(0.0, 0.3, (frames, 4))
+    found = skeleton.marker_segments
+    one, other = found[0], found[-1]
+    first = np.select([found == one, found == other], [0, 2])
+    return SkinPatterns(values, first, first + 2 * np.isin(found, [one, other]))
 
 
 def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
@@ -97,12 +109,13 @@ def curved_problem(path: Path) -> MapProblem:
         time=time,
         markers=markers + rng.normal(0.0, 0.01, markers.shape),
         marker_sd=np.linspace(0.01, 0.03, 5),
-        marker_autocorrelation=0.8,
+        marker_frames=9.0,
         q=motion.q,
         dynamic=np.arange(13) > 1,
         ground=FootPlates.one_per_foot(smooth(time, rng.normal(0.0, 50.0, (13, 12)), 15.0), 13),
         force_sd=6.0,
         moment_sd=2.0,
+        skin=small_skin(skeleton, 13),
     )
     prior = BspPrior(ours.bsp, np.diag(np.square(np.full(20, 0.01))), 13.0, 0.1)
     calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), PLATES, FLOOR, CLOCK)
@@ -123,7 +136,13 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     skeleton, rigid = _body(problem, tuple(static))
     q, qd, qdd = problem.bases[k].evaluate(coefficients)
     pose = skeleton.pose(q)
-    errors = whitened(trial.markers - skeleton.marker_positions(pose), trial.marker_sd, trial.marker_autocorrelation)
+    positions = skeleton.marker_positions(pose)
+    skin, coefficient = trial.skin, iter(static[layout.skin])
+    for m, segment in enumerate(skeleton.marker_segments):
+        for pattern in range(skin.first[m], skin.last[m]):
+            along = [next(coefficient) for _ in range(3)]
+            positions[:, m] += skin.values[:, pattern, None] * (pose.rotation[:, segment] @ along)
+    errors = whitened(trial.markers - positions, trial.marker_sd, trial.marker_frames)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
     floor = [*static[layout.plates][-2:], 0.0, 0.0]
     values = dict(zip(problem.plates, static[layout.plates][:-2].reshape(-1, 4) + floor, strict=True))
@@ -150,13 +169,15 @@ def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin
     return skeleton, pinocchio_model(skeleton, problem.bsp(values))
 
 
-def whitened(errors: np.ndarray, sd: np.ndarray, autocorrelation: float) -> np.ndarray:
-    """Errors (n, m, 3) of a first-order autoregressive process as independent ones, by the dense covariance of every
-    run of frames without a gap."""
+def whitened(errors: np.ndarray, sd: np.ndarray, frames: float) -> np.ndarray:
+    """Errors (n, m, 3) of an autoregressive process with a double pole as independent ones, by the dense covariance of
+    every run of frames without a gap."""
+    r = double_pole(frames)
     result = []
     for j in range(errors.shape[1]):
         seen = np.flatnonzero(np.isfinite(errors[:, j, 0]))
         for run in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
-            covariance = sd[j] ** 2 * autocorrelation ** np.abs(run[:, None] - run)
+            lag = np.abs(run[:, None] - run)
+            covariance = sd[j] ** 2 * r**lag * (1.0 + lag * (1.0 - r * r) / (1.0 + r * r))
             result.append(np.linalg.solve(np.linalg.cholesky(covariance), errors[run, j]).ravel())
     return np.concatenate(result)

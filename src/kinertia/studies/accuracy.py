@@ -75,6 +75,13 @@ PROOF = {
         "skin motion; left plate 20 mm off, forces 10 ms late, hip centres 10 mm off",
         Faults("artefact", hips_m=0.010, plate_m=0.020, late_s=0.010),
     ),
+    "mixed": Scenario(
+        "skin motion, two thirds of it linear in joint angles, calibration errors", Faults("mixed", calibration=True)
+    ),
+    "clusters": Scenario(
+        "skin motion of rigid clusters with the stride, not the joints; calibration errors",
+        Faults("clusters", calibration=True),
+    ),
     "walks": Scenario("skin motion, twelve strides at two paces", Faults("artefact"), others=("walk", "fast walk")),
     "session": Scenario(
         "skin motion, calibration errors; squats, arm swings and trunk sway besides the walk",

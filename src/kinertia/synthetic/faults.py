@@ -20,10 +20,13 @@ from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
+from kinertia.synthetic.skin_clusters import ClusterMotion
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.data import FootLoads, Markers, Trial
 
 CAMERA_SD_M = 0.0005
+LINEAR_SHARE = {"artefact": 1.0, "mixed": 2.0 / 3.0, "clusters": 0.0}
+"""Of the variance of skin motion, what goes with the joints."""
 WOBBLE_HZ, WOBBLE_DAMPING = 10.0, 0.3
 """Soft tissue of the thigh on its springs: natural frequency and damping ratio (Gruber et al. 1998, J Biomech 31)."""
 
@@ -33,7 +36,9 @@ class Faults:
     """What is wrong in a laboratory beside the noise of the markers.
 
     Attributes:
-        noise: "study" (`noise.study_noise`) or "artefact" (`noise.SkinMotion` and 0.5 mm of camera noise).
+        noise: "study" (`noise.study_noise`); or skin and 0.5 mm of camera noise: "artefact" goes with the joints
+            (`noise.SkinMotion`), "clusters" with the stride (`skin_clusters.ClusterMotion`), of "mixed" two thirds of
+            the variance are the first and one third the second.
         amplitude: factor on that noise, but for the cameras'.
         calibration: joint centres, markers, plates and clock are off by errors drawn from the estimator's own prior.
         axes_rad: the axes of knees, ankles and elbows are tilted by this much, each in its own direction.
@@ -44,7 +49,7 @@ class Faults:
         late_s: forces are recorded late by this.
     """
 
-    noise: Literal["study", "artefact"]
+    noise: Literal["study", "artefact", "clusters", "mixed"]
     amplitude: float = 1.0
     calibration: bool = False
     axes_rad: float = 0.0
@@ -86,13 +91,23 @@ def measured(
 def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator) -> list[Markers]:
     """The markers of each trial with noise."""
     first, *others = (trial.motion.q for trial in trials)
-    skin = SkinMotion.draw(trials[0].skeleton, first, rng, others) if faults.noise == "artefact" else None
+    skin: list[tuple[float, SkinMotion | ClusterMotion]] = []
+    if faults.noise in LINEAR_SHARE:
+        linear = LINEAR_SHARE[faults.noise]
+        if linear > 0.0:
+            skin.append((np.sqrt(linear), SkinMotion.draw(trials[0].skeleton, first, rng, others)))
+        if linear < 1.0:
+            skin.append((np.sqrt(1.0 - linear), ClusterMotion.draw(trials[0].skeleton, rng)))
     found = []
     for trial in trials:
-        exact = trial.markers
-        moved = study_noise(exact, rng) if skin is None else skin.moved(exact, trial.skeleton, trial.motion.q)
-        scaled = replace(exact, positions=exact.positions + faults.amplitude * (moved.positions - exact.positions))
-        found.append(scaled if skin is None else camera_noise(scaled, CAMERA_SD_M, rng))
+        exact, q = trial.markers, trial.motion.q
+        if not skin:
+            moved = study_noise(exact, rng).positions - exact.positions
+        else:
+            parts = (share * (each.moved(exact, trial.skeleton, q).positions - exact.positions) for share, each in skin)
+            moved = np.sum(list(parts), axis=0)
+        scaled = replace(exact, positions=exact.positions + faults.amplitude * moved)
+        found.append(camera_noise(scaled, CAMERA_SD_M, rng) if skin else scaled)
     return found
 
 

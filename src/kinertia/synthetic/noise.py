@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinertia.model.neighbouring_angles import neighbouring_angles
 from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads
 
@@ -34,6 +35,11 @@ def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
     phase = rng.uniform(0.0, 2 * np.pi, shape)
     time = (markers.time - markers.time[0])[:, None, None]
     return replace(markers, positions=markers.positions + amplitude * np.sin(rate * time + phase))
+
+
+def artefact_range(segment: str) -> tuple[float, float]:
+    """Smallest and largest peak-to-peak displacement of a segment's markers over a step, m."""
+    return ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +69,9 @@ class SkinMotion:
         for segment in skeleton.segments:
             if not any(marker.segment == segment for marker in skeleton.markers):
                 continue
-            columns = _neighbouring(skeleton, segment)
+            columns = neighbouring_angles(skeleton, segment)
             directions = rng.standard_normal((len(columns), 3))
-            low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
+            low, high = artefact_range(segment)
             walking, overall = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
             extent = max(walking, overall / 2.0)
             slopes[segment] = directions * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
@@ -78,20 +84,10 @@ class SkinMotion:
         for segment, slopes in self.slopes.items():
             labels = [marker.label for marker in skeleton.markers if marker.segment == segment]
             columns = [markers.labels.index(label) for label in labels if label in markers.labels]
-            local = (q - self.reference)[:, _neighbouring(skeleton, segment)] @ slopes
+            local = (q - self.reference)[:, neighbouring_angles(skeleton, segment)] @ slopes
             turned = pose.rotation[:, skeleton.segments.index(segment)] @ local[..., None]
             positions[:, columns] += turned[:, None, :, 0]
         return replace(markers, positions=positions)
-
-
-def _neighbouring(skeleton: Skeleton, segment: str) -> list[int]:
-    """Columns of the angles of the joints at both ends of a segment; a massless one in between belongs to the joint."""
-    names = set()
-    for joint in skeleton.joints:
-        if joint.child == segment or joint.parent == segment:
-            names |= {axis.coordinate for axis in joint.axes if axis.kind == "rotation"}
-    chosen = [i for i, name in enumerate(skeleton.coordinates) if name in names and not name.startswith("pelvis")]
-    return chosen
 
 
 def camera_noise(markers: Markers, sd_m: float, rng: np.random.Generator) -> Markers:

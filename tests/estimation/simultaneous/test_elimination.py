@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous, root_of_covariance
 from kinertia.estimation.simultaneous.stretches import stretches
 from kinertia.synthetic.walk import walk, walking_subject
-from small_problem import point, small_ground, small_problem
+from small_problem import point, small_ground, small_problem, small_skin
 
 DAMPING = 1e-3
 
@@ -39,6 +39,7 @@ def longer_problem() -> MapProblem:
         q=trial.motion.q,
         dynamic=dynamic,
         ground=small_ground(trial, rng),
+        skin=small_skin(trial.skeleton, len(trial.time)),
     )
     return MapProblem(problem.skeleton, problem.prior, problem.calibration, [observation], 0.05)
 

@@ -38,7 +38,7 @@ def sloped(function, size: float) -> float:
     return (function(size) - function(-size)) / (2 * size)
 
 
-@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "plates", "clock"])
+@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "skin", "plates", "clock"])
 def test_gradient_of_static_unknowns(problem, here, kind):
     coefficients, static = here
     part = getattr(problem.layout, kind)

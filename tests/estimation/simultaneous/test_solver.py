@@ -59,7 +59,7 @@ def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: flo
         time=time[frames],
         markers=markers[frames],
         marker_sd=np.full(markers.shape[1], max(noise_m, 0.001)),
-        marker_autocorrelation=0.0,
+        marker_frames=1.0,
         q=trial.motion.q[frames],
         dynamic=np.ones(len(time[frames]), dtype=bool),
         ground=FootPlates.one_per_foot(smooth(time, loads, 25.0), len(time[frames])),

@@ -1,6 +1,6 @@
 """Terms of the frames of a knot interval, weighed with the splines that are active, in a trial's normal equations.
 
-The same six splines are active in all frames of an interval, and seven with the frame after it.
+The same six splines are active in all frames of an interval, and seven with the two frames after it.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK
 from kinertia.model.compiled import compiled
 
@@ -16,11 +17,12 @@ _TOGETHER = SPLINES_PER_BLOCK + 1
 
 
 class Interval(NamedTuple):
-    """Terms of the frames of a knot interval, and of the one after them.
+    """Terms of the frames of a knot interval, and of the two after them.
 
     Attributes:
-        squares: (3, f, c c) J^T W J of each frame with itself, with the next, and the latter transposed.
-        across: (f + 1, c, k + 3 m) J^T W S.
+        squares: (5, f, c c) J^T W J of each frame with itself, with the next, the latter transposed, and the same with
+            the second after it.
+        across: (f + 2, c, s) J^T W S.
         gradient: (f, c) J^T W r.
     """
 
@@ -52,25 +54,24 @@ def to_splines(
 ) -> None:
     """Weigh the terms of an interval with the splines that are active, two by two."""
     n, size, c, at = len(first), len(band), right.shape[1], first[start]
-    later = np.zeros(_TOGETHER)
+    own, weights = np.zeros((1 + LATER, _TOGETHER)), np.empty(1 + 2 * LATER)
     for k in range(start, end):
-        own, row = values[k], k - start
-        now, after = interval.squares[0, row], interval.squares[1, row]
-        turned, across, gradient = interval.squares[2, row], interval.across[row], interval.gradient[row]
-        for i in range(_TOGETHER):
-            later[i] = 0.0
-        if k + 1 < n:
+        row = k - start
+        own[:] = 0.0
+        for later in range(min(LATER, n - 1 - k) + 1):
             for i in range(6):
-                later[first[k + 1] - at + i] = values[k + 1, i]
+                own[later, first[k + later] - at + i] = values[k + later, i]
         for i in range(_TOGETHER):
-            here = own[i] if i < 6 else 0.0
             for j in range(i, min(_TOGETHER, size - at)):
-                there = own[j] if j < 6 else 0.0
-                _add_rows(here * there, now, here * later[j], after, there * later[i], turned, band[at + i, j - i])
+                weights[0] = own[0, i] * own[0, j]
+                for later in range(1, LATER + 1):
+                    weights[2 * later - 1] = own[0, i] * own[later, j]
+                    weights[2 * later] = own[later, i] * own[0, j]
+                _add_rows(weights, interval.squares[:, row], band[at + i, j - i])
         for i in range(6):
             for j in range(c):
-                right[at + i, j] += own[i] * gradient[j]
-        to_border(at, own, across, border)
+                right[at + i, j] += own[0, i] * interval.gradient[row, j]
+        to_border(at, values[k], interval.across[row], border)
 
 
 @compiled
@@ -83,11 +84,12 @@ def to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarr
 
 
 @compiled
-def _add_rows(
-    a: float, first: np.ndarray, b: float, second: np.ndarray, c: float, third: np.ndarray, out: np.ndarray
-) -> None:
-    """out += a first + b second + c third, of rows (k k,) and a matrix (k, k)."""
+def _add_rows(weights: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """out (k, k) += the sum of the rows (r, k k) in these weights (r,)."""
     k = len(out)
-    for i in range(k):
-        for j in range(k):
-            out[i, j] += a * first[i * k + j] + b * second[i * k + j] + c * third[i * k + j]
+    for r in range(len(weights)):
+        weight = weights[r]
+        if weight != 0.0:
+            for i in range(k):
+                for j in range(k):
+                    out[i, j] += weight * rows[r, i * k + j]

@@ -1,58 +1,28 @@
 """Terms of the markers in a trial's normal equations, for errors that are alike from frame to frame.
 
-The errors of a marker coordinate are a first-order autoregressive process: e[t] = a e[t-1] + white noise, with the same
-deviation in every frame. The inverse of its covariance, the information, is tridiagonal in time: a
-frame sees itself and its two neighbours, so the normal matrix stays banded. A gap starts the process anew.
-
-Slow skin motion (a near one) counts for few independent frames where the motion is slow, and hardly disturbs what is
-fast: accelerations, which the forces answer to.
-
-With J the derivative of the markers by the coordinates that move, S that by what does not (static coordinates, then
-marker positions), r = measured - model and W the information, the terms are J^T W J, J^T W S, J^T W r, S^T W S and
-S^T W r. They are summed over the frames of a knot interval, in which the same six splines are active, and seven with
-the frame after it.
+With J the derivative of the markers by the coordinates that move, S that by what does not (static coordinates, marker
+positions, then coefficients of skin motion: `skin`), r = measured - model and W the information on the errors
+(`marker_errors`), the terms are J^T W J, J^T W S, J^T W r, S^T W S and S^T W r. Frames meet the two after them. They
+are summed over the frames of a knot interval, in which the same six splines are active, and seven with those after it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
+from kinertia.estimation.simultaneous.marker_errors import LATER, ErrorInformation
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
+from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled
 from kinertia.model.kinematic_tree import KinematicTree, place_axes
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.spatial import inner
 from kinertia.motion.marker_sums import add_force, add_marker, hand_down, met_force, place_marker, swapped
-
-
-@dataclass(frozen=True)
-class ErrorInformation:
-    """Inverse covariance of the errors of m markers over n frames; the three axes are alike and independent.
-
-    Attributes:
-        own: (n, m) of each frame with itself, 1 / m^2; zero where the marker is not seen.
-        next: (n - 1, m) of each frame with the one after it.
-    """
-
-    own: np.ndarray
-    next: np.ndarray
-
-    @classmethod
-    def of(cls, seen: np.ndarray, sd_m: np.ndarray, autocorrelation: float) -> ErrorInformation:
-        """Of markers seen (n, m), with deviations sd_m (m,) and this correlation between neighbouring frames."""
-        both = seen[:-1] & seen[1:]
-        a = autocorrelation
-        own = seen.astype(float)
-        own[1:] += a**2 / (1.0 - a**2) * both
-        own[:-1] += a**2 / (1.0 - a**2) * both
-        weight = 1.0 / np.square(sd_m)
-        return cls(own * weight, -a / (1.0 - a**2) * both * weight)
 
 
 class _Markers(NamedTuple):
@@ -63,10 +33,12 @@ class _Markers(NamedTuple):
         column: (a,) place of each axis' coordinate among those that move, then those that do not.
         at, slopes: (n, a) places of the axes, rad or m, and their derivatives by the coordinates.
         carrier: (m,) the axis that carries each marker.
-        local: (m, 3) m, the markers in the frames of these axes.
+        local: (n, m, 3) m, the markers in the frames of these axes, displaced with the skin.
         turned: (m, 3, 3) the segments' axes in these frames.
         measured: (n, m, 3) m; NaN where not seen.
-        own, next: as `ErrorInformation` has them.
+        own, next, second: as `ErrorInformation` has them.
+        patterns, first, last: as `SkinPatterns` has them.
+        columns: (m,) where the coefficients of each marker begin among the columns of S.
     """
 
     tree: KinematicTree
@@ -79,11 +51,16 @@ class _Markers(NamedTuple):
     measured: np.ndarray
     own: np.ndarray
     next: np.ndarray
+    second: np.ndarray
+    patterns: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    columns: np.ndarray
 
 
 class _Placed(NamedTuple):
-    """Three neighbouring frames, in turn: axes (3, a, 6), and of the markers the places (3, m, 3) m, the errors
-    (3, m, 3) m (zero where not seen) and the axes of their segments (3, m, 3, 3)."""
+    """Five neighbouring frames, in turn: axes (5, a, 6), and of the markers the places (5, m, 3) m, the errors
+    (5, m, 3) m (zero where not seen) and the axes of their segments (5, m, 3, 3)."""
 
     axes: np.ndarray
     places: np.ndarray
@@ -92,7 +69,7 @@ class _Placed(NamedTuple):
 
 
 class _Static(NamedTuple):
-    """S^T W S (k + 3 m, k + 3 m), S^T W r (k + 3 m,) and r^T W r (1,)."""
+    """S^T W S (s, s), S^T W r (s,) and r^T W r (1,)."""
 
     square: np.ndarray
     right: np.ndarray
@@ -108,6 +85,7 @@ def add_markers(
     measured: np.ndarray,
     q: np.ndarray,
     deviation: tuple[np.ndarray, float],
+    skin: tuple[SkinPatterns, np.ndarray],
     moving: np.ndarray,
     still: np.ndarray,
 ) -> None:
@@ -121,7 +99,8 @@ def add_markers(
         skeleton: with static coordinates free.
         measured: (n, m, 3) m, in the stretch with its neighbours; NaN where not seen.
         q: (n, c) rad and m, in the same frames.
-        deviation: (m,) of each marker's errors, m, and their correlation between neighbouring frames.
+        deviation: (m,) of each marker's errors, m, and over how many neighbouring frames they are alike.
+        skin: its patterns in the same frames, and the coefficients (k,).
         moving, still: columns of q that move in time, and that do not.
     """
     information = ErrorInformation.of(np.isfinite(measured).all(axis=-1), *deviation)
@@ -129,17 +108,24 @@ def add_markers(
     place[np.concatenate([moving, still])] = np.arange(q.shape[1])
     at, slopes = skeleton.map.axes(q), skeleton.map.slopes(q)
     carrier, local = skeleton.carried_markers
+    turned = skeleton.tree.segment_rotation[skeleton.marker_segments]
+    patterns, coefficients = skin
     markers = _Markers(
         skeleton.tree,
         place[skeleton.map.owner],
         np.ascontiguousarray(at),
         np.ones_like(at) if slopes is None else np.ascontiguousarray(slopes),
         carrier,
-        local,
-        np.ascontiguousarray(skeleton.tree.segment_rotation[skeleton.marker_segments]),
+        local + (turned @ patterns.displaced(coefficients)[..., None])[..., 0],
+        np.ascontiguousarray(turned),
         np.ascontiguousarray(measured),
-        np.ascontiguousarray(information.own),
-        np.ascontiguousarray(information.next),
+        information.own,
+        information.next,
+        information.second,
+        np.ascontiguousarray(patterns.values),
+        patterns.first,
+        patterns.last,
+        len(still) + 3 * len(carrier) + patterns.begin[:-1],
     )
     border = normal.border[..., columns]
     static = _Static(normal.static[columns, columns], normal.static_right[columns], np.zeros(1))
@@ -162,49 +148,49 @@ def _add(
     right: np.ndarray,
     static: _Static,
 ) -> None:
-    """Frames own[0] to own[1] - 1, interval by interval, and each with the next; `first` and `values` are the motion
-    basis'.
+    """Frames own[0] to own[1] - 1, interval by interval, and each with the two after it; `first` and `values` are the
+    motion basis'.
     """
     n, m = markers.own.shape
     start, stop = own
     c, a, s = band.shape[2], len(markers.column), border.shape[2]
-    placed = _Placed(np.empty((3, a, 6)), np.empty((3, m, 3)), np.empty((3, m, 3)), np.empty((3, m, 3, 3)))
+    placed = _Placed(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     most = longest_run(first)
-    interval = Interval(np.empty((3, most, c * c)), np.zeros((most + 1, c, s)), np.empty((most, c)))
-    if start > 0:
-        _place(markers, start - 1, placed)
-    _place(markers, start, placed)
+    interval = Interval(np.empty((1 + 2 * LATER, most, c * c)), np.zeros((most + LATER, c, s)), np.empty((most, c)))
+    for k in range(max(start - LATER, 0), min(start + LATER, n)):
+        _place(markers, k, placed)
     while start < stop:
         end = start + 1
         while end < stop and first[end] == first[start]:
             end += 1
         interval.squares[:] = 0.0
         interval.gradient[:] = 0.0
-        interval.across[1:] = 0.0
+        interval.across[LATER:] = 0.0
         for k in range(start, end):
-            if k + 1 < n:
-                _place(markers, k + 1, placed)
+            if k + LATER < n:
+                _place(markers, k + LATER, placed)
             _frame(markers, k, k - start, still, placed, interval, static)
-            if k + 1 < n:
-                _pair(markers, k, k - start, still, placed, interval, static)
+            for later in range(1, min(LATER, n - 1 - k) + 1):
+                _pair(markers, k, later, k - start, placed, interval, static)
         to_splines(first, values, start, end, interval, band, border, right)
-        interval.across[0] = interval.across[end - start]
+        for row in range(LATER):
+            interval.across[row] = interval.across[end - start + row]
         start = end
-    if stop < n:
-        # of the frame after them, only what it has in common with the last
-        to_border(first[stop], values[stop], interval.across[0], border)
+    for row in range(min(LATER, n - stop)):
+        # of the frames after them, only what these have in common with the last
+        to_border(first[stop + row], values[stop + row], interval.across[row], border)
 
 
 @compiled
 def _place(markers: _Markers, k: int, placed: _Placed) -> None:
     """Axes and markers of frame k."""
-    a, here = len(markers.column), k % 3
+    a, here = len(markers.column), k % 5
     rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
     place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])
     places, errors, turned = placed.places[here], placed.errors[here], placed.turned[here]
     for m in range(len(markers.carrier)):
         j = markers.carrier[m]
-        place_marker(rotation[j], translation[j], markers.local[m], places[m])
+        place_marker(rotation[j], translation[j], markers.local[k, m], places[m])
         for r in range(3):
             errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.own[k, m] > 0.0 else 0.0
             for i in range(3):
@@ -217,10 +203,11 @@ def _place(markers: _Markers, k: int, placed: _Placed) -> None:
 def _frame(
     markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
 ) -> None:
-    """J^T W J of frame k with itself; J^T W S of marker positions and J^T W r, W r being of three frames."""
-    a, m, here = len(markers.column), len(markers.carrier), k % 3
-    pull, directions = np.zeros((m, 3)), np.zeros((m, 3, 3))
-    for offset in range(-1, 2):
+    """J^T W J of frame k with itself; J^T W S of places and skin and J^T W r, W r being of five frames."""
+    a, m, here = len(markers.column), len(markers.carrier), k % 5
+    most = 1 + int(np.max(markers.last - markers.first))
+    pull, directions = np.zeros((m, 3)), np.zeros((m, 3, 3 * most))
+    for offset in range(-LATER, LATER + 1):
         _informed(markers, k, offset, placed, pull, directions)
     sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty((1, 6))
     for i in range(m):
@@ -253,16 +240,27 @@ def _frame(
 def _informed(
     markers: _Markers, k: int, offset: int, placed: _Placed, pull: np.ndarray, directions: np.ndarray
 ) -> None:
-    """Add what the frame at this offset from k gives of W r (m, 3) and W times the segments' axes (m, 3, 3)."""
-    if k + offset < 0 or k + offset >= len(markers.own):
+    """Add what the frame at this offset from k gives of W r (m, 3), and of W times the segments' axes (m, 3, 3 g): as
+    they are, then times each pattern of the skin.
+    """
+    there = k + offset
+    if there < 0 or there >= len(markers.own):
         return
-    weights = markers.own[k] if offset == 0 else markers.next[min(k, k + offset)]
-    errors, turned = placed.errors[(k + offset) % 3], placed.turned[(k + offset) % 3]
+    weights = markers.own[k]
+    if abs(offset) == 1:
+        weights = markers.next[min(k, there)]
+    elif offset != 0:
+        weights = markers.second[min(k, there)]
+    errors, turned, patterns = placed.errors[there % 5], placed.turned[there % 5], markers.patterns[there]
     for m in range(len(weights)):
+        count = markers.last[m] - markers.first[m]
         for r in range(3):
             pull[m, r] += weights[m] * errors[m, r]
             for i in range(3):
-                directions[m, r, i] += weights[m] * turned[m, r, i]
+                value = weights[m] * turned[m, r, i]
+                directions[m, r, i] += value
+                for g in range(count):
+                    directions[m, r, 3 + 3 * g + i] += value * patterns[markers.first[m] + g]
 
 
 @compiled
@@ -277,66 +275,82 @@ def _by_place(
     interval: Interval,
     static: _Static,
 ) -> None:
-    """Terms of the markers' positions in their segments: across the coordinates, with themselves, and of r."""
-    c, here = interval.gradient.shape[1], k % 3
+    """Terms of the markers' positions in their segments and of the skin's coefficients: across the coordinates, with
+    themselves, and of r.
+    """
+    c, here = interval.gradient.shape[1], k % 5
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
     axes, at, turned, errors = placed.axes[here], placed.places[here], placed.turned[here], placed.errors[here]
-    across, square, right, d = interval.across[row], static.square, static.right, directions
-    moments = np.empty((3, 3))
+    across, square, right = interval.across[row], static.square, static.right
+    wide = directions.shape[2]
+    moments, turn, values = np.empty((3, wide)), np.empty((3, wide)), np.empty(wide)
     for m in range(len(markers.carrier)):
-        first = still + 3 * m
+        d, place, skin = directions[m], still + 3 * m, markers.columns[m]
+        count = 3 + 3 * (markers.last[m] - markers.first[m])
         for i in range(3):
-            moments[0, i] = at[m, 1] * d[m, 2, i] - at[m, 2] * d[m, 1, i]
-            moments[1, i] = at[m, 2] * d[m, 0, i] - at[m, 0] * d[m, 2, i]
-            moments[2, i] = at[m, 0] * d[m, 1, i] - at[m, 1] * d[m, 0, i]
             static.cost[0] += errors[m, i] * pull[m, i]
+        for i in range(count):
+            moments[0, i] = at[m, 1] * d[2, i] - at[m, 2] * d[1, i]
+            moments[1, i] = at[m, 2] * d[0, i] - at[m, 0] * d[2, i]
+            moments[2, i] = at[m, 0] * d[1, i] - at[m, 1] * d[0, i]
+            pattern = 1.0 if i < 3 else markers.patterns[k, markers.first[m] + i // 3 - 1]
             for r in range(3):
-                right[first + i] += turned[m, r, i] * pull[m, r]
-                for h in range(3):
-                    square[first + h, first + i] += turned[m, r, h] * d[m, r, i]
+                turn[r, i] = pattern * turned[m, r, i % 3]
+        for h in range(count):
+            one = place + h if h < 3 else skin + h - 3
+            right[one] += turn[0, h] * pull[m, 0] + turn[1, h] * pull[m, 1] + turn[2, h] * pull[m, 2]
+            for i in range(count):
+                other = place + i if i < 3 else skin + i - 3
+                square[one, other] += turn[0, h] * d[0, i] + turn[1, h] * d[1, i] + turn[2, h] * d[2, i]
         j = markers.carrier[m]
         while j >= 0:
-            for i in range(3):
-                value = 0.0
-                for r in range(3):
-                    value += axes[j, r] * d[m, r, i] + axes[j, 3 + r] * moments[r, i]
-                value *= slopes[k, j]
-                if column[j] < c:
-                    across[column[j], first + i] += value
-                else:
-                    square[column[j] - c, first + i] += value
-                    square[first + i, column[j] - c] += value
+            for i in range(count):
+                values[i] = axes[j, 0] * d[0, i] + axes[j, 1] * d[1, i] + axes[j, 2] * d[2, i]
+                values[i] += axes[j, 3] * moments[0, i] + axes[j, 4] * moments[1, i] + axes[j, 5] * moments[2, i]
+                values[i] *= slopes[k, j]
+            if column[j] < c:
+                for i in range(3):
+                    across[column[j], place + i] += values[i]
+                for i in range(3, count):
+                    across[column[j], skin + i - 3] += values[i]
+            else:
+                for i in range(count):
+                    one = place + i if i < 3 else skin + i - 3
+                    square[column[j] - c, one] += values[i]
+                    square[one, column[j] - c] += values[i]
             j = parent[j]
 
 
 @compiled
 def _pair(
-    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
+    markers: _Markers, k: int, later: int, row: int, placed: _Placed, interval: Interval, static: _Static
 ) -> None:
-    """J^T W J of frame k with the next."""
-    a, here, there = len(markers.column), k % 3, (k + 1) % 3
+    """J^T W J of frame k with the one so many frames later."""
+    a, here, there = len(markers.column), k % 5, (k + later) % 5
     sums, met = np.zeros((a, 16)), np.empty((1, 6))
+    weights = markers.next[k] if later == 1 else markers.second[k]
     for m in range(len(markers.carrier)):
-        add_marker(markers.next[k, m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
+        add_marker(weights[m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
     hand_down(markers.tree.parent, sums)
     back = swapped(sums)
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
-    axes, later = placed.axes[here], placed.axes[there]
+    axes, after = placed.axes[here], placed.axes[there]
     product = np.zeros((a, a))
     for j in range(a):
         # what axis j carries meets it, and all axes before it, in the other frame
-        met_force(sums, j, later, j, met)
+        met_force(sums, j, after, j, met)
         i = j
         while i >= 0:
-            product[i, j] = slopes[k + 1, j] * slopes[k, i] * inner(axes, i, met, 0)
+            product[i, j] = slopes[k + later, j] * slopes[k, i] * inner(axes, i, met, 0)
             i = parent[i]
         met_force(back, j, axes, j, met)
         i = parent[j]
         while i >= 0:
-            product[j, i] = slopes[k, j] * slopes[k + 1, i] * inner(later, i, met, 0)
+            product[j, i] = slopes[k, j] * slopes[k + later, i] * inner(after, i, met, 0)
             i = parent[i]
-    _sort(column, product, interval.squares[1, row], interval.across[row], static.square)
-    _sort(column, product.T, interval.squares[2, row], interval.across[row + 1], static.square)
+    squares, across = interval.squares, interval.across
+    _sort(column, product, squares[2 * later - 1, row], across[row], static.square)
+    _sort(column, product.T, squares[2 * later, row], across[row + later], static.square)
 
 
 @compiled

@@ -18,9 +18,9 @@ _ROUNDING = 1e-9
 
 
 class MotionBasis:
-    """Uniform quintic B-splines over a trial's time, with knots no closer than frames.
+    """Uniform quintic B-splines over a trial's time, with knots no closer than every second frame.
 
-    Six splines are active at any time, and seven at two neighbouring frames.
+    Six splines are active at any time, and seven at a frame and the two after it.
 
     Attributes:
         size: number of splines.
@@ -29,7 +29,7 @@ class MotionBasis:
     """
 
     def __init__(self, time: np.ndarray, spacing_s: float) -> None:
-        count = min(max(1, int(np.ceil((time[-1] - time[0]) / spacing_s))), len(time) - 1)
+        count = min(max(1, int(np.ceil((time[-1] - time[0]) / spacing_s))), (len(time) - 1) // 2)
         step = (time[-1] - time[0]) / count
         knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE

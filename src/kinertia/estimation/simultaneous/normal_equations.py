@@ -11,7 +11,8 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.model.compiled import compiled
 
 SPLINES_PER_BLOCK = 6
-"""Two neighbouring frames see seven splines together: each at most the six after it, and so at most the next block."""
+"""A frame and the two after it see seven splines together: each at most the six after it, and so at most the next
+block."""
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,29 @@
-"""What the simultaneous estimate sees of a measured trial: its frames, its smoothed loads, and how noisy its markers
-are.
-
-Marker noise is not white: skin motion lasts for many frames. Its deviation and correlation length
-are read from the errors that inverse kinematics leaves; the estimate takes it as a first-order autoregressive process
-(`marker_terms`). The deviation is inflated by the square root of the number of markers that err alike: those of a
-segment ride on the same skin. So are all deviations where errors come back (`repetition`). Inverse kinematics absorbs
-part of the noise; the deviation makes up for its degrees of freedom only on average.
+"""What the simultaneous estimate sees of a measured trial: its frames, its smoothed loads, what its skin may follow,
+and how noisy its markers are (`marker_noise`). All deviations are inflated where errors come back (`repetition`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.marker_noise import (
+    MarkerNoise,
+    WithoutSkin,
+    frames_alike,
+    marker_noise,
+    markers_alike,
+    taken_by_chance,
+    weighed,
+)
 from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import Observation
-from kinertia.estimation.simultaneous.repetition import Repetition, repeats
+from kinertia.estimation.simultaneous.repetition import repeats
+from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import ground_reactions
@@ -31,31 +35,6 @@ FORCE_SD_OF_WEIGHT = 0.005
 """Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
 MOMENT_ARM_M = 0.3
 """Deviation of the root moment over that of the force."""
-SMALLEST_MARKER_SD_M = 0.001
-_WANDERING = 3.0
-CORNER = 2.0
-"""Skin motion has a nearly flat spectrum up to its highest frequency; that of a first-order process as strong and as
-long falls before. One with so many times its bandwidth, as dense at zero frequency, is two thirds as dense there. Less
-makes measured people odder and their residuals larger, more makes joint moments vaguer than they are."""
-
-
-@dataclass(frozen=True)
-class MarkerNoise:
-    """Errors of the markers of one trial.
-
-    Attributes:
-        sd_m: per label, deviation of one coordinate in one frame, m.
-        correlation_s: time over which errors are alike.
-        wandering: labels whose deviation is more than three times the usual; they drift and are down-weighted.
-        repeats: in how many strides of all trials together they are alike (`repetition`); 1: they never come back.
-        displacement_sd_m: per label, deviation of its displacement in this trial (`displacement`), m; 0 for one trial.
-    """
-
-    sd_m: Mapping[str, float]
-    correlation_s: float
-    wandering: tuple[str, ...]
-    repeats: float = 1.0
-    displacement_sd_m: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +70,23 @@ def observe(
         staying: markers stay where the skeleton has them, in all trials: no displacements.
     """
     errors = [_errors(skeleton, each) for each in trials]
-    found = [_observed(skeleton, k, each, mass_kg, bandwidth) for k, each in zip(trials, errors, strict=True)]
+    rates = [each.trial.markers.rate_hz for each in trials]
+    skin = skin_patterns(skeleton, [each.smooth for each in errors])
+    usual = [np.sqrt(np.nanmean(np.square(each.varying), axis=(0, 2))) for each in errors]
+    frames = [frames_alike(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
     places = np.stack([each.displaced for each in errors])
-    displaced = np.zeros(places.shape[1]) if staying else _displacement_sd(skeleton, places)
-    varying = [_columns(each.varying, o.marker_sd) for each, (o, _) in zip(errors, found, strict=True)]
-    counts = repeats(varying, [each.trial.markers.rate_hz for each in trials])
+    rest = WithoutSkin.of([each.varying for each in errors], places, skin, frames)
+    found = [
+        _observed(skeleton, *each, mass_kg, bandwidth)
+        for each in zip(trials, errors, rest.varying, skin, frames, strict=True)
+    ]
+    displaced = np.zeros(places.shape[1]) if staying else _displacement_sd(skeleton, rest.displaced)
+    # what the estimate finds to go with the joints comes back, too: it counts as often as before it was found
+    alike = [
+        repeats([weighed(e, o.marker_sd) for e, (o, _) in zip(every, found, strict=True)], rates)
+        for every in ([each.varying for each in errors], rest.varying)
+    ]
+    counts = np.maximum(*alike)
     by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))
     noise = [
         replace(one, repeats=float(count), displacement_sd_m={label: by_label[label] for label in one.sd_m})
@@ -112,7 +103,7 @@ def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
     count = seen.sum(axis=0)
     middle = np.where(seen, displaced, 0.0).sum(axis=0) / np.maximum(count, 1)
     apart = np.where(seen, displaced - middle, 0.0)
-    alike = _alike(skeleton, apart)
+    alike = markers_alike(skeleton, apart)
     result = np.zeros(len(alike))
     for segment in np.unique(skeleton.marker_segments):
         own = skeleton.marker_segments == segment
@@ -132,6 +123,7 @@ class _Errors:
         measured: (n, m, 3) markers, m; NaN where not seen.
         displaced: (m, 3) mean of measured minus model, in the axes of each marker's segment.
         varying: (n, m, 3) the rest.
+        smooth: (n, c) coordinates without noise, none missing.
     """
 
     time: np.ndarray
@@ -139,6 +131,7 @@ class _Errors:
     measured: np.ndarray
     displaced: np.ndarray
     varying: np.ndarray
+    smooth: np.ndarray
 
 
 def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
@@ -162,17 +155,23 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     # what a marker is off its place in the segment all the time is calibration, not noise
     shown = np.isfinite(local).any(axis=0)
     displaced = np.where(shown, np.nanmean(np.where(shown, local, 0.0), axis=0), np.nan)
-    return _Errors(time[frames], q, measured, displaced, local - displaced)
+    return _Errors(time[frames], q, measured, displaced, local - displaced, bridged)
 
 
 def _observed(
-    skeleton: Skeleton, kinematics: Kinematics, errors: _Errors, mass_kg: float, bandwidth: Bandwidth
+    skeleton: Skeleton,
+    kinematics: Kinematics,
+    errors: _Errors,
+    rest: np.ndarray,
+    skin: SkinPatterns,
+    frames: float,
+    mass_kg: float,
+    bandwidth: Bandwidth,
 ) -> tuple[Observation, MarkerNoise]:
     """One trial on its own."""
     (start, end), time = kinematics.window_s, errors.time
-    noise, effective, autocorrelation = _noise(
-        skeleton, errors.varying, len(skeleton.coordinates), kinematics.trial.markers.rate_hz
-    )
+    taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
+    noise, effective, alike = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
@@ -181,12 +180,13 @@ def _observed(
             time=time,
             markers=errors.measured,
             marker_sd=effective,
-            marker_autocorrelation=autocorrelation,
+            marker_frames=alike,
             q=errors.q,
             dynamic=(time >= start - 1e-9) & (time <= end + 1e-9),
             ground=_ground(kinematics, time, bandwidth.motion_hz, bandwidth.force),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
+            skin=skin,
         ),
         noise,
     )
@@ -206,49 +206,3 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cu
         places[: len(time)],
         turn,
     )
-
-
-def _noise(
-    skeleton: Skeleton, errors: np.ndarray, unknowns: int, rate_hz: float
-) -> tuple[MarkerNoise, np.ndarray, float]:
-    """Noise of the markers, their effective deviations (m,), and the autocorrelation of one frame with the next, from
-    errors (n, m, 3).
-    """
-    seen = np.isfinite(errors)
-    filled = np.where(seen, errors, 0.0)
-    count = np.maximum(seen.sum(axis=(0, 2)), 1)
-    per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
-    lost = np.sqrt(per_frame / max(per_frame - unknowns, 1.0))
-    sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
-    frames = Repetition.of(_columns(errors, sd)).frames
-    usual = float(np.median(sd))
-    labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
-    deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
-    noise = MarkerNoise(
-        {label: deviations[label] for label in labels},
-        frames / rate_hz,
-        tuple(label for label in labels if deviations[label] > _WANDERING * usual),
-    )
-    alike = max(1.0, frames / CORNER)
-    spread = _alike(skeleton, filled) * frames / alike
-    return noise, sd * np.sqrt(spread), (alike - 1.0) / (alike + 1.0)
-
-
-def _columns(errors: np.ndarray, sd_m: np.ndarray) -> np.ndarray:
-    """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
-    result: np.ndarray = np.nan_to_num(errors / sd_m[:, None]).reshape(len(errors), -1)
-    return result
-
-
-def _alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
-    """(m,) how many markers of each marker's segment err as one, from errors (n, m, 3): 1 if each errs on its own.
-
-    The variance of a sum of k equal errors is k times that of k independent ones.
-    """
-    count = np.ones(errors.shape[1])
-    for segment in np.unique(skeleton.marker_segments):
-        own = skeleton.marker_segments == segment
-        apart = np.square(errors[:, own]).sum()
-        if apart > 0:
-            count[own] = max(1.0, float(np.square(errors[:, own].sum(axis=1)).sum() / apart))
-    return count

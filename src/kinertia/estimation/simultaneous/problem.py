@@ -19,6 +19,7 @@ from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
@@ -46,19 +47,20 @@ class Observation:
         time: (n,) s, uniform.
         markers: (n, m, 3) m in the order of the skeleton's markers; NaN where not seen.
         marker_sd: (m,) effective deviation of each marker coordinate in one frame, m.
-        marker_autocorrelation: of these errors between neighbouring frames (`marker_terms`).
+        marker_frames: over how many neighbouring frames these errors are alike (`marker_errors`).
         q: (n, c) start.
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
         force_sd, moment_sd: effective deviations of the root residual, N and N m.
         displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
         repeats: by how much errors that come back have raised all variances (`repeated`).
+        skin: what the skin may follow; None: it does not move with the joints.
     """
 
     time: np.ndarray
     markers: np.ndarray
     marker_sd: np.ndarray
-    marker_autocorrelation: float
+    marker_frames: float
     q: np.ndarray
     dynamic: np.ndarray
     ground: FootPlates
@@ -66,6 +68,7 @@ class Observation:
     moment_sd: float
     displacement_sd_m: np.ndarray | float = 0.0
     repeats: float = 1.0
+    skin: SkinPatterns | None = None
 
     def repeated(self, times: float) -> Observation:
         """The same where its errors come back so many times in all that is estimated from."""
@@ -112,16 +115,18 @@ class Layout:
     clock: int
     coordinates: slice
     locals: slice
+    skin: slice
 
     @classmethod
-    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int) -> Layout:
+    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int, n_skin: int) -> Layout:
         """The layout for these numbers of unknowns."""
-        counts = [n_bsp, len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS), 1, n_coordinates, 3 * n_markers]
+        n_instruments = len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS)
+        counts = [n_bsp, n_instruments, 1, n_coordinates, 3 * n_markers, n_skin]
         ends = np.cumsum(counts).tolist()
-        theta, plates, clock, coordinates, places = (
+        theta, plates, clock, coordinates, places, skin = (
             slice(end - count, end) for end, count in zip(ends, counts, strict=True)
         )
-        return cls(theta, plates, clock.start, coordinates, places)
+        return cls(theta, plates, clock.start, coordinates, places, skin)
 
     @property
     def instruments(self) -> slice:
@@ -130,18 +135,18 @@ class Layout:
 
     @property
     def in_root(self) -> slice:
-        """What the root equations depend on: all but the marker positions."""
+        """What the root equations depend on: all but marker positions and skin."""
         return slice(0, self.coordinates.stop)
 
     @property
     def in_markers(self) -> slice:
-        """What the markers depend on: static coordinates and marker positions."""
-        return slice(self.coordinates.start, self.locals.stop)
+        """What the markers depend on: static coordinates, marker positions and skin."""
+        return slice(self.coordinates.start, self.skin.stop)
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        result: int = self.locals.stop
+        result: int = self.skin.stop
         return result
 
 
@@ -205,8 +210,10 @@ class MapProblem:
         self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
         self.carriers = [trial.ground.among(self.plates)[trial.ground.carrier] for trial in trials]
         self.to_plates = plates_with_floor(len(self.plates))
-        self.layout = Layout.of(10 * len(self.segments), len(self.still), len(skeleton.markers), len(self.plates))
         count = len(skeleton.markers)
+        self.skin = [trial.skin or SkinPatterns.none(len(trial.time), count) for trial in trials]
+        unknowns = (len(self.still), count, len(self.plates), self.skin[0].size)
+        self.layout = Layout.of(10 * len(self.segments), *unknowns)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
         self.start_static = np.zeros(self.layout.size)
@@ -219,6 +226,7 @@ class MapProblem:
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
         self.instruments = calibration.of_instruments(len(self.plates))
         self.weight = 1.0 / np.square(deviation)
+        self.skin_information = self.skin[0].information()
 
     @property
     def beginning(self) -> Point:
@@ -261,7 +269,11 @@ class MapProblem:
         information = np.diag(self.weight)
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))
-        theta = self.layout.theta
+        theta, skin = self.layout.theta, self.layout.skin
+        information[skin, skin] += self.skin_information
+        pulled = self.skin_information @ static[skin]
+        right[skin] -= pulled
+        cost += float(static[skin] @ pulled)
         information[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
         right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
         return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
@@ -321,10 +333,21 @@ class MapProblem:
         near, own, start = stretch.with_neighbours, stretch.splines, stretch.splines.start
         skeleton = self.placed(static)
         normal = NormalEquations.zero(stretch.size, len(self.moving), layout.size)
-        noise = (trial.marker_sd, trial.marker_autocorrelation)
+        noise, skin = (trial.marker_sd, trial.marker_frames), (self.skin[k].cut(near), static[layout.skin])
         q = self.full(basis.evaluate(coefficients, near), static)[0]
-        columns = (self.moving, self.still)
-        add_markers(normal, layout.in_markers, basis, stretch, skeleton, trial.markers[near], q, noise, *columns)
+        add_markers(
+            normal,
+            layout.in_markers,
+            basis,
+            stretch,
+            skeleton,
+            trial.markers[near],
+            q,
+            noise,
+            skin,
+            self.moving,
+            self.still,
+        )
         dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
         for piece in pieces(len(dynamic)):
             terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
 
@@ -54,8 +55,8 @@ class Stretch:
 
     @property
     def with_neighbours(self) -> slice:
-        """Its frames, the one before and the one after them, where there are such."""
-        return slice(max(self.frames.start - 1, 0), self.frames.stop + 1)
+        """Its frames, and those before and after them that they meet, where there are such."""
+        return slice(max(self.frames.start - LATER, 0), self.frames.stop + LATER)
 
 
 def stretches(basis: MotionBasis, most: int) -> tuple[Stretch, ...]:

@@ -1,0 +1,161 @@
+"""How noisy the markers of a trial are: deviations, and over how many frames and in how many markers errors are alike.
+
+Skin motion lasts for many frames. Its deviation and correlation length are read from the errors that inverse kinematics
+leaves, without what of them goes with the joints (`skin`). The deviation is inflated by the square root of the number
+of markers that err alike: those of a segment ride on the same skin. Inverse kinematics absorbs part of the noise, and
+so does the regression on the joints; the deviation makes up for their degrees of freedom only on average.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.repetition import Repetition
+from kinertia.estimation.simultaneous.skin import SkinPatterns
+from kinertia.model.skeleton import Skeleton
+
+SMALLEST_MARKER_SD_M = 0.001
+_WANDERING = 3.0
+CORNER = 2.0
+"""Skin motion has a nearly flat spectrum up to its highest frequency; that of an autoregressive process as strong and
+as long falls before. One with so many times its bandwidth, as dense at zero frequency, is denser there. Less makes
+measured people odder and their residuals larger, more makes joint moments vaguer than they are."""
+_MOST_TAKEN = 0.6
+"""Share of the variance of errors that regression on the joints is thought to take by chance, at most."""
+_ROUNDS = 2
+"""Of the regression: its prior is weighed with the deviation of what the last one left."""
+
+
+@dataclass(frozen=True)
+class MarkerNoise:
+    """Errors of the markers of one trial.
+
+    Attributes:
+        sd_m: per label, deviation of one coordinate in one frame, m, but for what goes with the joints.
+        correlation_s: time over which errors are alike.
+        wandering: labels whose deviation is more than three times the usual; they drift and are down-weighted.
+        repeats: in how many strides of all trials together they are alike (`repetition`); 1: they never come back.
+        displacement_sd_m: per label, deviation of its displacement in this trial (`displacement`), m; 0 for one trial.
+    """
+
+    sd_m: Mapping[str, float]
+    correlation_s: float
+    wandering: tuple[str, ...]
+    repeats: float = 1.0
+    displacement_sd_m: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class WithoutSkin:
+    """Errors of the markers in each of several trials, without what of them goes with the joints.
+
+    Attributes:
+        varying: per trial (n, m, 3) m; NaN where not seen.
+        displaced: (t, m, 3) m, how far the markers are from their places in the segments, on average over a trial,
+            and not because of the postures in it.
+    """
+
+    varying: tuple[np.ndarray, ...]
+    displaced: np.ndarray
+
+    @classmethod
+    def of(
+        cls, varying: Sequence[np.ndarray], displaced: np.ndarray, skin: Sequence[SkinPatterns], frames: Sequence[float]
+    ) -> WithoutSkin:
+        """Ridge regression on the patterns of the skin, of all trials together.
+
+        Args:
+            varying: per trial (n, m, 3) m, errors in the axes of each marker's segment, of zero mean.
+            displaced: (t, m, 3) m, what was taken off them for that.
+            skin: patterns of each trial.
+            frames: per trial, over how many frames its errors are alike: so many say what one says.
+        """
+        rests, still = [each.copy() for each in varying], displaced.copy()
+        for m, (first, last) in enumerate(zip(skin[0].first, skin[0].last, strict=True)):
+            seen = [np.isfinite(each[:, m]).all(axis=1) for each in varying]
+            if last == first or not any(map(np.any, seen)):
+                continue
+            here = [each.values[shown, first:last] for each, shown in zip(skin, seen, strict=True)]
+            middle = np.array([each.mean(axis=0) if len(each) else np.zeros(last - first) for each in here])
+            x = np.concatenate([(part - mean) / np.sqrt(f) for part, mean, f in zip(here, middle, frames, strict=True)])
+            y = np.concatenate([e[shown, m] / np.sqrt(f) for e, shown, f in zip(varying, seen, frames, strict=True)])
+            weight = np.concatenate([np.full(shown.sum(), f) for shown, f in zip(seen, frames, strict=True)])[:, None]
+            square, right, left = x.T @ x, x.T @ y, y
+            for _ in range(_ROUNDS):
+                variance = max(float((weight * np.square(left)).mean()), SMALLEST_MARKER_SD_M**2 / 10.0)
+                slopes = np.linalg.solve(square + variance * np.eye(last - first), right)
+                left = y - x @ slopes
+            parts = np.split(left * np.sqrt(weight), np.cumsum([shown.sum() for shown in seen])[:-1])
+            for rest, shown, part in zip(rests, seen, parts, strict=True):
+                rest[shown, m] = part
+            still[:, m] -= middle @ slopes
+        return cls(tuple(rests), still)
+
+
+def marker_noise(
+    skeleton: Skeleton, errors: np.ndarray, taken: np.ndarray, rate_hz: float
+) -> tuple[MarkerNoise, np.ndarray, float]:
+    """Noise of the markers of a trial, their effective deviations (m,), and over how many neighbouring frames errors of
+    these deviations are alike.
+
+    Args:
+        skeleton: with the trial's markers.
+        errors: (n, m, 3) m, without skin that goes with the joints.
+        taken: (m,) share of each marker's variance that is missing in them by chance, since the regression fits noise.
+        rate_hz: of the frames.
+    """
+    seen = np.isfinite(errors)
+    filled = np.where(seen, errors, 0.0)
+    count = np.maximum(seen.sum(axis=(0, 2)), 1)
+    per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
+    lost = np.sqrt(per_frame / max(per_frame - len(skeleton.coordinates), 1.0))
+    sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
+    frames = frames_alike(errors, sd)
+    usual = float(np.median(sd))
+    labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
+    deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
+    noise = MarkerNoise(
+        {label: deviations[label] for label in labels},
+        frames / rate_hz,
+        tuple(label for label in labels if deviations[label] > _WANDERING * usual),
+    )
+    alike = max(1.0, frames / CORNER)
+    spread = markers_alike(skeleton, filled) * frames / alike
+    return noise, sd * np.sqrt(spread / (1.0 - taken)), alike
+
+
+def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float) -> np.ndarray:
+    """(m,) share of the variance of errors that regression on so many patterns (m,) takes where nothing goes with the
+    joints, of so many frames (m,) with errors that are alike over `frames`.
+    """
+    result: np.ndarray = np.minimum(patterns * frames / np.maximum(frames_seen, 1.0), _MOST_TAKEN)
+    return result
+
+
+def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
+    """Over how many neighbouring frames errors (n, m, 3) of these deviations (m,) are alike."""
+    return Repetition.of(weighed(errors, sd_m)).frames
+
+
+def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:
+    """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
+    each = np.broadcast_to(sd_m, errors.shape[1])
+    result: np.ndarray = np.nan_to_num(errors / each[:, None]).reshape(len(errors), -1)
+    return result
+
+
+def markers_alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
+    """(m,) how many markers of each marker's segment err as one, from errors (n, m, 3): 1 if each errs on its own.
+
+    The variance of a sum of k equal errors is k times that of k independent ones.
+    """
+    count = np.ones(errors.shape[1])
+    for segment in np.unique(skeleton.marker_segments):
+        own = skeleton.marker_segments == segment
+        apart = np.square(errors[:, own]).sum()
+        if apart > 0:
+            count[own] = max(1.0, float(np.square(errors[:, own].sum(axis=1)).sum() / apart))
+    return count

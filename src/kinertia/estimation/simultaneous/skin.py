@@ -1,0 +1,132 @@
+"""Skin that moves with the joints: what of the markers' errors the angles beside them tell.
+
+Skin is drawn along by the joints at both ends of its segment (Camomilla et al. 2013, J Biomech 46:2328; Bonci et al.
+2014, J Biomech 47:2354). A marker m stands at
+
+    x_m = p(q) + R(q) [l_m + C_m phi(t)] + e,
+
+with phi the `patterns` of its segment, directions in the space of the neighbouring angles, taken from inverse
+kinematics and held fixed, and C_m (3, p) unknown: as many coefficients as the segment has patterns, on each axis. They
+are the person's, so that all trials share them. What is left, e, is `marker_errors`.
+
+The prior of each coefficient is a standard normal, since patterns are in metres: those of the segment together displace
+a marker by `EXPECTED_SD_M` over the trials, along each axis. Markers of a segment ride on the same skin: their
+coefficients correlate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from kinertia.model.anatomy import segment_of
+from kinertia.model.neighbouring_angles import neighbouring_angles
+from kinertia.model.skeleton import Skeleton
+
+EXPECTED_SD_M = {"thigh": 0.004, "shank": 0.003}
+"""Over a stride, RMS along each axis, by segment (Peters et al. 2010, Gait Posture 31:1); others:
+`OTHER_EXPECTED_SD_M`."""
+OTHER_EXPECTED_SD_M = 0.0025
+MOST_PATTERNS = 4
+"""Per segment. The angles of a gait go together: four directions hold nearly all of what three joints do."""
+ALIKE = 0.5
+"""Correlation of the same coefficient of two markers of a segment."""
+_STILL_RAD = 1e-3
+"""An angle that varies by less draws no skin."""
+_NO_PATTERN_M = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class SkinPatterns:
+    """What skin may follow in one trial.
+
+    The coefficients are those of one marker after another, pattern by pattern of its segment, three axes each.
+
+    Attributes:
+        values: (n, p) m, all segments' patterns; at `MapProblem` those of a stretch of frames.
+        first, last: (m,) those of each marker's segment: first, ..., last - 1.
+    """
+
+    values: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+
+    @classmethod
+    def none(cls, frames: int, markers: int) -> SkinPatterns:
+        """Skin that follows nothing."""
+        return cls(np.zeros((frames, 0)), *np.zeros((2, markers), dtype=int))
+
+    @cached_property
+    def begin(self) -> np.ndarray:
+        """(m + 1,) where the coefficients of each marker begin, and how many there are."""
+        return np.concatenate([[0], np.cumsum(3 * (self.last - self.first))])
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return int(self.begin[-1])
+
+    def cut(self, frames: slice) -> SkinPatterns:
+        """At these frames."""
+        return replace(self, values=self.values[frames])
+
+    def displaced(self, coefficients: np.ndarray) -> np.ndarray:
+        """(n, m, 3) m, how far skin with these coefficients carries the markers along the axes of their segments."""
+        result = np.zeros((len(self.values), len(self.first), 3))
+        for markers, places in self._by_segment():
+            patterns = self.values[:, self.first[markers[0]] : self.last[markers[0]]]
+            each = coefficients[places].transpose(1, 0, 2).reshape(patterns.shape[1], -1)
+            result[:, markers] = (patterns @ each).reshape(-1, len(markers), 3)
+        return result
+
+    def information(self) -> np.ndarray:
+        """(k, k) of the coefficients' prior."""
+        result = np.zeros((self.size, self.size))
+        for markers, places in self._by_segment():
+            count = len(markers)
+            own = np.eye(count) - ALIKE / (1.0 - ALIKE + ALIKE * count)
+            flat = places.reshape(count, -1)
+            result[flat[:, None], flat[None]] = own[:, :, None] / (1.0 - ALIKE)
+        return result
+
+    def _by_segment(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Markers (k,) of each segment that has patterns, and where their coefficients stand (k, patterns, 3)."""
+        for start in np.unique(self.first[self.last > self.first]):
+            markers = np.flatnonzero((self.first == start) & (self.last > self.first))
+            count = 3 * int(self.last[markers[0]] - start)
+            yield markers, (self.begin[markers, None] + np.arange(count)).reshape(len(markers), -1, 3)
+
+
+def skin_patterns(skeleton: Skeleton, trials: Sequence[np.ndarray]) -> tuple[SkinPatterns, ...]:
+    """What the skin under the markers of a skeleton may follow in trials of one person, of coordinates (n, c) each."""
+    every = np.concatenate(trials)
+    away, varying = every - every.mean(axis=0), np.std(every, axis=0)
+    turns, first, last = [np.zeros((every.shape[1], 0))], {}, {}
+    for segment in np.unique(skeleton.marker_segments):
+        found = _directions(skeleton, skeleton.segments[segment], away, varying)
+        first[segment] = sum(each.shape[1] for each in turns)
+        last[segment] = first[segment] + found.shape[1]
+        turns.append(found)
+    patterns = np.split(away @ np.hstack(turns), np.cumsum([len(each) for each in trials])[:-1])
+    begin, end = (np.array([part[s] for s in skeleton.marker_segments], dtype=int) for part in (first, last))
+    return tuple(SkinPatterns(each, begin, end) for each in patterns)
+
+
+def _directions(skeleton: Skeleton, segment: str, away: np.ndarray, varying: np.ndarray) -> np.ndarray:
+    """(c, p) m/rad from the coordinates to the patterns of a segment."""
+    angles = [i for i in neighbouring_angles(skeleton, segment) if varying[i] > _STILL_RAD]
+    if not angles:
+        return np.zeros((len(varying), 0))
+    kind = (segment_of(segment) or "").rpartition("_")[0]
+    expected = EXPECTED_SD_M.get(kind, OTHER_EXPECTED_SD_M)
+    # half of the expected variance goes by how far an angle moves, half to all angles alike
+    square = np.square(varying[angles])
+    scale = expected * np.sqrt(0.5 * square / square.sum() + 0.5 / len(angles)) / varying[angles]
+    _, size, directions = np.linalg.svd(away[:, angles] * scale, full_matrices=False)
+    kept = (size / np.sqrt(len(away)) > _NO_PATTERN_M)[:MOST_PATTERNS].sum()
+    result = np.zeros((len(varying), kept))
+    result[angles] = scale[:, None] * directions[:kept].T
+    return result

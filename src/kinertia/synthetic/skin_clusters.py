@@ -1,0 +1,62 @@
+"""Skin motion that no joint angle explains: each segment's markers move as a rigid cluster, by harmonics of the stride.
+
+It contradicts the estimator's model of skin (`kinertia.estimation.simultaneous.skin`) on purpose: displacements along
+three axes and turns about three, each a sum of the stride's first harmonics with random phases. Sizes are those of
+`kinertia.synthetic.noise.SkinMotion`. Turns are as large as displacements at `_ARM_M` from the middle of the markers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.model.skeleton import Skeleton
+from kinertia.synthetic.noise import artefact_range
+from kinertia.trial.data import Markers
+
+_HARMONICS = np.arange(1.0, 5.0)
+_ARM_M = 0.1
+STRIDE_S = 1.23
+"""Of the package's walk."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClusterMotion:
+    """Of a person, the same in every trial and stride.
+
+    Attributes:
+        waves: segment -> (2, 4, 6) cosines and sines of the harmonics of three displacements, m, and three turns, rad,
+            in the segment's frame.
+    """
+
+    waves: Mapping[str, np.ndarray]
+
+    @classmethod
+    def draw(cls, skeleton: Skeleton, rng: np.random.Generator) -> ClusterMotion:
+        """Random phases; higher harmonics are smaller by their number."""
+        waves = {}
+        phase = 2.0 * np.pi * np.linspace(0.0, 1.0, 100)[:, None] * _HARMONICS
+        for segment in dict.fromkeys(marker.segment for marker in skeleton.markers):
+            drawn = rng.standard_normal((2, len(_HARMONICS), 6)) / _HARMONICS[:, None]
+            path = np.cos(phase) @ drawn[0] + np.sin(phase) @ drawn[1]
+            extent = np.linalg.norm(np.ptp(path[:, :3], axis=0))
+            scaled = drawn * rng.uniform(*artefact_range(segment)) / extent
+            scaled[..., 3:] /= _ARM_M
+            waves[segment] = scaled
+        return cls(waves)
+
+    def moved(self, markers: Markers, skeleton: Skeleton, q: np.ndarray) -> Markers:
+        """The markers of a trial displaced; q (n, c) are its true coordinates at their frames."""
+        pose, positions = skeleton.pose(q), markers.positions.copy()
+        phase = 2.0 * np.pi * (markers.time / STRIDE_S)[:, None] * _HARMONICS
+        for segment, (cosines, sines) in self.waves.items():
+            own = [m for m in skeleton.markers if m.segment == segment and m.label in markers.labels]
+            columns = [markers.labels.index(marker.label) for marker in own]
+            places = np.array([marker.position for marker in own])
+            path = np.cos(phase) @ cosines + np.sin(phase) @ sines
+            local = path[:, None, :3] + np.cross(path[:, None, 3:], places - places.mean(axis=0))
+            turn = pose.rotation[:, None, skeleton.segments.index(segment)]
+            positions[:, columns] += (turn @ local[..., None])[..., 0]
+        return replace(markers, positions=positions)
