@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.model.compiled import compiled, inlined
-from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import force_cross, inner, motion_cross
 
 
@@ -213,17 +213,10 @@ def _load(bodies: np.ndarray, frame: Frame, derivatives: bool) -> None:
 @compiled
 def _sum_up(parent: np.ndarray, frame: Frame, derivatives: bool) -> None:
     """Add to what each axis bears itself all that it carries."""
-    force, inertia, bias = frame.force, frame.inertia, frame.bias
-    for j in range(len(parent) - 1, -1, -1):
-        before = parent[j]
-        if before >= 0:
-            for k in range(6):
-                force[before, k] += force[j, k]
-            if derivatives:
-                for k in range(13):
-                    inertia[before, k] += inertia[j, k]
-                for k in range(12):
-                    bias[before, k] += bias[j, k]
+    hand_down(parent, frame.force)
+    if derivatives:
+        hand_down(parent, frame.inertia)
+        hand_down(parent, frame.bias)
 
 
 @compiled

@@ -25,10 +25,10 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled
-from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.spatial import inner
-from kinertia.motion.marker_sums import add_force, add_marker, hand_down, met_force, place_marker, swapped
+from kinertia.motion.marker_sums import add_force, add_marker, met_force, place_marker, swapped
 
 
 @dataclass(frozen=True)
