@@ -10,6 +10,7 @@ from kinertia.motion.dynamics import (
     inverse_dynamics,
     joined,
     residual,
+    residual_terms,
     root_derivatives,
     root_regressor,
 )
@@ -66,10 +67,12 @@ def test_residual_is_opensims(skeleton, bsp, motion):
 
 
 @pytest.mark.parametrize("order", ["q", "qd", "qdd"])
-def test_root_derivatives_agree_with_finite_differences(skeleton, bsp, motion, wrench, order):
-    derivative = getattr(root_derivatives(skeleton, bsp, motion, wrench), order)
-    h = 1e-5
-    for c in range(6):
+def test_derivatives_of_the_residual_agree_with_finite_differences(skeleton, bsp, motion, wrench, order):
+    left, by = residual_terms(skeleton, bsp, motion, wrench)
+    derivative, h = getattr(by, order), 1e-5
+    np.testing.assert_allclose(left, residual(skeleton, bsp, motion, wrench), atol=1e-9)
+    np.testing.assert_array_equal(getattr(root_derivatives(skeleton, bsp, motion, wrench), order), derivative[..., :6])
+    for c in range(len(skeleton.coordinates)):
         ends = []
         for sign in (1, -1):
             parts = {name: getattr(motion, name).copy() for name in ("q", "qd", "qdd")}
