@@ -127,13 +127,13 @@ def add_markers(
     information = ErrorInformation.of(np.isfinite(measured).all(axis=-1), *deviation)
     place = np.empty(q.shape[1], dtype=np.int64)
     place[np.concatenate([moving, still])] = np.arange(q.shape[1])
-    at, slopes = skeleton.map.axes(q), skeleton.map.slopes(q)
+    at, slopes = skeleton.map.places_and_slopes(q)
     carrier, local = skeleton.carried_markers
     markers = _Markers(
         skeleton.tree,
         place[skeleton.map.owner],
-        np.ascontiguousarray(at),
-        np.ones_like(at) if slopes is None else np.ascontiguousarray(slopes),
+        at,
+        slopes,
         carrier,
         local,
         np.ascontiguousarray(skeleton.tree.segment_rotation[skeleton.marker_segments]),
