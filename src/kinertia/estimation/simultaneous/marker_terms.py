@@ -186,7 +186,7 @@ def _add(
                 _place(markers, k + 1, placed)
             _frame(markers, k, k - start, still, placed, interval, static)
             if k + 1 < n:
-                _pair(markers, k, k - start, still, placed, interval, static)
+                _pair(markers, k, k - start, placed, interval, static)
         to_splines(first, values, start, end, interval, band, border, right)
         interval.across[0] = interval.across[end - start]
         start = end
@@ -310,9 +310,7 @@ def _by_place(
 
 
 @compiled
-def _pair(
-    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
-) -> None:
+def _pair(markers: _Markers, k: int, row: int, placed: _Placed, interval: Interval, static: _Static) -> None:
     """J^T W J of frame k with the next."""
     a, here, there = len(markers.column), k % 3, (k + 1) % 3
     sums, met = np.zeros((a, 16)), np.empty((1, 6))
