@@ -26,6 +26,7 @@ from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 from kinertia.trial.data import nearest_samples
+from kinertia.trial.rms import rms_length
 
 IMPACT_SHARE_OF_WEIGHT = 0.01
 """Forces faster than the motion that stay below this (RMS over about one period, share of the mean vertical force) are
@@ -56,7 +57,7 @@ class GroundReactions:
     @property
     def impact_n(self) -> float:
         """RMS length of the impact's force."""
-        return float(np.sqrt(np.square(self.impact[..., :3].sum(axis=1)).sum(axis=-1).mean()))
+        return rms_length(self.impact[..., :3].sum(axis=1))
 
     @cached_property
     def point(self) -> np.ndarray:
