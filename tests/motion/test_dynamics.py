@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from generic_static import balancing_wrench, generic_model, smooth_motion
+from generic_static import generic_model, smooth_motion
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.dynamics import (
@@ -14,6 +14,7 @@ from kinertia.motion.dynamics import (
     root_derivatives,
     root_regressor,
 )
+from kinertia.synthetic.walk import balancing_wrench
 from opensim_model import Oracle
 from pinocchio_model import pin, pinocchio_model
 
