@@ -93,7 +93,7 @@ def residual_terms(
     load, by_axes = root_load(
         skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state, np.ascontiguousarray(about)
     )
-    left = load - root.about_centre(motion.q, wrench)
+    left = root.about_centre(motion.q, load - wrench)
     orders = by_axes[0], by_axes[1], by_axes[2]
     by = RootDerivatives(*skeleton.map.derivatives_to_coordinates(orders, motion.q, motion.qd, motion.qdd))
     by.q[:, 3:, :3] -= root.centre_moves(left)

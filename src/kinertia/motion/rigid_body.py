@@ -265,10 +265,11 @@ def root_load(
         gravity_m_s2: downward, along -y.
         bodies: (a, 10) parameters of what each axis itself bears, in its frame.
         x, v, a: (n, a) places, rates and accelerations of the axes.
-        about: (n, 3) m, the point of the moment; its motion with the axes is left out of the derivatives.
+        about: (n, 3) m, the point of the moment in the derivatives, which leave out that it moves with the axes.
 
     Returns:
-        (n, 6) force and moment, ground axes, and (3, n, 6, a) their derivatives by x, v and a.
+        (n, 6) force, and moment about the ground origin, ground axes, as `axis_forces` has them; and (3, n, 6, a)
+        derivatives by x, v and a of the force, and of the moment about the other point.
     """
     n, count = x.shape
     load, by = np.zeros((n, 6)), np.empty((3, n, 6, count))
@@ -285,10 +286,6 @@ def root_load(
                 by[order, k, 4, j] = column[order, j, 4] - (az * fx - ax * fz)
                 by[order, k, 5, j] = column[order, j, 5] - (ax * fy - ay * fx)
         _whole(tree.parent, frame.force, load, k)
-        fx, fy, fz = load[k, 0], load[k, 1], load[k, 2]
-        load[k, 3] -= ay * fz - az * fy
-        load[k, 4] -= az * fx - ax * fz
-        load[k, 5] -= ax * fy - ay * fx
     return load, by
 
 
