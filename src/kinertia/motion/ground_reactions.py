@@ -65,7 +65,7 @@ class GroundReactions:
     @cached_property
     def point(self) -> np.ndarray:
         """(k, 2, 3) m: centres of pressure, held where there is next to no load."""
-        return np.stack([held_centre_of_pressure(self.wrench[:, foot]) for foot in range(2)], axis=1)
+        return _points(self.wrench)
 
     @property
     def torque(self) -> np.ndarray:
@@ -157,7 +157,11 @@ def _impact(measured: GroundReactions, motion_hz: float) -> np.ndarray:
     impact = np.maximum(1.0 - limit / np.maximum(of_both, 1e-12), 0.0) * both
     shares = power / np.maximum(power.sum(axis=1, keepdims=True), 1e-12)
     parts = shares[..., None] * impact[:, None]
-    return np.concatenate([parts, np.cross(measured.point, parts)], axis=-1)
+    return np.concatenate([parts, np.cross(_points(measured.wrench), parts)], axis=-1)
+
+
+def _points(wrench: np.ndarray) -> np.ndarray:
+    return np.stack([held_centre_of_pressure(wrench[:, foot]) for foot in range(2)], axis=1)
 
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
