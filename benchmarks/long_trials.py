@@ -30,6 +30,8 @@ from synthetic_walks import BANDWIDTH, FIRST_SEED
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "long-trials.md"
 MINUTES = (0.5, 1.0, 3.0, 10.0)
+FAST_PLATES_HZ = 1000.0
+"""Plates' rate with which the longest walk is run once more."""
 RATE_HZ, FRAMES = 100.0, 124
 """Frames to a stride: it takes a whole number of them, at a pace that differs from the recorded one by 1 %."""
 _CAMERA_SD_M = 0.0005
@@ -40,6 +42,7 @@ class Long:
     """What a walk of so many minutes took.
 
     Attributes:
+        plates_hz: samples of the force plates per second.
         kinematics_s, estimate_s: seconds of processor time.
         before_mb, kinematics_mb, estimate_mb: most memory until the data are there, until inverse kinematics and
             smoothing are done, and until the end.
@@ -48,6 +51,7 @@ class Long:
 
     minutes: float
     frames: int
+    plates_hz: float
     kinematics_s: float
     estimate_s: float
     before_mb: float
@@ -56,38 +60,45 @@ class Long:
     iterations: int
 
 
-def stride(person_seed: int = FIRST_SEED) -> tuple[SyntheticTrial, BspPrior, Markers, np.ndarray]:
+def stride(plates_hz: float = RATE_HZ) -> tuple[SyntheticTrial, BspPrior, Markers, np.ndarray]:
     """A stride on a treadmill: its trial, the literature's prior, its markers with skin motion, and the loads on the
-    feet, all as they come back a stride later.
+    feet by the plates' clock, all as they come back a stride later.
     """
-    rng = np.random.default_rng(person_seed)
+    rng = np.random.default_rng(FIRST_SEED)
     person = unlike_literature(walking_subject(), rng)
-    pace = walk(person).time[-1] * RATE_HZ / FRAMES
-    trial = walk(person, FRAMES / RATE_HZ, RATE_HZ, trapezoid=False, pace=float(pace))
+    pace = float(walk(person).time[-1] * RATE_HZ / FRAMES)
+    trial, on_plates = (walk(person, FRAMES / RATE_HZ, rate, False, pace) for rate in (RATE_HZ, plates_hz))
     skin = SkinMotion.draw(trial.skeleton, trial.motion.q, rng)
     markers = skin.moved(trial.markers, trial.skeleton, trial.motion.q)
-    q = trial.motion.q
-    forward = (q[-1, 0] - q[0, 0]) * np.arange(len(q)) / FRAMES
-    back = np.stack([-forward, *np.zeros((2, len(q)))], axis=1)[:, None]
-    loads = trial.foot_loads.copy()
-    loads[..., 3:] += np.cross(back, loads[..., :3])
-    return trial, literature_prior(person.literature), replace(markers, positions=markers.positions + back), loads
+    loads = on_plates.foot_loads.copy()
+    loads[..., 3:] += np.cross(_back(on_plates), loads[..., :3])
+    positions = markers.positions + _back(trial)
+    return trial, literature_prior(person.literature), replace(markers, positions=positions), loads
 
 
-def long_walk(minutes: float) -> tuple[Skeleton, BspPrior, Trial]:
+def _back(trial: SyntheticTrial) -> np.ndarray:
+    """(n, 1, 3) m: how far the belt has carried everything back at each frame."""
+    x = trial.motion.q[:, 0]
+    carried = np.zeros((len(x), 1, 3))
+    carried[:, 0, 0] = -(x[-1] - x[0]) * np.arange(len(x)) / (len(x) - 1)
+    return carried
+
+
+def long_walk(minutes: float, plates_hz: float = RATE_HZ) -> tuple[Skeleton, BspPrior, Trial]:
     """The stride again and again."""
-    trial, prior, markers, loads = stride()
-    frames = np.arange(round(60.0 * minutes * RATE_HZ))
-    clock = frames / RATE_HZ
+    trial, prior, markers, loads = stride(plates_hz)
+    frames, samples = (np.arange(round(60.0 * minutes * rate)) for rate in (RATE_HZ, plates_hz))
     rng = np.random.default_rng(FIRST_SEED)
-    seen = camera_noise(Markers(clock, markers.labels, markers.positions[frames % FRAMES]), _CAMERA_SD_M, rng)
-    feet = FootLoads(clock, loads[frames % FRAMES, :, :3], loads[frames % FRAMES, :, 3:])
+    seen = Markers(frames / RATE_HZ, markers.labels, markers.positions[frames % FRAMES])
+    seen = camera_noise(seen, _CAMERA_SD_M, rng)
+    again = loads[samples % (len(loads) - 1)]
+    feet = FootLoads(samples / plates_hz, again[..., :3], again[..., 3:])
     return trial.skeleton, prior, Trial("walk", seen, feet, np.ones(len(frames), dtype=bool))
 
 
-def measured(minutes: float) -> Long:
+def measured(minutes: float, plates_hz: float) -> Long:
     """In this process."""
-    skeleton, prior, trial = long_walk(minutes)
+    skeleton, prior, trial = long_walk(minutes, plates_hz)
     marks = [(time.process_time(), _most_mb())]
     kinematics = solve_kinematics(skeleton, trial, 0.0, BANDWIDTH.motion_hz)
     marks.append((time.process_time(), _most_mb()))
@@ -95,12 +106,13 @@ def measured(minutes: float) -> Long:
     marks.append((time.process_time(), _most_mb()))
     (begun, before), (solved, kinematics_mb), (ended, estimate_mb) = marks
     spent = (solved - begun, ended - solved, before, kinematics_mb, estimate_mb)
-    return Long(minutes, len(trial.markers.time), *spent, fitted.result.iterations)
+    return Long(minutes, len(trial.markers.time), plates_hz, *spent, fitted.result.iterations)
 
 
-def in_own_process(minutes: float) -> Long:
+def in_own_process(minutes: float, plates_hz: float = RATE_HZ) -> Long:
     """The same, where nothing else is in memory."""
-    told = subprocess.run([sys.executable, __file__, "--alone", str(minutes)], check=True, stdout=subprocess.PIPE)
+    command = [sys.executable, __file__, "--alone", str(minutes), str(plates_hz)]
+    told = subprocess.run(command, check=True, stdout=subprocess.PIPE)
     return Long(**json.loads(told.stdout))
 
 
@@ -118,6 +130,7 @@ def document(walks: list[Long]) -> str:
         [
             f"{w.minutes:g} min",
             str(w.frames),
+            f"{w.plates_hz:g}",
             f"{w.before_mb:.0f}",
             f"{w.kinematics_mb:.0f}",
             f"{w.estimate_mb:.0f}",
@@ -128,12 +141,12 @@ def document(walks: list[Long]) -> str:
         ]
         for w in walks
     ]
-    headings = ["walk", "frames", "data (MB)", "kinematics (MB)", "estimate (MB)"]
+    headings = ["walk", "frames", "plates (Hz)", "data (MB)", "kinematics (MB)", "estimate (MB)"]
     headings += ["kinematics (s)", "estimate (s)", "steps", "ms a frame"]
     return f"""# Long trials
 
-A synthetic walk on a treadmill at 100 Hz, 41 markers and 27 coordinates; seconds of processor time, one thread. Memory
-is the most that the process has held until the data are there (the programs themselves included), until inverse
+A synthetic walk on a treadmill, its markers (41) at 100 Hz, 27 coordinates; seconds of processor time, one thread.
+Memory is the most that the process has held until the data are there (the programs themselves included), until inverse
 kinematics and smoothing are done, and until the end. This page is written by `python benchmarks/long_trials.py`; do not
 edit it by hand.
 
@@ -142,20 +155,22 @@ edit it by hand.
 Time is linear. Up to about a minute, counted over all trials of a fit, the normal equations are in memory as a whole.
 Those of longer walks are summed and eliminated in stretches of some seconds, and made anew on the way back, which takes
 up to twice the time; the results are the same to rounding. Memory then grows only by what there is of every frame:
-markers, coordinates, loads.
+markers, coordinates, loads. Of the loads, at the plates' rate, the estimate holds several copies (as measured, without
+impacts, put right, smooth): with fast plates they are most of it.
 """
 
 
 def main() -> None:
     """Measure and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
-    parser.add_argument("--alone", type=float, help="so many minutes, in this process, as JSON")
+    parser.add_argument("--alone", type=float, nargs=2, help="minutes and plates' rate (Hz): in this process, as JSON")
     parser.add_argument("--minutes", type=float, nargs="+", default=MINUTES)
     given = parser.parse_args()
     if given.alone:
-        print(json.dumps(asdict(measured(given.alone))))
+        print(json.dumps(asdict(measured(*given.alone))))
         return
-    text = document([in_own_process(minutes) for minutes in given.minutes])
+    walks = [(minutes, RATE_HZ) for minutes in given.minutes]
+    text = document([in_own_process(*one) for one in (*walks, (max(given.minutes), FAST_PLATES_HZ))])
     DOCUMENT.write_text(text, encoding="utf-8")
     print(text)
 

@@ -99,18 +99,21 @@ def fit_with_model(shared_data, tmp_path_factory):
 @pytest.fixture(scope="session")
 def demo_command(tmp_path_factory) -> tuple[Demo, Path, Outcome]:
     """Outcome of `run_demo`, its folder, and of the command; with a two-level estimate that stays at its start."""
-    folder = tmp_path_factory.mktemp("demo") / "out"
-    kept = []
 
-    def keep(*arguments, **options):
-        kept.append(run_demo(*arguments, **options))
-        return kept[-1]
+    def make(made: Path) -> tuple[Demo, Path, Outcome]:
+        folder, kept = made / "demo" / "out", []
 
-    two_level = mock.patch("kinertia.estimation.estimate.estimate_two_level", given_back)
-    with two_level, mock.patch("kinertia.cli.demo.run_demo", keep):
-        outcome = run("demo", "-o", folder)
-    assert outcome.status == 0, outcome.err
-    return kept[0], folder, outcome
+        def keep(*arguments, **options):
+            kept.append(run_demo(*arguments, **options))
+            return kept[-1]
+
+        two_level = mock.patch("kinertia.estimation.estimate.estimate_two_level", given_back)
+        with two_level, mock.patch("kinertia.cli.demo.run_demo", keep):
+            outcome = run("demo", "-o", folder)
+        assert outcome.status == 0, outcome.err
+        return kept[0], folder, outcome
+
+    return once(tmp_path_factory, "demo", make)
 
 
 @pytest.fixture(scope="session")
@@ -148,17 +151,20 @@ class MeasuredDemo:
 @pytest.fixture(scope="session")
 def measured_demo(tmp_path_factory) -> MeasuredDemo:
     """Outcome of `kinertia demo --measured`; run once."""
-    folder = tmp_path_factory.mktemp("measured") / "out"
-    fits = []
 
-    def kept(*arguments):
-        fits.append(run_measured_demo(*arguments))
-        return fits[-1]
+    def make(made: Path) -> MeasuredDemo:
+        folder, fits = made / "out", []
 
-    with mock.patch("kinertia.cli.demo.run_measured_demo", kept):
-        outcome = run("demo", "--measured", "-o", folder)
-    assert outcome.status in (0, 1), outcome.err
-    return MeasuredDemo(folder, outcome, fits[0])
+        def kept(*arguments):
+            fits.append(run_measured_demo(*arguments))
+            return fits[-1]
+
+        with mock.patch("kinertia.cli.demo.run_measured_demo", kept):
+            outcome = run("demo", "--measured", "-o", folder)
+        assert outcome.status in (0, 1), outcome.err
+        return MeasuredDemo(folder, outcome, fits[0])
+
+    return once(tmp_path_factory, "measured", make)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.gait27 import Gait27, build_gait27
-from kinertia.motion.dynamics import Motion, residual
+from kinertia.motion.dynamics import Motion
 from kinertia.trial.data import Markers, Recording
 
 # (x forward, y up, z right) in shares of the stature; right side of those that come in pairs
@@ -83,9 +83,3 @@ def smooth_motion(skeleton, n: int = 60, rate_hz: float = 60.0, seed: int = 0) -
     )
     q[:, 1] += 1.0
     return time, Motion(q, qd, qdd)
-
-
-def balancing_wrench(skeleton, bsp, motion: Motion) -> np.ndarray:
-    """The ground reaction (n, 6) about the ground origin that leaves no residual."""
-    load = residual(skeleton, bsp, motion, np.zeros((len(motion.q), 6)))
-    return np.hstack([load[:, :3], load[:, 3:] + np.cross(motion.q[:, :3], load[:, :3])])

@@ -146,17 +146,24 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
     floor = [*static[layout.plates][-2:], 0.0, 0.0]
     values = dict(zip(problem.plates, static[layout.plates][:-2].reshape(-1, 4) + floor, strict=True))
-    for i, foot in np.ndindex(len(loads), 2):
-        x, z, gain, free_moment = values[trial.ground.plates[trial.ground.carrier[i, foot]]]
-        loads[i, foot, 3:] += np.cross(trial.ground.turn @ [x, 0.0, z], loads[i, foot, :3])
-        loads[i, foot, 4] += free_moment * loads[i, foot, 1]
-        loads[i, foot] *= 1.0 + gain
+    here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
+    x, z, gain, free_moment = np.moveaxis(here, -1, 0)
+    offset = np.stack([x, np.zeros_like(x), z], axis=-1) @ trial.ground.turn.T
+    loads[..., 3:] += np.cross(offset, loads[..., :3])
+    loads[..., 4] += free_moment * loads[..., 1]
+    loads *= 1.0 + gain[..., None]
     forces = axis_forces(rigid, skeleton.map.motion(q, qd, qdd))
     load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
     left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
-    moved = (coefficients - problem.bases[k].fit(trial.q)) / COEFFICIENT_SD
+    moved = (coefficients - _start(problem, k)) / COEFFICIENT_SD
     return np.concatenate([errors, left[trial.dynamic].ravel(), moved.ravel()])
+
+
+@lru_cache(maxsize=1)
+def _start(problem: MapProblem, k: int) -> np.ndarray:
+    """Coefficients to which the motion is tied."""
+    return problem.bases[k].fit(problem.trials[k].q)
 
 
 @lru_cache(maxsize=1)

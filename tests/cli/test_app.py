@@ -272,7 +272,7 @@ def test_one_walk_as_two_trials(tmp_path, shared_data):
     ("arguments", "stage"),
     [
         (["fit", "walk.c3d", "--static", "static.c3d", "--sex", "male"], "calibration"),
-        (["demo"], "inverse kinematics"),
+        pytest.param(["demo"], "inverse kinematics", marks=pytest.mark.slow),
         (["study", "table1", "--repeats", "1"], "1 draws"),
     ],
 )

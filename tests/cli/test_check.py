@@ -283,7 +283,7 @@ def test_model_of_other_markers_in_a_subject_file(lab, shared_data):
     assert "no markers in it" in outcome.err
 
 
-@pytest.mark.parametrize(("mass", "status"), [("72.6", 0), ("90", 1)])
+@pytest.mark.parametrize(("mass", "status"), [pytest.param("72.6", 0, marks=pytest.mark.slow), ("90", 1)])
 def test_nobody_reads_on(lab, mass, status):
     """As with `| head`: the page is there, and the status is the check's."""
     files = [str(lab / name) for name in ("walk.trc", "walk_grf.mot")]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from generic_static import balancing_wrench, generic_model, smooth_motion
+from generic_static import generic_model, smooth_motion
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import (
     MAX_STRETCH_S,
@@ -15,6 +15,7 @@ from kinertia.estimation.two_level import (
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual, root_regressor
+from kinertia.synthetic.walk import balancing_wrench
 
 
 @pytest.fixture(scope="module")

@@ -73,6 +73,16 @@ def test_a_plain_model_costs_nothing():
     assert all(a is b for a, b in zip(PLAIN.motion(q, q, q), (q, q, q), strict=True))
 
 
+@pytest.mark.parametrize("axes", [PLAIN, CURVED])
+def test_compiled_functions_get_contiguous_places_and_slopes(axes):
+    q = np.asfortranarray(np.random.default_rng(3).uniform(-0.9, 0.5, (6, axes.count)))
+    places, slopes = axes.places_and_slopes(q)
+    assert places.flags.c_contiguous
+    assert slopes.flags.c_contiguous
+    np.testing.assert_array_equal(places, axes.axes(q))
+    np.testing.assert_array_equal(slopes, 1.0 if axes.identity else axes.slopes(q))
+
+
 def test_a_shared_coordinate_is_not_plain():
     assert not CoordinateMap.of(("a",), ("a", "a"), (None, None)).identity
     assert not CURVED.identity

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from generic_static import balancing_wrench, generic_model, smooth_motion
+from generic_static import generic_model, smooth_motion
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.dynamics import (
@@ -10,9 +10,11 @@ from kinertia.motion.dynamics import (
     inverse_dynamics,
     joined,
     residual,
+    residual_terms,
     root_derivatives,
     root_regressor,
 )
+from kinertia.synthetic.walk import balancing_wrench
 from opensim_model import Oracle
 from pinocchio_model import pin, pinocchio_model
 
@@ -66,10 +68,12 @@ def test_residual_is_opensims(skeleton, bsp, motion):
 
 
 @pytest.mark.parametrize("order", ["q", "qd", "qdd"])
-def test_root_derivatives_agree_with_finite_differences(skeleton, bsp, motion, wrench, order):
-    derivative = getattr(root_derivatives(skeleton, bsp, motion, wrench), order)
-    h = 1e-5
-    for c in range(6):
+def test_derivatives_of_the_residual_agree_with_finite_differences(skeleton, bsp, motion, wrench, order):
+    left, by = residual_terms(skeleton, bsp, motion, wrench)
+    derivative, h = getattr(by, order), 1e-5
+    np.testing.assert_array_equal(left, residual(skeleton, bsp, motion, wrench))
+    np.testing.assert_array_equal(getattr(root_derivatives(skeleton, bsp, motion, wrench), order), derivative[..., :6])
+    for c in range(len(skeleton.coordinates)):
         ends = []
         for sign in (1, -1):
             parts = {name: getattr(motion, name).copy() for name in ("q", "qd", "qdd")}

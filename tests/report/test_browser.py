@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (pip install -e '.[test]')")
 
@@ -49,6 +48,8 @@ class Opened:
 
     def picture(self, locator):
         """Pixels (h, w, 3), 0 to 1."""
+        from matplotlib.image import imread  # takes longer to load than most tests
+
         return imread(io.BytesIO(locator.screenshot()), format="png")[..., :3]
 
 
@@ -273,21 +274,27 @@ def test_page_fits_a_phone(browser, demo_run):
     report.page.close()
 
 
-@pytest.mark.parametrize(("width", "columns"), [(390, 4), (1200, 9)])
-def test_table_shows_its_first_columns_on_a_phone_and_all_on_a_desktop(browser, demo_run, width, columns):
-    report = Opened(browser, demo_run[1] / "report.html", {"width": width, "height": 844})
+@pytest.fixture(scope="module", params=[390, 1200])
+def of_width(request, browser, demo_run):
+    """A report in a window of a phone's width and of a desktop's, and the width."""
+    report = Opened(browser, demo_run[1] / "report.html", {"width": request.param, "height": 844})
+    yield report, request.param
+    report.page.close()
+
+
+def test_table_shows_its_first_columns_on_a_phone_and_all_on_a_desktop(of_width):
+    report, width = of_width
+    columns = {390: 4, 1200: 9}[width]
     rights = report.page.locator("#bsp-table thead th").evaluate_all(
         "cells => cells.map(cell => cell.getBoundingClientRect().right"
         " - cell.closest('.scroll').getBoundingClientRect().right)"
     )
     assert len(rights) == 9
     assert rights[columns - 1] <= 0
-    report.page.close()
 
 
-@pytest.mark.parametrize("width", [390, 1200])
-def test_nothing_lies_on_a_legend(browser, demo_run, width):
-    report = Opened(browser, demo_run[1] / "report.html", {"width": width, "height": 844})
+def test_nothing_lies_on_a_legend(of_width):
+    report, _ = of_width
     assert report.page.locator(".modebar-btn").count() == 0
     covered = report.page.locator(".plot").evaluate_all(
         """plots => plots.flatMap(plot => {
@@ -300,7 +307,6 @@ def test_nothing_lies_on_a_legend(browser, demo_run, width):
         })"""
     )
     assert covered == []
-    report.page.close()
 
 
 def panel_places(page):

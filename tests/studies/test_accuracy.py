@@ -69,7 +69,7 @@ def test_what_an_estimate_at_the_bound_can_attain():
 
 def test_draws_do_not_depend_on_the_number_of_processes():
     """None of its own, and two."""
-    short = replace(PROOF["artefact"], walk_s=SHORT_S)
+    short = replace(PROOF["artefact"], walk_s=0.5)
     alone = [run_draw(4, (short, number)) for number in range(2)]
     assert run_accuracy({"artefact": short}, 2, seed=4, workers=2)["artefact"] == summarised(short.title, alone)
 
@@ -167,7 +167,7 @@ def test_calibration_errors_move_everything(trial):
 
 @in_one_process()
 def test_command(tmp_path, monkeypatch):
-    chosen = {key: replace(SCENARIOS[key], walk_s=SHORT_S) for key in ("study_calibration", "gain")}
+    chosen = {key: replace(SCENARIOS[key], walk_s=0.6) for key in ("study_calibration", "gain")}
     monkeypatch.setattr("kinertia.cli.study.SCENARIOS", chosen)
     outcome = run("study", "accuracy", "--draws", 2, "--workers", 2, "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err

@@ -26,9 +26,9 @@ def test_errors_of_the_truth_are_zero():
 
 
 def test_page(monkeypatch):
-    monkeypatch.setattr("study_noise.study_walk", lambda: study_walk(0.6))
+    monkeypatch.setattr("study_noise.study_walk", lambda: study_walk(0.5))
     draw = study_draw(0, two_level=False)
-    outcome = calibrated(LARGEST, 0, duration_s=0.8)
+    outcome = calibrated(LARGEST, 0, duration_s=0.5)
     values = {name: np.arange(3.0) for name in ("whole", "first half", "second half", "halves")}
     sds = {"whole": np.ones(3), "first half": np.full(3, 2.0), "second half": np.full(3, 2.0), "halves": np.ones(3)}
     page = accuracy.document(

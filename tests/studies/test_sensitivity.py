@@ -49,7 +49,7 @@ def few_conditions(monkeypatch):
 @pytest.mark.usefixtures("few_conditions")
 @in_one_process()
 def test_noise_makes_errors_larger():
-    found = run_sensitivity(4)
+    found = run_sensitivity(2)
     small, large = found.errors["study x 0.25"], found.errors["study x 2"]
     assert small.shape == (7 * len(SHOWN),)
     assert np.mean(small.reshape(-1, 7)[:, :4]) < np.mean(large.reshape(-1, 7)[:, :4])

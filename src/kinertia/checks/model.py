@@ -224,9 +224,8 @@ def _possible(bsp: BodySegmentParameters) -> list[Verdict]:
     ]
     if not found:
         found.append(Verdict("pass", "every body is physically possible"))
-    at_fault = {sentence.split(": ", 1)[0] for sentence in bsp.inconsistencies()}
-    thin = [name for name, mass in zip(bsp.segments, bsp.mass_kg, strict=True) if mass > 0 and name in at_fault]
-    thin = [name for name in thin if name not in impossible]
+    at_fault = ~bsp.physically_consistent() & (bsp.mass_kg > 0)
+    thin = [bsp.segments[i] for i in np.flatnonzero(at_fault) if bsp.segments[i] not in impossible]
     if thin:
         found.append(
             Verdict(

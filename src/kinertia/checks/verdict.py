@@ -18,6 +18,7 @@ from kinertia.estimation.forces_used import full_bandwidth
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
 from kinertia.estimation.warnings import CONTRADICTING_COM_M
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
+from kinertia.trial.rms import rms
 
 if TYPE_CHECKING:
     from kinertia.estimation.result import Fit, TrialFit
@@ -109,11 +110,11 @@ def _residuals(trial: TrialFit) -> list[Verdict]:
     return [
         _and(
             _by_guideline(f"{trial.name}: residual force {at}", "N", force, PASS_FORCE_N, CAUTION_FORCE_N),
-            f"with {full} RMS {_rms(whole[0]):.1f} N",
+            f"with {full} RMS {rms(whole[0]):.1f} N",
         ),
         _and(
             _by_guideline(f"{trial.name}: residual moment {at}", "N m", moment, PASS_MOMENT_NM, CAUTION_MOMENT_NM),
-            f"with {full} RMS {_rms(whole[1]):.1f} N m",
+            f"with {full} RMS {rms(whole[1]):.1f} N m",
         ),
         Verdict(
             small,
@@ -128,10 +129,6 @@ def _lengths(residual: np.ndarray) -> list[np.ndarray]:
     return [np.linalg.norm(part, axis=1) for part in np.hsplit(residual, 2)]
 
 
-def _rms(size: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(size))))
-
-
 def _and(verdict: Verdict, told: str) -> Verdict:
     """The same with something to know beside it."""
     return verdict._replace(sentence=f"{verdict.sentence}; {told}")
@@ -139,11 +136,11 @@ def _and(verdict: Verdict, told: str) -> Verdict:
 
 def _markers(fit: Fit, trial: TrialFit) -> Verdict:
     """How far the model's markers are from the measured ones, at the motion that the forces go with."""
-    rms = float(np.sqrt(np.nanmean(np.square(trial.marker_errors_m["final"]))))
-    told = f"{trial.name}: model and measured markers are {rms * 1e3:.1f} mm apart (RMS)"
-    if rms <= PASS_MARKERS_M:
+    apart_m = rms(trial.marker_errors_m["final"])
+    told = f"{trial.name}: model and measured markers are {apart_m * 1e3:.1f} mm apart (RMS)"
+    if apart_m <= PASS_MARKERS_M:
         return Verdict("pass", f"{told}; well within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm)")
-    if rms <= CAUTION_MARKERS_M:
+    if apart_m <= CAUTION_MARKERS_M:
         return Verdict("caution", f"{told}; within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm), marginally")
     advice = "" if fit.file is None else "; let markers and joint centres move (--calibrate)"
     return Verdict("fail", f"{told}, beyond OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm){advice}")
@@ -153,14 +150,14 @@ def _by_guideline(
     what: str, unit: str, size: np.ndarray, passing: tuple[float, float], marginal: tuple[float, float]
 ) -> Verdict:
     """Verdict on vector lengths (w,) by limits of RMS and peak."""
-    rms, peak = _rms(size), float(size.max())
-    told = f"{what} RMS {rms:.1f} {unit}, peak {peak:.1f} {unit}"
+    typical, peak = rms(size), float(size.max())
+    told = f"{what} RMS {typical:.1f} {unit}, peak {peak:.1f} {unit}"
     levels: tuple[tuple[Level, str, tuple[float, float]], ...] = (
         ("pass", "well within", passing),
         ("caution", "marginally within", marginal),
     )
     for level, where, limits in levels:
-        if rms <= limits[0] and peak <= limits[1]:
+        if typical <= limits[0] and peak <= limits[1]:
             return Verdict(
                 level, f"{told}: {where} OpenSim's guideline (at most {limits[0]:g} and {limits[1]:g} {unit})"
             )

@@ -76,9 +76,10 @@ def fit(
     result = _run(wanted)
     folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
     judged = verdicts(result)
-    report_fit(result)
-    report_verdicts(judged, result, verbose)
-    out.print(f"results in {folder}", soft_wrap=True)
+    if not out.quiet:
+        report_fit(result)
+        report_verdicts(judged, result, verbose)
+        out.print(f"results in {folder}", soft_wrap=True)
     raise typer.Exit(int(stands_against(judged)))
 
 

@@ -38,6 +38,17 @@ MIRROR_SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
 
 _ROUNDING = 1e-6
 _ASYMMETRY = 1e-9
+_CONDITIONS = (
+    "mass is {value:.4g} kg, not positive",
+    "ixx is {value:.4g} kg m2, not positive",
+    "iyy is {value:.4g} kg m2, not positive",
+    "izz is {value:.4g} kg m2, not positive",
+    "triangle inequality ixx + iyy > izz violated by {excess:.4g} kg m2",
+    "triangle inequality iyy + izz > ixx violated by {excess:.4g} kg m2",
+    "triangle inequality izz + ixx > iyy violated by {excess:.4g} kg m2",
+    "ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by {excess:.4g} kg m2",
+)
+"""What is said of a segment that violates them; `BodySegmentParameters._margins` has a column for each."""
 _TABLE_ROWS, _TABLE_COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # ixx iyy izz ixy ixz iyz
 _PIN_ROWS, _PIN_COLUMNS = [0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]  # Ixx Ixy Iyy Ixz Iyz Izz
 
@@ -199,32 +210,29 @@ class BodySegmentParameters:
 
     def physically_consistent(self) -> npt.NDArray[np.bool_]:
         """(s,) whether mass > 0 and pseudo-inertia positive definite: a body of positive density exists."""
-        moments = np.diagonal(self.inertia_kgm2, axis1=1, axis2=2)
-        excess = moments - np.roll(moments, -1, axis=1) - np.roll(moments, -2, axis=1)
-        smallest = np.linalg.eigvalsh(second_moments(self.inertia_kgm2))[:, 0]
-        possible: npt.NDArray[np.bool_] = (self.mass_kg > 0) & (moments > 0).all(axis=1) & (smallest > 0)
-        return possible & (excess < 0).all(axis=1)
+        possible: npt.NDArray[np.bool_] = np.all(self._margins() > 0, axis=1)
+        return possible
 
     def inconsistencies(self) -> list[str]:
         """One sentence for each physical condition that a segment violates; empty if all are consistent."""
-        return [f"{name}: {problem}." for i, name in enumerate(self.segments) for problem in self._problems(i)]
+        margins = self._margins()
+        violated = ~(margins > 0)
+        # the principal moments say nothing new where those about the axes are impossible
+        violated[:, -1] &= ~violated[:, 1:-1].any(axis=1)
+        return [
+            f"{self.segments[i]}: {_CONDITIONS[k].format(value=margins[i, k], excess=-margins[i, k])}."
+            for i, k in np.argwhere(violated)
+        ]
 
-    def _problems(self, i: int) -> list[str]:
-        # about the CoM: the pseudo-inertia is positive definite about one point or else about none
-        problems = [] if self.mass_kg[i] > 0 else [f"mass is {self.mass_kg[i]:.4g} kg, not positive"]
-        moments = dict(zip(("ixx", "iyy", "izz"), np.diag(self.inertia_kgm2[i]), strict=True))
-        bad = [f"{name} is {v:.4g} kg m2, not positive" for name, v in moments.items() if not v > 0]
-        for a, b, c in (("ixx", "iyy", "izz"), ("iyy", "izz", "ixx"), ("izz", "ixx", "iyy")):
-            excess = moments[c] - moments[a] - moments[b]
-            if not excess < 0:
-                bad.append(f"triangle inequality {a} + {b} > {c} violated by {excess:.4g} kg m2")
-        smallest = np.linalg.eigvalsh(second_moments(self.inertia_kgm2[i]))[0]
-        if not bad and not smallest > 0:
-            bad.append(
-                "ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by "
-                f"{-2 * smallest:.4g} kg m2"
-            )
-        return problems + bad
+    def _margins(self) -> FloatArray:
+        """(s, 8) what must be positive for each of `_CONDITIONS`, kg and kg m2.
+
+        Moments are about the CoM: the pseudo-inertia is positive definite about one point or else about none.
+        """
+        moments = np.diagonal(self.inertia_kgm2, axis1=1, axis2=2)
+        excess = moments - np.roll(moments, -1, axis=1) - np.roll(moments, -2, axis=1)
+        smallest = np.linalg.eigvalsh(second_moments(self.inertia_kgm2))[:, 0]
+        return np.column_stack([self.mass_kg, moments, -excess[:, [2, 0, 1]], 2.0 * smallest])
 
     def mirrored(self) -> BodySegmentParameters:
         """The body's mirror image, with the same names in the same order.

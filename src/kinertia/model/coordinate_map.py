@@ -66,6 +66,11 @@ class CoordinateMap:
         """(n, a) derivative of every axis by its coordinate; None where all are one and the axes the coordinates."""
         return None if self.identity else self._evaluated(q, 1)
 
+    def places_and_slopes(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`axes` and `slopes` as the compiled functions take them: each (n, a), contiguous, ones for slopes of None."""
+        at, slopes = np.ascontiguousarray(self.axes(q)), self.slopes(q)
+        return at, np.ones_like(at) if slopes is None else np.ascontiguousarray(slopes)
+
     def motion(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Places, rates and accelerations of the axes, each (n, a)."""
         if self.identity:

@@ -73,7 +73,7 @@ class Landmarks:
 def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
     """Median position of every marker and landmark over the frames of a static trial."""
     markers = static.markers
-    seen = np.all(np.isfinite(markers.positions), axis=-1)
+    seen = markers.seen
     median = {
         label: np.median(markers.positions[seen[:, i], i], axis=0)
         for i, label in enumerate(markers.labels)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import compiled, inlined
 
 
 class KinematicTree(NamedTuple):
@@ -88,6 +88,16 @@ def place_axes(
         axes[j, 0] = here[1] * unit[2] - here[2] * unit[1]
         axes[j, 1] = here[2] * unit[0] - here[0] * unit[2]
         axes[j, 2] = here[0] * unit[1] - here[1] * unit[0]
+
+
+@inlined
+def hand_down(parent: np.ndarray, sums: np.ndarray) -> None:
+    """Add to the sums (a, k) of every axis those of the axes that it carries."""
+    for j in range(len(parent) - 1, -1, -1):
+        before = parent[j]
+        if before >= 0:
+            for k in range(sums.shape[1]):
+                sums[before, k] += sums[j, k]
 
 
 @compiled

@@ -88,11 +88,6 @@ class Pose:
     axes: np.ndarray
     slopes: np.ndarray | None
 
-    def cut(self, frames: slice | np.ndarray) -> Pose:
-        """The pose at these frames."""
-        slopes = None if self.slopes is None else self.slopes[frames]
-        return Pose(self.rotation[frames], self.translation[frames], self.axes[frames], slopes)
-
 
 @dataclass(frozen=True)
 class Skeleton:

@@ -56,23 +56,11 @@ def joined(parts: Sequence[Motion]) -> Motion:
 
 @dataclass(frozen=True)
 class RootDerivatives:
-    """Derivatives of the residual with respect to root position, velocity and acceleration, each (n, 6, 6)."""
+    """Derivatives of the residual with respect to coordinates, velocities and accelerations.
 
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-
-
-@dataclass(frozen=True)
-class RootLoad:
-    """Load of the whole body about a point, ground axes, and its derivatives by all coordinates.
-
-    Attributes:
-        load: (n, 6) N and N m.
-        q, qd, qdd: (n, 6, c) by the coordinates and their rates; the point stays.
+    Each is (n, 6, c), with a column for each of the coordinates, or (n, 6, 6), for those of the root alone.
     """
 
-    load: np.ndarray
     q: np.ndarray
     qd: np.ndarray
     qdd: np.ndarray
@@ -82,15 +70,6 @@ def axis_motion(skeleton: Skeleton, motion: Motion) -> tuple[np.ndarray, np.ndar
     """Places, rates and accelerations of all axes, each (n, a), as the compiled functions take them."""
     x, v, a = skeleton.map.motion(motion.q, motion.qd, motion.qdd)
     return np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
-
-
-def root_terms(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, about: np.ndarray) -> RootLoad:
-    """Load of the body about the points (n, 3) m, and its derivatives by all coordinates and their rates."""
-    bodies = skeleton.bodies(bsp)
-    state = axis_motion(skeleton, motion)
-    load, by = root_load(skeleton.tree, skeleton.gravity_m_s2, bodies, *state, np.ascontiguousarray(about))
-    parts = skeleton.map.derivatives_to_coordinates((by[0], by[1], by[2]), motion.q, motion.qd, motion.qdd)
-    return RootLoad(load, *parts)
 
 
 def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
@@ -106,13 +85,27 @@ def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wre
     return skeleton.root.about_centre(motion.q, load - wrench)
 
 
+def residual_terms(
+    skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
+) -> tuple[np.ndarray, RootDerivatives]:
+    """P (n, 6) as in `residual`, and its derivatives by all coordinates; the centre moves along with the root."""
+    root, state, about = skeleton.root, axis_motion(skeleton, motion), skeleton.root.centre(motion.q)
+    load, by_axes = root_load(
+        skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state, np.ascontiguousarray(about)
+    )
+    left = root.about_centre(motion.q, load - wrench)
+    orders = by_axes[0], by_axes[1], by_axes[2]
+    by = RootDerivatives(*skeleton.map.derivatives_to_coordinates(orders, motion.q, motion.qd, motion.qdd))
+    by.q[:, 3:, :3] -= root.centre_moves(left)
+    return left, by
+
+
 def consistent_root_acceleration(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> np.ndarray:
     """Root acceleration (n, 6) that zeroes P at the given state, equation (2)."""
-    left = residual(skeleton, bsp, motion, wrench)
-    mass = root_derivatives(skeleton, bsp, motion, wrench).qdd
-    result: np.ndarray = motion.qdd[:, :6] - np.linalg.solve(mass, left[..., None])[..., 0]
+    left, by = residual_terms(skeleton, bsp, motion, wrench)
+    result: np.ndarray = motion.qdd[:, :6] - np.linalg.solve(by.qdd[:, :, :6], left[..., None])[..., 0]
     return result
 
 
@@ -129,10 +122,8 @@ def root_derivatives(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> RootDerivatives:
     """Derivatives of P with respect to the root coordinates, velocities and accelerations."""
-    terms = root_terms(skeleton, bsp, motion, skeleton.root.centre(motion.q))
-    by_q = terms.q[:, :, :6].copy()
-    by_q[:, 3:, :3] -= skeleton.root.centre_moves(terms.load - skeleton.root.about_centre(motion.q, wrench))
-    return RootDerivatives(by_q, terms.qd[:, :, :6], terms.qdd[:, :, :6])
+    _, by = residual_terms(skeleton, bsp, motion, wrench)
+    return RootDerivatives(by.q[:, :, :6], by.qd[:, :, :6], by.qdd[:, :, :6])
 
 
 def inverse_dynamics(

@@ -21,17 +21,22 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 
+from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 from kinertia.trial.data import nearest_samples
+from kinertia.trial.rms import rms_length
 
 IMPACT_SHARE_OF_WEIGHT = 0.01
 """Forces faster than the motion that stay below this (RMS over about one period, share of the mean vertical force) are
 no impact: twice what rigid segments leave (`observation.FORCE_SD_OF_WEIGHT`)."""
 NOISE_LEFT_N = 1.0
 """Deviation of the noise that may stay in the vertical force."""
+_FORGOTTEN = 40
+"""Samples from which on a natural cubic spline knows nothing of another one: each divides its weight by 3.7, so that
+this many leave less than rounding does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,36 +61,50 @@ class GroundReactions:
     @property
     def impact_n(self) -> float:
         """RMS length of the impact's force."""
-        return float(np.sqrt(np.square(self.impact[..., :3].sum(axis=1)).sum(axis=-1).mean()))
+        return rms_length(self.impact[..., :3].sum(axis=1))
 
     @cached_property
     def point(self) -> np.ndarray:
         """(k, 2, 3) m: centres of pressure, held where there is next to no load."""
-        return np.stack([held_centre_of_pressure(self.wrench[:, foot]) for foot in range(2)], axis=1)
+        return _points(self.wrench)
 
-    @cached_property
+    @property
     def torque(self) -> np.ndarray:
         """(k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
-        return self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
+        return self._torque(slice(None))
 
     def at(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) loads at these times: natural cubic splines of force, point and torque, as OpenSim's tools lay them
         through the columns of the file that is written of them.
         """
-        force, point, torque = np.moveaxis(self._spline(time), 2, 0)
-        return np.concatenate([force, torque + np.cross(point, force)], axis=-1)
+        return np.concatenate([self._at(time[some]) for some in pieces(len(time))])
 
     def rate(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) derivative of `at` by time, N/s and N m/s."""
+        return np.concatenate([self._rate(time[some]) for some in pieces(len(time))])
+
+    def _at(self, time: np.ndarray) -> np.ndarray:
+        force, point, torque = np.moveaxis(self._spline(time)(time), 2, 0)
+        return np.concatenate([force, torque + np.cross(point, force)], axis=-1)
+
+    def _rate(self, time: np.ndarray) -> np.ndarray:
+        spline = self._spline(time)
         (force, point, _), (by_force, by_point, by_torque) = (
-            np.moveaxis(self._spline(time, order), 2, 0) for order in (0, 1)
+            np.moveaxis(spline(time, order), 2, 0) for order in (0, 1)
         )
         return np.concatenate([by_force, by_torque + np.cross(by_point, force) + np.cross(point, by_force)], axis=-1)
 
-    @cached_property
-    def _spline(self) -> BSpline:
-        columns = np.stack([self.wrench[..., :3], self.point, self.torque], axis=2)
-        return make_interp_spline(self.time, columns, k=3, bc_type="natural")
+    def _spline(self, time: np.ndarray) -> BSpline:
+        """Of all samples, as far as these times can tell: of those around them."""
+        first, last = np.searchsorted(self.time, (time.min(), time.max()))
+        near = slice(max(int(first) - _FORGOTTEN, 0), int(last) + _FORGOTTEN)
+        columns = np.stack([self.wrench[near, :, :3], self.point[near], self._torque(near)], axis=2)
+        return make_interp_spline(self.time[near], columns, k=3, bc_type="natural")
+
+    def _torque(self, samples: slice) -> np.ndarray:
+        wrench = self.wrench[samples]
+        result: np.ndarray = wrench[..., 3:] - np.cross(self.point[samples], wrench[..., :3])
+        return result
 
     def impact_at(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) `impact` at the samples nearest to these times."""
@@ -102,7 +121,7 @@ def measured_reactions(kinematics: Kinematics) -> GroundReactions:
         # white noise of deviation s, cut off at f, keeps s sqrt(2 f / rate)
         cutoff_hz = float(max(rate_hz / 2.0 * (NOISE_LEFT_N / loads.noise_n) ** 2, kinematics.cutoff_hz))
         wrench = _low_passed(time, wrench, cutoff_hz)
-    return GroundReactions(time, wrench, loads.carrier[near], np.zeros_like(wrench), cutoff_hz)
+    return GroundReactions(time, wrench, loads.carrier[near], np.zeros(wrench.shape), cutoff_hz)
 
 
 def ground_reactions(kinematics: Kinematics, motion_hz: float, wanted: ForceCutoff = "auto") -> GroundReactions:
@@ -139,7 +158,11 @@ def _impact(measured: GroundReactions, motion_hz: float) -> np.ndarray:
     impact = np.maximum(1.0 - limit / np.maximum(of_both, 1e-12), 0.0) * both
     shares = power / np.maximum(power.sum(axis=1, keepdims=True), 1e-12)
     parts = shares[..., None] * impact[:, None]
-    return np.concatenate([parts, np.cross(measured.point, parts)], axis=-1)
+    return np.concatenate([parts, np.cross(_points(measured.wrench), parts)], axis=-1)
+
+
+def _points(wrench: np.ndarray) -> np.ndarray:
+    return np.stack([held_centre_of_pressure(wrench[:, foot]) for foot in range(2)], axis=1)
 
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:

@@ -236,11 +236,9 @@ def normal_equations(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tu
     """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers (n, m, 3); r = measured - model."""
     tree, axes = model.tree, model.map
     carrier, local = model.carried_markers
-    at, slopes = axes.axes(q), axes.slopes(q)
-    if slopes is None:
-        slopes = np.ones_like(at)
+    at, slopes = axes.places_and_slopes(q)
     return marker_sums.normal_equations(
-        tree, axes.owner, slopes, np.ascontiguousarray(at), carrier, local, np.ascontiguousarray(measured), axes.count
+        tree, axes.owner, slopes, at, carrier, local, np.ascontiguousarray(measured), axes.count
     )
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.model.compiled import compiled, inlined
-from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import inner
 
 
@@ -68,15 +68,6 @@ def swapped(sums: np.ndarray) -> np.ndarray:
             for c in range(3):
                 result[j, 7 + 3 * r + c] = sums[j, 7 + 3 * c + r]
     return result
-
-
-@compiled
-def hand_down(parent: np.ndarray, sums: np.ndarray) -> None:
-    """Add to the sums (a, k) of every axis those of the axes that it carries."""
-    for j in range(len(parent) - 1, -1, -1):
-        if parent[j] >= 0:
-            for k in range(sums.shape[1]):
-                sums[parent[j], k] += sums[j, k]
 
 
 @inlined

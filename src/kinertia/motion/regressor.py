@@ -13,11 +13,11 @@ from kinertia.motion.rigid_body import empty_frame, move
 def regressor(
     tree: KinematicTree, gravity_m_s2: float, x: np.ndarray, v: np.ndarray, a: np.ndarray, about: np.ndarray
 ) -> np.ndarray:
-    """(n, 6, s, 10) load of every segment per unit of its ten parameters, in its own frame; else as `root_load`.
+    """(n, 6, s, 10) load of every segment per unit of its ten parameters, in its own frame; moments about `about`.
 
-    With w, e and b the angular velocity, angular acceleration and acceleration of the origin in the segment's axes,
-    mass m, first moment h and inertia I need the force m b + e x h + w x (w x h) and, about the segment's origin, the
-    moment h x b + I e + w x (I w).
+    The arguments are those of `root_load`. With w, e and b the angular velocity, angular acceleration and acceleration
+    of the origin in the segment's axes, mass m, first moment h and inertia I need the force m b + e x h + w x (w x h)
+    and, about the segment's origin, the moment h x b + I e + w x (I w).
     """
     n, count = x.shape
     segments = len(tree.carrier)

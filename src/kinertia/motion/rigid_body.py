@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.model.compiled import compiled, inlined
-from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import force_cross, inner, motion_cross
 
 
@@ -40,9 +40,10 @@ class Frame(NamedTuple):
         rotation, translation, axes: as `place_axes` has them.
         velocity, acceleration: (a + 1, 6) of what the axis moves; the last row, -1, is the ground's.
         swept, turned: (a, 6) P and Q above.
-        inertia: (a, 13) m, H and J above, J row by row.
-        bias: (a, 12) p and K above, K row by row.
-        force: (a, 6) f above.
+        inertia: (a, 13) m, H and J above, J row by row, of all that the axis carries.
+        bias: (a, 12) p and K above, K row by row, of the same.
+        force: (a, 6) f above, of the same.
+        column: (3, a, 6) derivatives of the force by the axis' place, rate and acceleration.
     """
 
     rotation: np.ndarray
@@ -55,6 +56,7 @@ class Frame(NamedTuple):
     inertia: np.ndarray
     bias: np.ndarray
     force: np.ndarray
+    column: np.ndarray
 
 
 @compiled
@@ -65,7 +67,7 @@ def empty_frame(a: int, gravity_m_s2: float) -> Frame:
     acceleration[a, 1] = gravity_m_s2
     places = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty(six)
     moved = velocity, acceleration, np.empty(six), np.empty(six)
-    return Frame(*places, *moved, np.empty((a, 13)), np.empty((a, 12)), np.empty(six))
+    return Frame(*places, *moved, np.empty((a, 13)), np.empty((a, 12)), np.empty(six), np.empty((3, a, 6)))
 
 
 @compiled
@@ -91,7 +93,7 @@ def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame
             acceleration[j, k] = acceleration[parent, k] + axes[j, k] * a[j] + swept[j, k] * v[j]
 
 
-@compiled
+@inlined
 def _place_inertia(j: int, bodies: np.ndarray, frame: Frame) -> None:
     """Inertia of what axis j itself bears, at the ground origin, from its ten parameters in the axis' frame."""
     rotation, translation, inertia = frame.rotation, frame.translation, frame.inertia
@@ -187,13 +189,44 @@ def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.
 
 
 @compiled
-def _load(bodies: np.ndarray, frame: Frame, derivatives: bool) -> None:
-    """Force, inertia, and bias if there are to be derivatives, of what each axis itself bears: bodies (a, 10)."""
+def _columns(frame: Frame) -> None:
+    """The derivatives `column`, from all else in the frame."""
+    axes, swept, inertia, bias = frame.axes, frame.swept, frame.inertia, frame.bias
+    place, rate, acceleration = frame.column[0], frame.column[1], frame.column[2]
+    part = np.empty((3, 6))
+    for j in range(len(axes)):
+        force_cross(axes, j, frame.force, j, place, j)
+        _bias_times(bias, j, swept, j, part, 0)
+        _inertia_times(inertia, j, frame.turned, j, part, 1)
+        _bias_times(bias, j, axes, j, rate, j)
+        _inertia_times(inertia, j, swept, j, part, 2)
+        _inertia_times(inertia, j, axes, j, acceleration, j)
+        for k in range(6):
+            place[j, k] += part[0, k] + part[1, k]
+            rate[j, k] += 2.0 * part[2, k]
+
+
+@compiled
+def _fill(
+    tree: KinematicTree,
+    bodies: np.ndarray,
+    x: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    frame: Frame,
+    derivatives: bool,
+) -> None:
+    """All of one frame, from bodies (a, 10) and places, rates and accelerations (a,) as `root_load` has them.
+
+    Without `derivatives` inertia, bias and column are of no use afterwards.
+    """
+    move(tree, x, v, a, frame)
     inertia, bias, force = frame.inertia, frame.bias, frame.force
     momentum, second = np.empty((1, 6)), np.empty((1, 6))
     force[:] = 0.0
-    inertia[:] = 0.0
-    bias[:] = 0.0
+    if derivatives:
+        inertia[:] = 0.0
+        bias[:] = 0.0
     for j in range(len(bodies)):
         borne = False
         for k in range(10):
@@ -208,40 +241,11 @@ def _load(bodies: np.ndarray, frame: Frame, derivatives: bool) -> None:
             force[j, k] += second[0, k]
         if derivatives:
             _place_bias(j, frame.velocity, inertia, momentum, bias)
-
-
-@compiled
-def _sum_up(parent: np.ndarray, frame: Frame, derivatives: bool) -> None:
-    """Add to what each axis bears itself all that it carries."""
-    force, inertia, bias = frame.force, frame.inertia, frame.bias
-    for j in range(len(parent) - 1, -1, -1):
-        before = parent[j]
-        if before >= 0:
-            for k in range(6):
-                force[before, k] += force[j, k]
-            if derivatives:
-                for k in range(13):
-                    inertia[before, k] += inertia[j, k]
-                for k in range(12):
-                    bias[before, k] += bias[j, k]
-
-
-@compiled
-def _columns(frame: Frame, by: np.ndarray) -> None:
-    """by = (3, a, 6) derivatives of what each axis carries by its place, rate and acceleration."""
-    axes, swept, inertia, bias = frame.axes, frame.swept, frame.inertia, frame.bias
-    place, rate, acceleration = by[0], by[1], by[2]
-    part = np.empty((3, 6))
-    for j in range(len(axes)):
-        force_cross(axes, j, frame.force, j, place, j)
-        _bias_times(bias, j, swept, j, part, 0)
-        _inertia_times(inertia, j, frame.turned, j, part, 1)
-        _bias_times(bias, j, axes, j, rate, j)
-        _inertia_times(inertia, j, swept, j, part, 2)
-        _inertia_times(inertia, j, axes, j, acceleration, j)
-        for k in range(6):
-            place[j, k] += part[0, k] + part[1, k]
-            rate[j, k] += 2.0 * part[2, k]
+    hand_down(tree.parent, force)
+    if derivatives:
+        hand_down(tree.parent, inertia)
+        hand_down(tree.parent, bias)
+        _columns(frame)
 
 
 @compiled
@@ -261,19 +265,18 @@ def root_load(
         gravity_m_s2: downward, along -y.
         bodies: (a, 10) parameters of what each axis itself bears, in its frame.
         x, v, a: (n, a) places, rates and accelerations of the axes.
-        about: (n, 3) m, the point of the moment; its motion with the axes is left out of the derivatives.
+        about: (n, 3) m, the point of the moment in the derivatives, which leave out that it moves with the axes.
 
     Returns:
-        (n, 6) force and moment, ground axes, and (3, n, 6, a) their derivatives by x, v and a.
+        (n, 6) force, and moment about the ground origin, ground axes, as `axis_forces` has them; and (3, n, 6, a)
+        derivatives by x, v and a of the force, and of the moment about the other point.
     """
     n, count = x.shape
     load, by = np.zeros((n, 6)), np.empty((3, n, 6, count))
-    frame, column = empty_frame(count, gravity_m_s2), np.empty((3, count, 6))
+    frame = empty_frame(count, gravity_m_s2)
+    column = frame.column
     for k in range(n):
-        move(tree, x[k], v[k], a[k], frame)
-        _load(bodies, frame, True)
-        _sum_up(tree.parent, frame, True)
-        _columns(frame, column)
+        _fill(tree, bodies, x[k], v[k], a[k], frame, True)
         ax, ay, az = about[k, 0], about[k, 1], about[k, 2]
         for j in range(count):
             for order in range(3):
@@ -283,10 +286,6 @@ def root_load(
                 by[order, k, 4, j] = column[order, j, 4] - (az * fx - ax * fz)
                 by[order, k, 5, j] = column[order, j, 5] - (ax * fy - ay * fx)
         _whole(tree.parent, frame.force, load, k)
-        fx, fy, fz = load[k, 0], load[k, 1], load[k, 2]
-        load[k, 3] -= ay * fz - az * fy
-        load[k, 4] -= az * fx - ax * fz
-        load[k, 5] -= ax * fy - ay * fx
     return load, by
 
 
@@ -308,9 +307,7 @@ def axis_forces(
     tau, load = np.empty((n, count)), np.zeros((n, 6))
     frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
-        move(tree, x[k], v[k], a[k], frame)
-        _load(bodies, frame, False)
-        _sum_up(tree.parent, frame, False)
+        _fill(tree, bodies, x[k], v[k], a[k], frame, False)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
         _whole(tree.parent, frame.force, load, k)
@@ -324,24 +321,22 @@ def axis_force_derivatives(
     """(n, a) as `axis_forces` and (3, n, a, a) their derivatives by x, v and a (columns)."""
     n, count = x.shape
     tau, by = np.empty((n, count)), np.zeros((3, n, count, count))
-    frame, column = empty_frame(count, gravity_m_s2), np.empty((3, count, 6))
+    frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
-        move(tree, x[k], v[k], a[k], frame)
-        _load(bodies, frame, True)
-        _sum_up(tree.parent, frame, True)
-        _columns(frame, column)
+        _fill(tree, bodies, x[k], v[k], a[k], frame, True)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
-        _through_axes(tree.parent, frame, column, by[0, k], by[1, k], by[2, k])
+        _through_axes(tree.parent, frame, by[0, k], by[1, k], by[2, k])
     return tau, by
 
 
 @compiled
 def _through_axes(
-    parent: np.ndarray, frame: Frame, column: np.ndarray, place: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
+    parent: np.ndarray, frame: Frame, place: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
 ) -> None:
-    """Derivatives (a, a) of the forces of axes, from those (3, a, 6) of what they carry."""
+    """Derivatives (a, a) of the forces of axes, from those of what they carry."""
     axes, swept, turned, inertia, bias = frame.axes, frame.swept, frame.turned, frame.inertia, frame.bias
+    column = frame.column
     borne = np.empty((2, 6))
     for j in range(len(parent)):
         i = j

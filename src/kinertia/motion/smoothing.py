@@ -58,6 +58,7 @@ from scipy.linalg import lapack
 from scipy.optimize import minimize_scalar
 
 from kinertia.errors import KinertiaError
+from kinertia.motion.frames_at_once import pieces
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,7 @@ MIN_SAMPLES = 6
 
 _STEP = 1e-30  # of the complex-step derivative: its square vanishes beside 1
 _BAND = 4  # diagonals on either side of the main one
+_ROWS_AT_ONCE = 20000
 
 
 class SmoothingError(KinertiaError):
@@ -275,6 +277,15 @@ class _System:
 
     @classmethod
     def of(cls, t: Array) -> _System:
+        """A stretch at a time: row j of either knows of t[j] to t[j + 5] only."""
+        parts = [cls._of(t[rows.start : rows.stop + 5]) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
+        rows = [slice(0, _ROWS_AT_ONCE)] * (len(parts) - 1) + [slice(None)]
+        differences = [part.differences[kept] for part, kept in zip(parts, rows, strict=True)]
+        gram = [part.gram[:, kept] for part, kept in zip(parts, rows, strict=True)]
+        return cls(np.concatenate(differences), np.concatenate(gram, axis=1))
+
+    @classmethod
+    def _of(cls, t: Array) -> _System:
         n = len(t)
         knots = np.stack([t[m : n - 3 + m] for m in range(4)], axis=1)
         factors = knots[:, :, None] - knots[:, None, :] + np.eye(4)
@@ -305,13 +316,16 @@ class _System:
         places = 2 * np.arange(n - 3) + 3
         matrix = self._matrix((2 * np.pi * f) ** 3 * (1 + 0.5j * _STEP), visible, places)
         factors, pivots, _ = lapack.zgbtrf(matrix, _BAND, _BAND, overwrite_ab=1)
-        right = np.zeros((2 * n - 1, y.shape[1]), order="F")
-        right[places] = sum(self.differences[:, m, None] * y[m : n - 3 + m] for m in range(4))
-        solution, _ = lapack.dgbtrs(factors.real, _BAND, _BAND, right, pivots, overwrite_b=1)
-        residual = solution[::2]
         diagonal = factors[2 * _BAND]
         trace = 1.5 + float((diagonal.imag / diagonal.real).sum()) / _STEP
-        return y - residual, (residual[visible] ** 2).sum(axis=0), trace
+        real = factors.real.copy(order="F")
+        del matrix, factors, diagonal  # of plates they are some hundred MB
+        right = np.zeros((2 * n - 1, y.shape[1]), order="F")
+        for m in range(4):
+            right[places] += self.differences[:, m, None] * y[m : n - 3 + m]
+        solution, _ = lapack.dgbtrs(real, _BAND, _BAND, right, pivots, overwrite_b=1)
+        residual = solution[::2]
+        return y - residual, np.einsum("nc,nc,n->c", residual, residual, visible.astype(float)), trace
 
     def _matrix(self, root: complex, visible: NDArray[np.bool_], places: NDArray[np.int_]) -> NDArray[np.complex128]:
         """LAPACK band storage, element (r, c) at [2 _BAND + r - c, c], of the matrix for sqrt(m) = root."""

@@ -26,6 +26,7 @@ from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.sto import TimeTable, write_table
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
+from kinertia.trial.rms import rms, rms_length
 
 _PARTS = (slice(0, 3), slice(3, 6))
 """Force and moment of a residual."""
@@ -185,15 +186,15 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "impact_force_rms_N": trial.reactions.impact_n,
         "mass_from_force_kg": mass_from_force_kg(fit.literature, trial),
         "seconds": {stage: round(value, 4) for stage, value in trial.seconds.items()},
-        "marker_rms_m": {stage: _rms(values[..., None]) for stage, values in trial.marker_errors_m.items()},
+        "marker_rms_m": {stage: rms(values) for stage, values in trial.marker_errors_m.items()},
         "marker_displacements_m": _displacements(fit, trial),
-        "residual_force_rms_N": _each(force, _rms),
+        "residual_force_rms_N": _each(force, rms_length),
         "residual_force_max_N": _each(force, _max),
-        "residual_moment_rms_Nm": _each(moment, _rms),
+        "residual_moment_rms_Nm": _each(moment, rms_length),
         "residual_moment_max_Nm": _each(moment, _max),
-        "full_residual_force_rms_N": _each(full_force, _rms),
+        "full_residual_force_rms_N": _each(full_force, rms_length),
         "full_residual_force_max_N": _each(full_force, _max),
-        "full_residual_moment_rms_Nm": _each(full_moment, _rms),
+        "full_residual_moment_rms_Nm": _each(full_moment, rms_length),
         "full_residual_moment_max_Nm": _each(full_moment, _max),
     }
 
@@ -206,11 +207,6 @@ def _displacements(fit: Fit, trial: TrialFit) -> dict[str, list[float]]:
 
 def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float]:
     return {stage: statistic(values) for stage, values in vectors.items()}
-
-
-def _rms(vectors: np.ndarray) -> float:
-    """Root mean square length of vectors (..., k) over everything that is not NaN."""
-    return math.sqrt(float(np.nanmean(np.square(vectors).sum(axis=-1))))
 
 
 def _max(vectors: np.ndarray) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.headline import words
 from kinertia.report.page import bsp_rows, residual_rows
@@ -62,6 +60,6 @@ def recording_html(recording: Recording) -> str:
 
 def _gappy(markers: Markers) -> list[tuple[str, float]]:
     """Labels of markers that are not always seen, and the percentage of frames that show them; the least seen first."""
-    seen = np.asarray(np.isfinite(markers.positions).all(axis=2)).mean(axis=0)
+    seen = markers.seen.mean(axis=0)
     found = [(label, 100 * float(share)) for label, share in zip(markers.labels, seen, strict=True) if share < 1]
     return sorted(found, key=lambda item: item[1])

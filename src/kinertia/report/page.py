@@ -147,7 +147,7 @@ def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], wandering: tuple[st
     """Per marker: distances in mm, share of frames that show it (whole trial), longest gap in s."""
     kinematics = trial.kinematics
     markers = kinematics.trial.markers.select(kinematics.ik.labels)
-    seen = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    seen = markers.seen
     found = {stage: rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
     rows = []
     for k, label in enumerate(markers.labels):

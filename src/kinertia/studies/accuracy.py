@@ -38,6 +38,7 @@ from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.motions import MOTIONS
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
+from kinertia.trial.rms import rms
 
 WALK_S = 2.5
 CLASSES = {
@@ -273,13 +274,9 @@ def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.nda
     return ClassAccuracy(
         float(within.mean()),
         float(within.std() / np.sqrt(len(within))),
-        _rms(away),
-        _rms(errors),
-        _rms(before),
-        _rms(bound),
+        rms(away),
+        rms(errors),
+        rms(before),
+        rms(bound),
         float(np.mean(each < each_before)),
     )
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(np.square(values))))

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from kinertia.errors import KinertiaError
 from kinertia.estimation.prepare import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
@@ -21,6 +19,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.trial.rms import rms_length
 
 _FROZEN = 1e-3
 """Deviation that is left to frozen parameters, share of the prior's."""
@@ -105,10 +104,4 @@ def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, ba
     left = residual(model, fitted.bsp, motion, loads.sum(axis=1))
     modelled = model.marker_positions(model.pose(motion.q))
     away = held.trial.markers.arranged(model.labels)[held.frames] - modelled
-    force, moment = np.square(left).reshape(-1, 2, 3).sum(axis=2).T
-    return Explained(
-        fitted.result.cost[1],
-        float(np.sqrt(force.mean())),
-        float(np.sqrt(moment.mean())),
-        float(np.sqrt(np.nanmean(np.square(away).sum(axis=-1)))),
-    )
+    return Explained(fitted.result.cost[1], rms_length(left[:, :3]), rms_length(left[:, 3:]), rms_length(away))

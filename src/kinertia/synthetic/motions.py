@@ -13,8 +13,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion, residual
-from kinertia.synthetic.walk import STATIC_ONLY, SyntheticSubject, SyntheticTrial, walk
+from kinertia.motion.dynamics import Motion
+from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, balancing_wrench, walk
 
 DURATION_S, RATE_HZ = 5.0, 100.0
 FAST_PACE = 4.0 / 3.0
@@ -69,7 +69,7 @@ def _phase(frequency_hz: float) -> np.ndarray:
 
 def _standing(subject: SyntheticSubject, angles_deg: Angles) -> SyntheticTrial:
     """The trial of these angles over time (all others zero), with the feet where they are at the first frame."""
-    skeleton = subject.skeleton.with_markers([m for m in subject.skeleton.markers if m.label not in STATIC_ONLY])
+    skeleton = subject.moving_skeleton
     time = _time()
     q = np.zeros((len(time), len(skeleton.coordinates)))
     for name, values in angles_deg.items():
@@ -77,10 +77,8 @@ def _standing(subject: SyntheticSubject, angles_deg: Angles) -> SyntheticTrial:
     q[:, :3] = _feet_stay(skeleton, q)
     spline = make_interp_spline(time, q, k=5)
     motion = Motion(*(spline(time, order) for order in range(3)))
-    at_pelvis = residual(skeleton, subject.bsp, motion, np.zeros((len(time), 6)))
-    force = at_pelvis[:, :3]
-    wrench = np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])
-    loads = np.stack([0.5 * wrench, 0.5 * wrench], axis=1)
+    half = 0.5 * balancing_wrench(skeleton, subject.bsp, motion)
+    loads = np.stack([half, half], axis=1)
     return SyntheticTrial(skeleton, subject.bsp, time, motion, loads, np.zeros(6))
 
 

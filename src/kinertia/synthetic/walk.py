@@ -67,6 +67,11 @@ class SyntheticSubject:
     literature: BodySegmentParameters
     bsp: BodySegmentParameters
 
+    @property
+    def moving_skeleton(self) -> Skeleton:
+        """The skeleton without the markers `STATIC_ONLY`."""
+        return self.skeleton.with_markers([m for m in self.skeleton.markers if m.label not in STATIC_ONLY])
+
 
 @dataclass(frozen=True, eq=False)
 class SyntheticTrial:
@@ -169,7 +174,7 @@ def walk(
     """
     series = _WalkSeries.read()
     series = replace(series, period_s=series.period_s / pace, speed_m_s=series.speed_m_s * pace)
-    skeleton = subject.skeleton.with_markers([m for m in subject.skeleton.markers if m.label not in STATIC_ONLY])
+    skeleton = subject.moving_skeleton
     duration_s = series.period_s if duration_s is None else duration_s
     time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
     motion = series.motion(skeleton.coordinates, time + start * series.period_s)
@@ -177,11 +182,16 @@ def walk(
     if trapezoid:
         motion = motion.with_root(*Integration(time).track(motion.qdd[:, :6], periodic), motion.qdd[:, :6])
     deviation = np.abs(motion.q[:, :6] - periodic).max(axis=0)
-    at_pelvis = residual(skeleton, subject.bsp, motion, np.zeros((len(time), 6)))
-    force = at_pelvis[:, :3]
-    wrench = np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])
+    wrench = balancing_wrench(skeleton, subject.bsp, motion)
     loads = _on_feet(skeleton, motion, wrench, *series.support(time + start * series.period_s))
     return SyntheticTrial(skeleton, subject.bsp, time, motion, loads, deviation)
+
+
+def balancing_wrench(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion) -> np.ndarray:
+    """Ground reaction (n, 6) that leaves no residual: force (N), moment about the ground origin (N m)."""
+    at_pelvis = residual(skeleton, bsp, motion, np.zeros((len(motion.q), 6)))
+    force = at_pelvis[:, :3]
+    return np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])
 
 
 def consistent_trial(

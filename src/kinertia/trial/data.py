@@ -68,6 +68,11 @@ class Markers:
             return float("nan")
         return round(float((len(self.time) - 1) / (self.time[-1] - self.time[0])), 9)
 
+    @property
+    def seen(self) -> BoolArray:
+        """(n, m) in which frames each marker was seen."""
+        return np.asarray(np.isfinite(self.positions).all(axis=2))
+
     def cut(self, start_s: float, end_s: float) -> Markers:
         """The frames with start_s <= time <= end_s."""
         keep = (self.time >= start_s - _TIME_TOLERANCE_S) & (self.time <= end_s + _TIME_TOLERANCE_S)

@@ -151,7 +151,7 @@ def _short_gaps_filled(markers: Markers) -> FloatArray:
 
     Only for telling whether a foot is on the ground.
     """
-    seen = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    seen = markers.seen
     kept = np.flatnonzero(seen.mean(axis=0) >= 0.5)
     if not kept.size:
         raise MarkerSetError(

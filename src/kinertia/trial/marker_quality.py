@@ -62,7 +62,7 @@ class Travel:
 
 def visibility(markers: Markers) -> tuple[Visibility, ...]:
     """Of every marker, in the file's order."""
-    seen = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    seen = markers.seen
     frame_s = 0.0 if len(markers.time) < 2 else 1.0 / markers.rate_hz
     return tuple(
         Visibility(label, float(shown.mean()), frame_s * _longest(~shown))
@@ -76,7 +76,7 @@ def _longest(missing: BoolArray) -> int:
 
 def travel(markers: Markers) -> Travel:
     """What the person does: by how far the median marker comes from where it is first seen to where it is last."""
-    shown = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    shown = markers.seen
     spans = [(k, np.flatnonzero(on)) for k, on in enumerate(shown.T) if on.any()]
     moved = [
         np.linalg.norm(np.ptp(np.percentile(markers.positions[frames, k], (5, 95), axis=0), axis=0))
@@ -97,7 +97,7 @@ def travel(markers: Markers) -> Travel:
 
 def extent_m(markers: Markers) -> FloatArray:
     """(3,) m, median over the frames of how far the markers of one frame reach along x, y, z; NaN where unknown."""
-    shown = markers.positions[np.isfinite(markers.positions).all(axis=2).sum(axis=1) >= 2]
+    shown = markers.positions[markers.seen.sum(axis=1) >= 2]
     if not len(shown):
         return np.full(3, np.nan)
     return np.asarray(np.median(np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1), axis=0))

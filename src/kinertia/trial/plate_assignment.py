@@ -145,7 +145,7 @@ def _held(time: FloatArray, on_plate: npt.NDArray[np.int_]) -> npt.NDArray[np.in
 
 def _centre(markers: Markers, time: FloatArray) -> FloatArray:
     """Horizontal middle (k, 2) m of the markers at these times, held where none is seen."""
-    seen = np.asarray(np.isfinite(markers.positions).all(axis=2))
+    seen = markers.seen
     some = seen.any(axis=1)
     if not some.any():
         return np.full((len(time), 2), np.nan)

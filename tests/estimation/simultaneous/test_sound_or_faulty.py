@@ -1,15 +1,21 @@
+from math import exp
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import norm
 
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
 
 PLATE = SoundOrFaulty(0.001, 0.015, 0.1)
 
 
+def normal(x: float, mean: float, sd: float) -> float:
+    """Density, but for a factor that all have."""
+    return exp(-0.5 * ((x - mean) / sd) ** 2) / sd
+
+
 def density(x: float) -> float:
-    return 0.9 * norm.pdf(x, 0.0, PLATE.sound_sd) + 0.1 * norm.pdf(x, 0.0, PLATE.faulty_sd)
+    return 0.9 * normal(x, 0.0, PLATE.sound_sd) + 0.1 * normal(x, 0.0, PLATE.faulty_sd)
 
 
 @pytest.mark.parametrize(("mean", "sd"), [(0.0, 0.002), (0.004, 0.002), (-0.012, 0.006), (0.02, 0.003)])
@@ -18,7 +24,7 @@ def test_one_quantity_has_the_mean_and_deviation_of_the_product(mean, sd):
 
     def part(power):
         def value(x):
-            return x**power * density(x) * norm.pdf(x, mean, sd)
+            return x**power * density(x) * normal(x, mean, sd)
 
         return quad(value, -0.1, 0.1, points=[0.0, mean], limit=200, epsabs=0, epsrel=1e-6)[0]
 

@@ -90,7 +90,6 @@ class SimultaneousFit:
         posterior: deviations and calibration.
         motions: per trial, at the frames of its measured window.
         foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
-        bandwidth: of motion and forces.
         warnings: one sentence each.
     """
 
@@ -101,7 +100,6 @@ class SimultaneousFit:
     posterior: Posterior
     motions: tuple[Motion, ...]
     foot_loads: tuple[np.ndarray, ...]
-    bandwidth: Bandwidth
     warnings: tuple[str, ...]
 
 
@@ -153,7 +151,6 @@ def fit_simultaneous(
         posterior,
         motions,
         loads,
-        bandwidth,
         tuple(_warnings(prior, uncertainty, result, posterior, trials)),
     )
 

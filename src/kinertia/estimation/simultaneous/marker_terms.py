@@ -19,10 +19,10 @@ from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled
-from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.spatial import inner
-from kinertia.motion.marker_sums import add_force, add_marker, hand_down, met_force, place_marker, swapped
+from kinertia.motion.marker_sums import add_force, add_marker, met_force, place_marker, swapped
 
 
 class _Markers(NamedTuple):
@@ -106,15 +106,15 @@ def add_markers(
     information = ErrorInformation.of(np.isfinite(measured).all(axis=-1), *deviation)
     place = np.empty(q.shape[1], dtype=np.int64)
     place[np.concatenate([moving, still])] = np.arange(q.shape[1])
-    at, slopes = skeleton.map.axes(q), skeleton.map.slopes(q)
+    at, slopes = skeleton.map.places_and_slopes(q)
     carrier, local = skeleton.carried_markers
     turned = skeleton.tree.segment_rotation[skeleton.marker_segments]
     patterns, coefficients = skin
     markers = _Markers(
         skeleton.tree,
         place[skeleton.map.owner],
-        np.ascontiguousarray(at),
-        np.ones_like(at) if slopes is None else np.ascontiguousarray(slopes),
+        at,
+        slopes,
         carrier,
         local + (turned @ patterns.displaced(coefficients)[..., None])[..., 0],
         np.ascontiguousarray(turned),

@@ -31,7 +31,7 @@ from kinertia.model.log_cholesky import (
     to_log_cholesky,
 )
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion, root_regressor, root_terms
+from kinertia.motion.dynamics import Motion, residual_terms, root_regressor
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
 
@@ -365,23 +365,19 @@ class MapProblem:
         trial, layout = self.trials[k], self.layout
         q, qd, qdd = self.full(self.bases[k].evaluate(coefficients, frames), static)
         motion = Motion(q, qd, qdd)
-        root = skeleton.root
-        terms = root_terms(skeleton, self.bsp(static), motion, root.centre(q))
         loads = self.foot_loads(k, static, 0, frames)
-        left = terms.load - root.about_centre(q, loads.sum(axis=1))
-        by_q = terms.q
-        by_q[:, 3:, :3] -= root.centre_moves(left)
+        left, by = residual_terms(skeleton, self.bsp(static), motion, loads.sum(axis=1))
         by_static = np.zeros((len(q), 6, layout.in_root.stop))
         shown = root_regressor(skeleton, self.segments, motion)
         by_static[:, :, layout.theta] = by_body(shown, dynamic_jacobian(static[layout.theta]))
-        by_static[:, :, layout.coordinates] = by_q[:, :, self.still]
+        by_static[:, :, layout.coordinates] = by.q[:, :, self.still]
         by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static)) @ self.to_plates
         rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
         by_instrument = np.concatenate([by_plate, rates[:, :, None]], axis=2)
-        by_instrument[:, 3:] -= np.cross(root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
+        by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
         by_static[:, :, layout.instruments] = -by_instrument
         sd = self.root_sd(trial)[:, None]
-        by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by_q, terms.qd, terms.qdd))
+        by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by.q, by.qd, by.qdd))
         return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[:, 0])
 
 
