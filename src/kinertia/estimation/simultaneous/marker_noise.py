@@ -109,10 +109,9 @@ def marker_noise(
     """
     seen = np.isfinite(errors)
     filled = np.where(seen, errors, 0.0)
-    count = np.maximum(seen.sum(axis=(0, 2)), 1)
     per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
     lost = np.sqrt(per_frame / max(per_frame - len(skeleton.coordinates), 1.0))
-    sd = np.maximum(lost * np.sqrt(np.square(filled).sum(axis=(0, 2)) / count), SMALLEST_MARKER_SD_M)
+    sd = np.maximum(lost * root_mean_square(errors), SMALLEST_MARKER_SD_M)
     frames = frames_alike(errors, sd)
     usual = float(np.median(sd))
     labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
@@ -135,6 +134,13 @@ def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float
     return result
 
 
+def root_mean_square(errors: np.ndarray) -> np.ndarray:
+    """(m,) of errors (n, m, 3); zero for markers that are never seen."""
+    count = np.maximum(np.isfinite(errors).sum(axis=(0, 2)), 1)
+    result: np.ndarray = np.sqrt(np.nansum(np.square(errors), axis=(0, 2)) / count)
+    return result
+
+
 def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
     """Over how many neighbouring frames errors (n, m, 3) of these deviations (m,) are alike."""
     return Repetition.of(weighed(errors, sd_m)).frames
@@ -143,7 +149,7 @@ def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
 def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:
     """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
     each = np.broadcast_to(sd_m, errors.shape[1])
-    result: np.ndarray = np.nan_to_num(errors / each[:, None]).reshape(len(errors), -1)
+    result: np.ndarray = np.nan_to_num(errors / np.where(each > 0.0, each, 1.0)[:, None]).reshape(len(errors), -1)
     return result
 
 

@@ -17,6 +17,7 @@ from kinertia.estimation.simultaneous.marker_noise import (
     frames_alike,
     marker_noise,
     markers_alike,
+    root_mean_square,
     taken_by_chance,
     weighed,
 )
@@ -72,7 +73,7 @@ def observe(
     errors = [_errors(skeleton, each) for each in trials]
     rates = [each.trial.markers.rate_hz for each in trials]
     skin = skin_patterns(skeleton, [each.smooth for each in errors])
-    usual = [np.sqrt(np.nanmean(np.square(each.varying), axis=(0, 2))) for each in errors]
+    usual = [root_mean_square(each.varying) for each in errors]
     frames = [frames_alike(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
     places = np.stack([each.displaced for each in errors])
     rest = WithoutSkin.of([each.varying for each in errors], places, skin, frames)
