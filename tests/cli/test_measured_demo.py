@@ -15,6 +15,7 @@ import cut_walk
 from command_line import fitted, run
 from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.estimation.from_files import prepare_subject
+from kinertia.estimation.simultaneous.skin import OTHER_EXPECTED_SD_M
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto
@@ -157,7 +158,8 @@ def test_simultaneous_fit(measured_demo):
     assert force < 5.0 < before
     assert moment < 3.0
     rms = {stage: np.sqrt(np.nanmean(np.square(errors))) for stage, errors in trial.marker_errors_m.items()}
-    assert rms["final"] < 1.3 * rms["ik"]
+    # bones leave the markers by what skin is thought to have moved
+    assert rms["final"] < np.hypot(rms["ik"], np.sqrt(3.0) * OTHER_EXPECTED_SD_M)
     assert any("plate 1" in warning and "gain" in warning for warning in fit.warnings)
 
 

@@ -25,6 +25,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
         at_truth(seen, trial),
         marker_sd=np.full_like(seen.marker_sd, 1e-3),
         marker_frames=1.0,
+        skin=None,
         force_sd=study_bound.EXACT_N,
         moment_sd=0.3 * study_bound.EXACT_N,
     )

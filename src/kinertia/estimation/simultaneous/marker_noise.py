@@ -19,10 +19,6 @@ from kinertia.model.skeleton import Skeleton
 
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0
-CORNER = 2.0
-"""Skin motion has a nearly flat spectrum up to its highest frequency; that of an autoregressive process as strong and
-as long falls before. One with so many times its bandwidth, as dense at zero frequency, is denser there. Less makes
-measured people odder and their residuals larger, more makes joint moments vaguer than they are."""
 _MOST_TAKEN = 0.6
 """Share of the variance of errors that regression on the joints is thought to take by chance, at most."""
 _ROUNDS = 2
@@ -121,9 +117,7 @@ def marker_noise(
         frames / rate_hz,
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
-    alike = max(1.0, frames / CORNER)
-    spread = markers_alike(skeleton, filled) * frames / alike
-    return noise, sd * np.sqrt(spread / (1.0 - taken)), alike
+    return noise, sd * np.sqrt(markers_alike(skeleton, filled) / (1.0 - taken)), frames
 
 
 def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float) -> np.ndarray:
