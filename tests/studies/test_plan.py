@@ -58,7 +58,8 @@ def test_a_walk_shows_more_than_squats_and_both_more_than_one(planned):
 def test_more_recordings_never_say_less(planned):
     both = planned.sd["walk", "squat"]
     for alone in (("walk",), ("squat",)):
-        assert (both <= planned.sd[alone] * (1 + 1e-6)).all()
+        # each set of recordings reads its own noise
+        assert (both <= planned.sd[alone] * (1 + 1e-4)).all()
     assert (both < planned.prior_sd).all()
 
 
