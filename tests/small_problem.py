@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.marker_errors import double_pole
+from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
 from kinertia.estimation.simultaneous.skin import SkinPatterns
@@ -142,7 +142,7 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
         for pattern in range(skin.first[m], skin.last[m]):
             along = [next(coefficient) for _ in range(3)]
             positions[:, m] += skin.values[:, pattern, None] * (pose.rotation[:, segment] @ along)
-    errors = whitened(trial.markers - positions, trial.marker_sd, trial.marker_frames)
+    errors = whitened(trial.markers - positions, *trial.marker_process)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
     floor = [*static[layout.plates][-2:], 0.0, 0.0]
     values = dict(zip(problem.plates, static[layout.plates][:-2].reshape(-1, 4) + floor, strict=True))
@@ -176,15 +176,22 @@ def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin
     return skeleton, pinocchio_model(skeleton, problem.bsp(values))
 
 
-def whitened(errors: np.ndarray, sd: np.ndarray, frames: float) -> np.ndarray:
-    """Errors (n, m, 3) of an autoregressive process with a double pole as independent ones, by the dense covariance of
-    every run of frames without a gap."""
-    r = double_pole(frames)
+def process_covariance(process: ErrorProcess, lags: np.ndarray) -> np.ndarray:
+    """At these lags, of a second-order autoregressive process of unit variance (Yule and Walker)."""
+    one, two = process.of_before
+    found = [1.0, one / (1.0 - two)]
+    while len(found) <= np.max(lags):
+        found.append(one * found[-1] + two * found[-2])
+    return np.array(found)[lags]
+
+
+def whitened(errors: np.ndarray, sd: np.ndarray, process: ErrorProcess) -> np.ndarray:
+    """Errors (n, m, 3) of an autoregressive process as independent ones, by the dense covariance of every run of frames
+    without a gap."""
     result = []
     for j in range(errors.shape[1]):
         seen = np.flatnonzero(np.isfinite(errors[:, j, 0]))
         for run in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
-            lag = np.abs(run[:, None] - run)
-            covariance = sd[j] ** 2 * r**lag * (1.0 + lag * (1.0 - r * r) / (1.0 + r * r))
+            covariance = sd[j] ** 2 * process_covariance(process, np.abs(run[:, None] - run))
             result.append(np.linalg.solve(np.linalg.cholesky(covariance), errors[run, j]).ravel())
     return np.concatenate(result)

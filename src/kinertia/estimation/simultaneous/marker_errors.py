@@ -1,25 +1,103 @@
 """Errors of markers that are alike from frame to frame: their information, banded in time.
 
-The errors of a marker coordinate are a second-order autoregressive process with a double pole,
+The errors of a marker coordinate are a second-order autoregressive process with the poles r and s,
 
-    e[t] = 2 r e[t-1] - r^2 e[t-2] + white noise,
+    e[t] = (r + s) e[t-1] - r s e[t-2] + white noise,
 
 with the same deviation in every frame. The inverse of its covariance, the information, is banded: a frame sees itself
 and the two on either side, so the normal matrix stays banded, too. A gap starts the process anew.
 
-What skin does is slow. A first-order process that is as strong and as long has the same information on what is slow,
-but a spectrum that falls by the square of the frequency only: errors of markers would shake the accelerations, and
-with them joint moments, by more than they do. This one falls by the fourth power.
+What skin does is slow. With s = 0, a first-order process, the spectrum falls by the square of the frequency only:
+errors of markers would shake the accelerations, and with them joint moments, by more than they do. With s = r it falls
+by the fourth power. But the cameras' noise is in every frame, and of errors that last long, in a slow movement or a
+posture, such a spectrum would soon be below it: the estimate would follow the noise. So s is as near to r as the errors
+allow that a frame shows beyond what the two before it tell.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 LATER = 2
 """How many frames after it a frame meets in the information."""
+
+
+_STEPS = 32
+"""Processes that are tried between one with a double pole and white noise."""
+
+
+class ErrorProcess(NamedTuple):
+    """Poles of the process, the larger first; white noise has none.
+
+    >>> process = ErrorProcess.alike_over(9.0)
+    >>> round(process.larger, 3), process.larger == process.smaller, round(process.frames, 6)
+    (0.571, True, 9.0)
+    """
+
+    larger: float = 0.0
+    smaller: float = 0.0
+
+    @classmethod
+    def alike_over(cls, frames: float) -> ErrorProcess:
+        """With a double pole, alike over so many neighbouring frames, the sum of its correlations over all lags:
+        (1 + r)^3 / ((1 + r^2) (1 - r)).
+        """
+        if frames <= 1.0:
+            return cls()
+        roots = np.roots([1.0 + frames, 3.0 - frames, 3.0 + frames, 1.0 - frames])
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        r = float(real[(real >= 0.0) & (real < 1.0)][0])
+        return cls(r, r)
+
+    @classmethod
+    def with_smaller(cls, smaller: float, frames: float) -> ErrorProcess:
+        """With this smaller pole s, alike over (1 - r s) (1 + r) (1 + s) / ((1 + r s) (1 - r) (1 - s)) frames."""
+        more = frames * (1.0 - smaller) / (1.0 + smaller)
+        half = (1.0 - smaller) * (1.0 + more)
+        larger = 2.0 * (more - 1.0) / (half + np.sqrt(half**2 + 4.0 * smaller * (more - 1.0) ** 2))
+        return cls(float(larger), smaller)
+
+    @property
+    def of_before(self) -> tuple[float, float]:
+        """What a frame has of the one before it, and of the second before it."""
+        return self.larger + self.smaller, -self.larger * self.smaller
+
+    @property
+    def new(self) -> float:
+        """Variance of what a frame shows beyond the two before it, of a process of unit variance."""
+        one, two = self.of_before
+        return (1.0 + two) * ((1.0 - two) ** 2 - one**2) / (1.0 - two)
+
+    @property
+    def frames(self) -> float:
+        """Over how many neighbouring frames its errors are alike."""
+        one, two = self.of_before
+        return self.new / (1.0 - one - two) ** 2
+
+    @classmethod
+    def read(cls, frames: float, together: np.ndarray) -> tuple[ErrorProcess, float]:
+        """The slowest process that has as much news in a frame as errors do, and its variance.
+
+        From errors of unit variance that are alike over so many frames. Where even a first-order process has less, it
+        is a shorter one, with as much more variance: as much is told about what does not vary.
+
+        Args:
+            frames: of the errors.
+            together: (k, 3, 3) mean products of the errors of a frame and of the two before it, of several kinds of
+                errors: as much as in any of them.
+        """
+        double = cls.alike_over(frames)
+        slow = [cls.with_smaller(float(s), frames) for s in np.linspace(double.smaller, 0.0, _STEPS)[1:]]
+        short = [cls.with_smaller(0.0, float(f)) for f in np.geomspace(max(frames, 1.0), 1.0, _STEPS)[1:]]
+        for process in (double, *slow, *short):
+            variance = frames / process.frames
+            beyond = np.array([1.0, *(-each for each in process.of_before)])
+            if np.max(beyond @ together @ beyond) <= variance * process.new:
+                break
+        return process, max(variance, 1.0)
 
 
 @dataclass(frozen=True)
@@ -37,15 +115,14 @@ class ErrorInformation:
     second: np.ndarray
 
     @classmethod
-    def of(cls, seen: np.ndarray, sd_m: np.ndarray, frames: float) -> ErrorInformation:
-        """Of markers seen (n, m), with deviations sd_m (m,), alike over so many neighbouring frames (`double_pole`)."""
-        r = double_pole(frames)
-        one, two = 2.0 * r, -r * r
+    def of(cls, seen: np.ndarray, sd_m: np.ndarray, process: ErrorProcess) -> ErrorInformation:
+        """Of markers seen (n, m), with deviations sd_m (m,)."""
+        one, two = process.of_before
         n, m = seen.shape
         own, after, second = np.zeros((n, m)), np.zeros((max(n - 1, 0), m)), np.zeros((max(n - 2, 0), m))
-        # of a process of unit variance: white noise's, and the correlation of neighbours
-        noise, alike = (1.0 - r * r) ** 3 / (1.0 + r * r), one / (1.0 - two)
-        three = (seen[2:] & seen[1:-1] & seen[:-2]) / noise
+        three = (seen[2:] & seen[1:-1] & seen[:-2]) / process.new
+        # correlation of neighbours
+        alike = one / (1.0 - two)
         own[2:] += three
         own[1:-1] += one * one * three
         own[:-2] += two * two * three
@@ -61,17 +138,3 @@ class ErrorInformation:
         own += seen & ~before & ~np.vstack([seen[1:], np.zeros((1, m), dtype=bool)])
         weight = 1.0 / np.square(sd_m)
         return cls(own * weight, after * weight, second * weight)
-
-
-def double_pole(frames: float) -> float:
-    """r of the process whose errors are alike over so many neighbouring frames, the sum of its correlations over all
-    lags: (1 + r)^3 / ((1 + r^2) (1 - r)).
-
-    >>> round(double_pole(1.0), 6), round(double_pole(9.0), 3)
-    (0.0, 0.571)
-    """
-    if frames <= 1.0:
-        return 0.0
-    roots = np.roots([1.0 + frames, 3.0 - frames, 3.0 + frames, 1.0 - frames])
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    return float(real[(real >= 0.0) & (real < 1.0)][0])

@@ -93,9 +93,9 @@ class WithoutSkin:
 
 def marker_noise(
     skeleton: Skeleton, errors: np.ndarray, taken: np.ndarray, rate_hz: float
-) -> tuple[MarkerNoise, np.ndarray, float]:
-    """Noise of the markers of a trial, their effective deviations (m,), and over how many neighbouring frames errors of
-    these deviations are alike.
+) -> tuple[MarkerNoise, np.ndarray, float, np.ndarray]:
+    """Noise of the markers of a trial, their effective deviations (m,), over how many neighbouring frames errors of
+    these deviations are alike, and their products (2, 3, 3) with those of the two frames before (`Observation`).
 
     Args:
         skeleton: with the trial's markers.
@@ -117,7 +117,8 @@ def marker_noise(
         frames / rate_hz,
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
-    return noise, sd * np.sqrt(markers_alike(skeleton, filled) / (1.0 - taken)), frames
+    effective = sd * np.sqrt(markers_alike(skeleton, filled) / (1.0 - taken))
+    return noise, effective, frames, lost**2 * _products(skeleton, errors / effective[:, None])
 
 
 def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float) -> np.ndarray:
@@ -138,6 +139,19 @@ def root_mean_square(errors: np.ndarray) -> np.ndarray:
 def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
     """Over how many neighbouring frames errors (n, m, 3) of these deviations (m,) are alike."""
     return Repetition.of(weighed(errors, sd_m)).frames
+
+
+def _products(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
+    """(2, 3, 3) mean products of the errors (n, m, 3) of a frame and of the two before it, those of each marker and
+    those that the markers of a segment have in common, as `markers_alike` counts it.
+    """
+    three = np.stack([errors[2:], errors[1:-1], errors[:-2]])
+    shown = np.isfinite(three).all(axis=(0, 3))
+    three = np.where(shown[..., None], three, 0.0)
+    common = [three[:, :, skeleton.marker_segments == s].sum(axis=2) for s in np.unique(skeleton.marker_segments)]
+    kinds = [each.reshape(3, -1) for each in (three, np.stack(common, axis=1))]
+    result: np.ndarray = np.stack([each @ each.T for each in kinds]) / max(3 * np.count_nonzero(shown), 1)
+    return result
 
 
 def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:

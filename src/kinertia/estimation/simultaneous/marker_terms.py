@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
-from kinertia.estimation.simultaneous.marker_errors import LATER, ErrorInformation
+from kinertia.estimation.simultaneous.marker_errors import LATER, ErrorInformation, ErrorProcess
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.skin import SkinPatterns
@@ -84,7 +84,7 @@ def add_markers(
     skeleton: Skeleton,
     measured: np.ndarray,
     q: np.ndarray,
-    deviation: tuple[np.ndarray, float],
+    deviation: tuple[np.ndarray, ErrorProcess],
     skin: tuple[SkinPatterns, np.ndarray],
     moving: np.ndarray,
     still: np.ndarray,
@@ -99,7 +99,7 @@ def add_markers(
         skeleton: with static coordinates free.
         measured: (n, m, 3) m, in the stretch with its neighbours; NaN where not seen.
         q: (n, c) rad and m, in the same frames.
-        deviation: (m,) of each marker's errors, m, and over how many neighbouring frames they are alike.
+        deviation: (m,) of each marker's errors, m, and how they go from frame to frame.
         skin: its patterns in the same frames, and the coefficients (k,).
         moving, still: columns of q that move in time, and that do not.
     """

@@ -172,7 +172,7 @@ def _observed(
     """One trial on its own."""
     (start, end), time = kinematics.window_s, errors.time
     taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
-    noise, effective, alike = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
+    noise, effective, alike, products = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
@@ -188,6 +188,7 @@ def _observed(
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
             skin=skin,
+            frame_products=products,
         ),
         noise,
     )

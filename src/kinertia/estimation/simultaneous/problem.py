@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.elimination import TrialNormal, summed
+from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
@@ -55,6 +56,8 @@ class Observation:
         displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
         repeats: by how much errors that come back have raised all variances (`repeated`).
         skin: what the skin may follow; None: it does not move with the joints.
+        frame_products: (k, 3, 3) of several kinds of errors, over their deviations, the mean products of a frame's and
+            of the two before it; None: of a process with a double pole.
     """
 
     time: np.ndarray
@@ -69,9 +72,21 @@ class Observation:
     displacement_sd_m: np.ndarray | float = 0.0
     repeats: float = 1.0
     skin: SkinPatterns | None = None
+    frame_products: np.ndarray | None = None
+
+    @property
+    def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
+        """(m,) deviations of the markers' errors, m, and how they go from frame to frame."""
+        if self.frame_products is None:
+            return self.marker_sd, ErrorProcess.alike_over(self.marker_frames)
+        process, variance = ErrorProcess.read(self.marker_frames, self.frame_products)
+        return np.sqrt(variance) * self.marker_sd, process
 
     def repeated(self, times: float) -> Observation:
-        """The same where its errors come back so many times in all that is estimated from."""
+        """The same where its errors come back so many times in all that is estimated from.
+
+        Larger deviations leave more room for what is new in a frame, the cameras' noise: it does not come back.
+        """
         more = np.sqrt(times)
         return replace(
             self,
@@ -79,6 +94,7 @@ class Observation:
             force_sd=more * self.force_sd,
             moment_sd=more * self.moment_sd,
             repeats=times * self.repeats,
+            frame_products=None if self.frame_products is None else self.frame_products / times,
         )
 
 
@@ -333,7 +349,7 @@ class MapProblem:
         near, own, start = stretch.with_neighbours, stretch.splines, stretch.splines.start
         skeleton = self.placed(static)
         normal = NormalEquations.zero(stretch.size, len(self.moving), layout.size)
-        noise, skin = (trial.marker_sd, trial.marker_frames), (self.skin[k].cut(near), static[layout.skin])
+        noise, skin = trial.marker_process, (self.skin[k].cut(near), static[layout.skin])
         q = self.full(basis.evaluate(coefficients, near), static)[0]
         add_markers(
             normal,
