@@ -20,8 +20,8 @@ class Interval(NamedTuple):
     """Terms of the frames of a knot interval, and of the two after them.
 
     Attributes:
-        squares: (5, f, c c) J^T W J of each frame with itself, with the next, the latter transposed, and the same with
-            the second after it.
+        squares: (5 f, c c) J^T W J of each frame with itself, f frames with the next, the latter transposed, and the
+            same with the second after it.
         across: (f + 2, c, s) J^T W S.
         gradient: (f, c) J^T W r.
     """
@@ -53,25 +53,49 @@ def to_splines(
     right: np.ndarray,
 ) -> None:
     """Weigh the terms of an interval with the splines that are active, two by two."""
-    n, size, c, at = len(first), len(band), right.shape[1], first[start]
-    own, weights = np.zeros((1 + LATER, _TOGETHER)), np.empty(1 + 2 * LATER)
+    n, size, c, at, most = len(first), len(band), right.shape[1], first[start], len(interval.gradient)
+    own = np.zeros((1 + LATER, most, _TOGETHER))
     for k in range(start, end):
-        row = k - start
-        own[:] = 0.0
         for later in range(min(LATER, n - 1 - k) + 1):
             for i in range(6):
-                own[later, first[k + later] - at + i] = values[k + later, i]
-        for i in range(_TOGETHER):
-            for j in range(i, min(_TOGETHER, size - at)):
-                weights[0] = own[0, i] * own[0, j]
-                for later in range(1, LATER + 1):
-                    weights[2 * later - 1] = own[0, i] * own[later, j]
-                    weights[2 * later] = own[later, i] * own[0, j]
-                _add_rows(weights, interval.squares[:, row], band[at + i, j - i])
+                own[later, k - start, first[k + later] - at + i] = values[k + later, i]
         for i in range(6):
             for j in range(c):
-                right[at + i, j] += own[0, i] * interval.gradient[row, j]
-        to_border(at, values[k], interval.across[row], border)
+                right[at + i, j] += own[0, k - start, i] * interval.gradient[k - start, j]
+    products, pair = np.dot(_pair_weights(own), interval.squares), 0
+    for i in range(_TOGETHER):
+        for j in range(i, _TOGETHER):
+            if at + j < size:
+                block = band[at + i, j - i]
+                for row in range(c):
+                    for column in range(c):
+                        block[row, column] += products[pair, row * c + column]
+            pair += 1
+    for j in range(c):
+        for i in range(6):
+            for k in range(end - start):
+                weight = own[0, k, i]
+                for s in range(border.shape[2]):
+                    border[at + i, j, s] += weight * interval.across[k, j, s]
+
+
+@compiled
+def _pair_weights(own: np.ndarray) -> np.ndarray:
+    """(28, 5 f) weights of `Interval.squares` in each pair of splines, the second not before the first.
+
+    From the splines (3, f, 7) in each frame and in the two after it.
+    """
+    most, pair = own.shape[1], 0
+    weights = np.empty((_TOGETHER * (_TOGETHER + 1) // 2, (1 + 2 * LATER) * most))
+    for i in range(_TOGETHER):
+        for j in range(i, _TOGETHER):
+            for k in range(most):
+                weights[pair, k] = own[0, k, i] * own[0, k, j]
+                for later in range(1, LATER + 1):
+                    weights[pair, (2 * later - 1) * most + k] = own[0, k, i] * own[later, k, j]
+                    weights[pair, 2 * later * most + k] = own[later, k, i] * own[0, k, j]
+            pair += 1
+    return weights
 
 
 @compiled
@@ -81,15 +105,3 @@ def to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarr
         for j in range(across.shape[0]):
             for s in range(across.shape[1]):
                 border[at + i, j, s] += weights[i] * across[j, s]
-
-
-@compiled
-def _add_rows(weights: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """out (k, k) += the sum of the rows (r, k k) in these weights (r,)."""
-    k = len(out)
-    for r in range(len(weights)):
-        weight = weights[r]
-        if weight != 0.0:
-            for i in range(k):
-                for j in range(k):
-                    out[i, j] += weight * rows[r, i * k + j]

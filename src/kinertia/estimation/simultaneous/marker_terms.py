@@ -156,7 +156,7 @@ def _add(
     c, a, s = band.shape[2], len(markers.column), border.shape[2]
     placed = _Placed(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     most = longest_run(first)
-    interval = Interval(np.empty((1 + 2 * LATER, most, c * c)), np.zeros((most + LATER, c, s)), np.empty((most, c)))
+    interval = Interval(np.empty(((1 + 2 * LATER) * most, c * c)), np.zeros((most + LATER, c, s)), np.empty((most, c)))
     for k in range(max(start - LATER, 0), min(start + LATER, n)):
         _place(markers, k, placed)
     while start < stop:
@@ -233,7 +233,7 @@ def _frame(
             product[i, j] = value
             product[j, i] = value
             i = parent[i]
-    _sort(column, product, interval.squares[0, row], interval.across[row], static.square)
+    _sort(column, product, interval.squares[row], interval.across[row], static.square)
 
 
 @compiled
@@ -282,40 +282,41 @@ def _by_place(
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
     axes, at, turned, errors = placed.axes[here], placed.places[here], placed.turned[here], placed.errors[here]
     across, square, right = interval.across[row], static.square, static.right
-    wide = directions.shape[2]
-    moments, turn, values = np.empty((3, wide)), np.empty((3, wide)), np.empty(wide)
+    most = directions.shape[2]
+    own, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
     for m in range(len(markers.carrier)):
-        d, place, skin = directions[m], still + 3 * m, markers.columns[m]
-        count = 3 + 3 * (markers.last[m] - markers.first[m])
+        d, place, first = directions[m], still + 3 * m, markers.first[m]
+        # so many before the columns of the skin
+        skin = markers.columns[m] - 3
+        count = 3 + 3 * (markers.last[m] - first)
         for i in range(3):
             static.cost[0] += errors[m, i] * pull[m, i]
-        for i in range(count):
-            moments[0, i] = at[m, 1] * d[2, i] - at[m, 2] * d[1, i]
-            moments[1, i] = at[m, 2] * d[0, i] - at[m, 0] * d[2, i]
-            moments[2, i] = at[m, 0] * d[1, i] - at[m, 1] * d[0, i]
-            pattern = 1.0 if i < 3 else markers.patterns[k, markers.first[m] + i // 3 - 1]
-            for r in range(3):
-                turn[r, i] = pattern * turned[m, r, i % 3]
-        for h in range(count):
-            one = place + h if h < 3 else skin + h - 3
-            right[one] += turn[0, h] * pull[m, 0] + turn[1, h] * pull[m, 1] + turn[2, h] * pull[m, 2]
-            for i in range(count):
-                other = place + i if i < 3 else skin + i - 3
-                square[one, other] += turn[0, h] * d[0, i] + turn[1, h] * d[1, i] + turn[2, h] * d[2, i]
+            along = turned[m, 0, i] * pull[m, 0] + turned[m, 1, i] * pull[m, 1] + turned[m, 2, i] * pull[m, 2]
+            for j in range(count):
+                own[i, j] = turned[m, 0, i] * d[0, j] + turned[m, 1, i] * d[1, j] + turned[m, 2, i] * d[2, j]
+            for g in range(count // 3):
+                pattern = 1.0 if g == 0 else markers.patterns[k, first + g - 1]
+                one = i + (place if g == 0 else skin + 3 * g)
+                right[one] += pattern * along
+                for j in range(3):
+                    square[one, place + j] += pattern * own[i, j]
+                for j in range(3, count):
+                    square[one, skin + j] += pattern * own[i, j]
         j = markers.carrier[m]
         while j >= 0:
+            velocity[0] = axes[j, 0] + axes[j, 4] * at[m, 2] - axes[j, 5] * at[m, 1]
+            velocity[1] = axes[j, 1] + axes[j, 5] * at[m, 0] - axes[j, 3] * at[m, 2]
+            velocity[2] = axes[j, 2] + axes[j, 3] * at[m, 1] - axes[j, 4] * at[m, 0]
             for i in range(count):
-                values[i] = axes[j, 0] * d[0, i] + axes[j, 1] * d[1, i] + axes[j, 2] * d[2, i]
-                values[i] += axes[j, 3] * moments[0, i] + axes[j, 4] * moments[1, i] + axes[j, 5] * moments[2, i]
-                values[i] *= slopes[k, j]
+                values[i] = slopes[k, j] * (velocity[0] * d[0, i] + velocity[1] * d[1, i] + velocity[2] * d[2, i])
             if column[j] < c:
                 for i in range(3):
                     across[column[j], place + i] += values[i]
                 for i in range(3, count):
-                    across[column[j], skin + i - 3] += values[i]
+                    across[column[j], skin + i] += values[i]
             else:
                 for i in range(count):
-                    one = place + i if i < 3 else skin + i - 3
+                    one = i + (place if i < 3 else skin)
                     square[column[j] - c, one] += values[i]
                     square[one, column[j] - c] += values[i]
             j = parent[j]
@@ -348,9 +349,9 @@ def _pair(
         while i >= 0:
             product[j, i] = slopes[k, j] * slopes[k + later, i] * inner(after, i, met, 0)
             i = parent[i]
-    squares, across = interval.squares, interval.across
-    _sort(column, product, squares[2 * later - 1, row], across[row], static.square)
-    _sort(column, product.T, squares[2 * later, row], across[row + later], static.square)
+    squares, across, most = interval.squares, interval.across, len(interval.gradient)
+    _sort(column, product, squares[(2 * later - 1) * most + row], across[row], static.square)
+    _sort(column, product.T, squares[2 * later * most + row], across[row + later], static.square)
 
 
 @compiled
