@@ -10,7 +10,8 @@ from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.solver import estimate_simultaneous, root_of_covariance
+from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.estimation.simultaneous.stretches import stretches
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin
@@ -91,7 +92,8 @@ def test_elimination_and_step_are_those_of_the_whole(whole, cut, here, told):
 
 def test_deviations_of_moments_are_those_of_the_whole(whole, cut, here):
     expected, found = (reduced(each.trial_normal(0, *here), 0.0) for each in (whole, cut))
-    root = root_of_covariance(expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2))
+    information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
+    root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
     sd = [joint_moment_sd(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, found))]
     close(sd[1], sd[0])
 

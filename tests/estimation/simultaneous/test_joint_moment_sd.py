@@ -7,8 +7,9 @@ from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, moment_derivatives
 from kinertia.estimation.simultaneous.problem import MapProblem, Point
-from kinertia.estimation.simultaneous.solver import _deviations, _eliminated, _step, root_of_covariance
+from kinertia.estimation.simultaneous.solver import _deviations, _eliminated, _step
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from small_problem import SWITCH_S, curved_problem, point, small_problem
 from study_bound import dense_band
@@ -93,7 +94,8 @@ def test_derivatives_agree_with_finite_differences(estimate):
 
 def test_deviations_are_those_of_the_dense_covariance(estimate):
     problem, coefficients, static = estimate
-    root = root_of_covariance(dense(problem, coefficients, static))
+    information = dense(problem, coefficients, static)
+    root = StaticInformation.of(information, len(information)).root_of_covariance()
     full = root @ root.T
     n = coefficients.size
     by = dense_derivative(problem, coefficients, static)
@@ -101,7 +103,8 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
         np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + of_impacts(problem, coefficients, static)
     )
     part = reduced(problem.trial_normal(0, coefficients, static), 0.0)
-    root = root_of_covariance(prior_information(problem, static) + part.information)
+    information = prior_information(problem, static) + part.information
+    root = StaticInformation.of(information, problem.layout.in_root.stop).root_of_covariance()
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     found = joint_moment_sd(problem, 0, coefficients, static, part, root)
     np.testing.assert_allclose(found, expected, rtol=1e-3)

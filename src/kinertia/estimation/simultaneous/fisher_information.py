@@ -16,8 +16,8 @@ import numpy as np
 from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.solver import root_of_covariance
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 
@@ -54,18 +54,19 @@ class Information:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
         chosen = list(trials)
         counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
-        layout, information = self.problem.layout, self.of_prior
+        layout, information = self.problem.layout, self.of_prior.copy()
         for k, count in zip(chosen, counts, strict=True):
             sd = self.problem.displacement_sd_m[k]
             information = information + as_displaced(self.of_trials[k] / count, layout.locals, sd)
-        information = information + self._of_instruments(information)
+        first = layout.in_root
+        information[first, first] += self._of_instruments(StaticInformation.of(information, first.stop).first)
         theta = layout.theta
         chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
-        result: np.ndarray = chain @ root_of_covariance(information)[theta]
+        result: np.ndarray = chain @ StaticInformation.of(information, first.stop).root_of_covariance()[theta]
         return result
 
     def _of_instruments(self, rest: np.ndarray) -> np.ndarray:
-        """(S, S) information of the instruments' priors where the data, of which the rest tells, show them sound."""
+        """(n, n) information of the instruments' priors where the data, of which the rest tells, show them sound."""
         priors, places = self.problem.instruments, self.problem.layout.instruments
         found, result = GaussianPrior.of(priors), np.zeros_like(rest)
         for _ in range(_ROUNDS):

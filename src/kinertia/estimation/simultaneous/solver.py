@@ -24,6 +24,7 @@ from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.model.skeleton import Skeleton
@@ -80,8 +81,6 @@ _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 40
-_SINGULAR = 1e-13
-"""Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
 
 
 @one_blas_thread
@@ -150,8 +149,9 @@ def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instr
     under = here.under(instruments, places)
     information = under.information + sum(each.information for each in eliminated.displaced)
     right = under.right + sum(each.right for each in eliminated.displaced)
-    covariance = np.linalg.inv(information)
-    mean = here.point.static[places] + (covariance @ right)[places]
+    found = StaticInformation.of(information, problem.layout.in_root.stop)
+    covariance = np.linalg.inv(found.first)
+    mean = here.point.static[places] + (covariance @ found.first_of(right))[places]
     return instruments.updated(problem.instruments, mean, covariance[places, places])
 
 
@@ -159,13 +159,15 @@ def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tupl
     """Posterior covariance (S, S) of the static unknowns, and deviations of the joint moments of every trial."""
     parts, displaced = _eliminated(problem, here, 0.0)
     told = [each.information for each in displaced]
-    root = root_of_covariance(here.information + sum(told))
+    first = problem.layout.in_root.stop
+    root = StaticInformation.of(here.information + sum(told), first).root_of_covariance()
     moment_sd = []
     for k, (motion, part) in enumerate(zip(here.point.coefficients, parts, strict=True)):
         in_trial, sd = root, problem.displacement_sd_m[k]
         if sd.any():
             elsewhere = here.information + sum(told[:k] + told[k + 1 :])
-            in_trial = root_of_covariance(part.information + as_displaced(elsewhere, problem.layout.locals, sd))
+            elsewhere = as_displaced(elsewhere, problem.layout.locals, sd)
+            in_trial = StaticInformation.of(part.information + elsewhere, first).root_of_covariance()
         static = problem.in_trial(k, here.point)
         moment_sd.append(joint_moment_sd(problem, k, motion, static, part, in_trial))
     return root @ root.T, tuple(moment_sd)
@@ -189,17 +191,6 @@ def _next_damping(damping: float, kept: float) -> float:
     """The damping after a step that lowered the cost by this share of what it promised."""
     factor = 0.1 if kept > 0.75 else 1.0 if kept > 0.25 else 10.0
     return max(damping * factor, _LEAST_DAMPING)
-
-
-def root_of_covariance(information: np.ndarray) -> np.ndarray:
-    """R with covariance R R^T; finite also where a segment has come near the edge of what is physically possible.
-
-    There the logarithm of a second moment tells nothing any more, and the information on it may round to below zero.
-    """
-    scale = 1.0 / np.sqrt(np.diag(information))
-    values, vectors = np.linalg.eigh(scale[:, None] * information * scale)
-    result: np.ndarray = scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
-    return result
 
 
 def _step(

@@ -1,0 +1,68 @@
+"""Information on the static unknowns, those that only the markers see eliminated: their positions and the skin.
+
+These are many, and always have a prior that holds them. What is left, body and calibration, may come near the edge of
+what is physically possible, where the logarithm of a second moment tells nothing any more and the information on it may
+round to below zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+_SINGULAR = 1e-13
+"""Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
+
+
+@dataclass(frozen=True)
+class StaticInformation:
+    """Of S unknowns, the last k eliminated.
+
+    Attributes:
+        first: (n, n) on the first n (Schur complement).
+        factor: (k, k) lower Cholesky factor L of the information on the last k alone.
+        across: (k, n) L^-1 times the block between them.
+
+    >>> found = StaticInformation.of(np.array([[3.0, 1.0], [1.0, 2.0]]), 1)
+    >>> found.first
+    array([[2.5]])
+    >>> root = found.root_of_covariance()
+    >>> np.round(root @ root.T, 3)
+    array([[ 0.4, -0.2],
+           [-0.2,  0.6]])
+    """
+
+    first: np.ndarray
+    factor: np.ndarray
+    across: np.ndarray
+
+    @classmethod
+    def of(cls, information: np.ndarray, n: int) -> StaticInformation:
+        """Information (S, S) without all but the first n.
+
+        Raises:
+            numpy.linalg.LinAlgError: that on the others is not positive definite.
+        """
+        factor = cholesky(information[n:, n:], lower=True)
+        across = solve_triangular(factor, information[n:, :n], lower=True)
+        return cls(information[:n, :n] - across.T @ across, factor, across)
+
+    def first_of(self, right: np.ndarray) -> np.ndarray:
+        """(n,) the right-hand side (S,) of normal equations, for the first n."""
+        n = len(self.first)
+        result: np.ndarray = right[:n] - self.across.T @ solve_triangular(self.factor, right[n:], lower=True)
+        return result
+
+    def root_of_covariance(self) -> np.ndarray:
+        """(S, S) R with covariance R R^T of all unknowns; finite also where some information rounds to below zero."""
+        n, k = len(self.first), len(self.factor)
+        scale = 1.0 / np.sqrt(np.diag(self.first))
+        values, vectors = np.linalg.eigh(scale[:, None] * self.first * scale)
+        result = np.zeros((n + k, n + k))
+        result[:n, :n] = scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+        result[n:, n:] = np.eye(k)
+        result[n:, :n] = -self.across @ result[:n, :n]
+        result[n:] = solve_triangular(self.factor, result[n:], lower=True, trans="T")
+        return result

@@ -1,0 +1,38 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.static_information import StaticInformation
+
+
+@pytest.fixture
+def singular_first() -> np.ndarray:
+    """(9, 9) information, of which that on unknown 4 rounds to below zero; that on the last three is sound."""
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(12, 9)) * [1e6, 1.0, 1.0, 1e-3, 1.0, 1.0, 10.0, 1.0, 1.0]
+    return factor.T @ factor
+
+
+@pytest.mark.parametrize("n", [6, 9])
+def test_root_gives_the_inverse(singular_first, n):
+    root = StaticInformation.of(singular_first, n).root_of_covariance()
+    np.testing.assert_allclose(root @ root.T, np.linalg.inv(singular_first), rtol=1e-6, atol=1e-12)
+
+
+def test_first_unknowns_alone_are_those_of_all_together(singular_first):
+    found = StaticInformation.of(singular_first, 6)
+    right = np.arange(9.0)
+    np.testing.assert_allclose(
+        np.linalg.solve(found.first, found.first_of(right)), np.linalg.solve(singular_first, right)[:6], rtol=1e-8
+    )
+    covariance = np.linalg.inv(singular_first)[:6, :6]
+    np.testing.assert_allclose(np.linalg.inv(found.first), covariance, rtol=1e-8, atol=1e-14)
+
+
+def test_singular_information_has_a_covariance():
+    """At the edge of what is possible the information on a logarithm rounds to zero, or below."""
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(8, 8)) * [1e6, 1.0, 1.0, 1e-3, 1.0, 1.0, 1.0, 1.0]
+    factor[:, 4] = factor[:, 5] * (1.0 + 1e-12)
+    singular = factor.T @ factor - 1e-12 * np.outer(np.arange(8) == 4, np.arange(8) == 4)
+    assert np.linalg.eigvalsh(singular)[0] < 0
+    assert np.isfinite(StaticInformation.of(singular, 6).root_of_covariance()).all()
