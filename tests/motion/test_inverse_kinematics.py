@@ -11,7 +11,8 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import build_gait27
-from kinertia.motion.inverse_kinematics import _STEP_TOLERANCE, normal_equations, solve_ik
+from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.pose_fit import _STEP_TOLERANCE, normal_equations
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim
 
