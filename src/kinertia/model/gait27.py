@@ -49,8 +49,8 @@ _USUAL_DEG = {
     "arm_add": (-120.0, 60.0),
     "elbow_flex": (-15.0, 155.0),
 }
-"""How far people move: somewhat more than the normal ranges of Norkin and White (Measurement of Joint Motion, 2016). They
-only tell equal poses apart: a joint goes beyond where its markers do."""
+"""How far people move, and somewhat more. These ranges only tell equal poses apart: a joint goes beyond where its
+markers do."""
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -124,8 +124,12 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
 
 def _usual_ranges(joints: list[Joint]) -> dict[str, Range]:
     names = {axis.coordinate for joint in joints for axis in joint.axes}
-    both = {name: _USUAL_DEG.get(name.removesuffix("_r").removesuffix("_l")) for name in names}
-    return {name: Range(*np.radians(ends).tolist(), clamped=False) for name, ends in both.items() if ends is not None}
+    known = [(name, _USUAL_DEG.get(name.removesuffix("_r").removesuffix("_l"))) for name in sorted(names)]
+    return {
+        name: Range(float(np.radians(ends[0])), float(np.radians(ends[1])), clamped=False)
+        for name, ends in known
+        if ends is not None
+    }
 
 
 def _root() -> Joint:

@@ -85,7 +85,8 @@ class EqualAngles:
         for columns, joint in paths:
             known = np.flatnonzero(np.isfinite(q[:, columns]).all(axis=1))
             if known.size:
-                q[np.ix_(known, columns)] = self._one_branch(q[np.ix_(known, columns)], columns, joint)
+                some = np.ix_(known, np.array(columns))
+                q[some] = self._one_branch(q[some], columns, joint)
         return q
 
     def _one_branch(self, angles: np.ndarray, columns: Sequence[int], joint: ThreeAngles | None) -> np.ndarray:
@@ -97,8 +98,10 @@ class EqualAngles:
             # a change from twin to twin is as large as one between the angles themselves
             other = np.concatenate([[False], np.logical_xor.accumulate(change < stay)])[:, None]
             paths = [np.where(other, twins, angles), np.where(other, angles, twins)]
+        # which twin is meant shows in the middle angle: the others may have come round
+        k = len(columns) // 2
         choices = [self._whole_turns(np.unwrap(path, axis=0), columns) for path in paths]
-        best = min(choices, key=lambda path: self._strangeness(path, columns).sum())
+        best = min(choices, key=lambda path: self._beyond(path, columns).sum() + self._from_neutral(path, columns)[k])
         low, high = self.bounds.least[list(columns)], self.bounds.most[list(columns)]
         leaves = (np.abs(best - np.clip(best, low, high)) > _END_RAD).any()
         return angles if leaves else best
@@ -107,14 +110,19 @@ class EqualAngles:
         """The same path (n, k), every angle shifted by the whole turns that make it least strange."""
         usual = np.round((np.median(path, axis=0) - self.neutral[list(columns)]) / (2 * np.pi))
         shifted = np.stack([path - 2 * np.pi * (usual + turns) for turns in (0, 1, -1)])
-        best = np.argmin([self._strangeness(one, columns) for one in shifted], axis=0)
-        return np.take_along_axis(shifted, best[None, None, :], axis=0)[0]
+        badness = [self._beyond(one, columns) + self._from_neutral(one, columns) for one in shifted]
+        least: np.ndarray = np.take_along_axis(shifted, np.argmin(badness, axis=0)[None, None, :], axis=0)[0]
+        return least
 
-    def _strangeness(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """(k,) how far angles (n, k) are out of their ranges, in mean squares, and a little for the way from neutral."""
+    def _beyond(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
+        """(k,) how far angles (n, k) are out of their ranges, mean square."""
         low, high = self.bounds.low[list(columns)], self.bounds.high[list(columns)]
-        beyond = np.square(path - np.clip(path, low, high)).mean(axis=0)
-        result: np.ndarray = beyond + 1e-3 * np.square(path - self.neutral[list(columns)]).mean(axis=0)
+        result: np.ndarray = np.square(path - np.clip(path, low, high)).mean(axis=0)
+        return result
+
+    def _from_neutral(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
+        """(k,) a little for being far from neutral, which decides between equals within their ranges."""
+        result: np.ndarray = 1e-3 * np.square(path - self.neutral[list(columns)]).mean(axis=0)
         return result
 
 

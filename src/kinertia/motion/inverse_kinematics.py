@@ -33,8 +33,8 @@ MOST_STEPS = 60
 _DOUBTED_RAD, _ANEW_RAD = 0.5, 1.0
 _DOUBTED, _DOUBTED_M = 2.0, 0.005
 """Frames that did not converge, are farther beyond a range than the first, or miss their markers by more than the third
-times what is usual in the trial and by more than the fourth (RMS), start anew with no joint farther than the second from
-its neutral angle."""
+times what is usual in the trial and by more than the fourth (RMS), start anew with no joint farther than the second
+from its neutral angle."""
 _UNINFORMED_RAD_PER_M = 60.0
 """A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
 
@@ -191,7 +191,9 @@ def _far(equal: EqualAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
 def _strangeness(measured: np.ndarray, found: PoseFit, equal: EqualAngles) -> np.ndarray:
     """(n,) m2, mean squared marker distances, and one square centimetre per square rad away from neutral."""
     seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
-    away = np.square(equal.nearest(found.q, np.broadcast_to(equal.neutral, found.q.shape))[:, 6:] - equal.neutral[6:]).mean(axis=1)
+    away = np.square(
+        equal.nearest(found.q, np.broadcast_to(equal.neutral, found.q.shape))[:, 6:] - equal.neutral[6:]
+    ).mean(axis=1)
     result: np.ndarray = found.cost_m2 / seen + 1e-4 * away
     return result
 

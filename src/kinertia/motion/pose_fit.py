@@ -89,7 +89,9 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
         normal[up], gradient[up] = h[better], g[better]
         damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
         damping[active[~better]] *= 100.0
-        step[active] = _steps(model, normal[active], gradient[active], accepted[active], damping[active], stop.beyond_m2)
+        step[active] = _steps(
+            model, normal[active], gradient[active], accepted[active], damping[active], stop.beyond_m2
+        )
         gain = np.einsum("nc,nc->n", step[active], gradient[active])
         # a step that was cut at the end of a range may lead upwards: then the next one is shorter
         small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | ((gain >= 0) & (gain < stop.gain_tolerance_m2))

@@ -52,7 +52,8 @@ def _axes(rng: np.random.Generator, child: str, ranges: dict[str, Range], clampe
 
 
 def _markers(rng: np.random.Generator, segment: str) -> list[Marker]:
-    return [Marker(f"{segment}_m{k}", segment, rng.uniform(-0.15, 0.15, 3)) for k in range(4)]
+    corners = 0.1 * np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
+    return [Marker(f"{segment}_m{k}", segment, at + rng.uniform(-0.05, 0.05, 3)) for k, at in enumerate(corners)]
 
 
 def motion_within(rng: np.random.Generator, skeleton: Skeleton, time: np.ndarray) -> np.ndarray:
