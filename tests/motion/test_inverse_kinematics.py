@@ -164,6 +164,21 @@ def test_a_missing_marker_changes_little_and_is_not_counted(skeleton):
     assert np.isnan(ik.errors_m[10:20, ik.labels.index("R.Knee.Lat")]).all()
 
 
+@pytest.mark.parametrize("gap", [slice(30, 31), slice(20, 60), slice(0, 15)])
+def test_a_marker_that_is_off_its_place_and_vanishes_leaves_no_jump(skeleton, gap):
+    """Without care the knee of this walk jumps by several degrees at either end of the gap."""
+    _, motion = smooth_motion(skeleton, n=90)
+    places = skeleton.marker_locals.copy()
+    places[skeleton.labels.index("R.Shank.Front")] += 0.03
+    off = markers_of(skeleton.with_places(places), motion.q)
+    whole = solve_ik(skeleton, off).q
+    gapped = solve_ik(skeleton, without(off, ["R.Shank.Front"], gap)).q
+    alone = solve_ik(skeleton, without(off, ["R.Shank.Front"])).q
+    assert np.degrees(np.abs(alone - whole)).max() > 2.0
+    jumps = np.abs(np.diff(gapped - whole, axis=0)).max(axis=0)
+    assert np.degrees(jumps).max() < 0.1
+
+
 def test_coordinates_without_enough_markers_are_nan_and_the_others_exact(skeleton):
     _, motion = smooth_motion(skeleton, n=30)
     arm = [m.label for m in skeleton.markers if m.segment == "forearm_r"]

@@ -18,6 +18,7 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.equal_angles import EqualAngles
 from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.held_errors import HeldErrors
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.pose_fit import BEYOND_M2, PoseFit, Stop, fit_poses
 from kinertia.trial.data import Markers
@@ -30,6 +31,8 @@ as well."""
 _AS_GOOD, _AS_GOOD_M2 = 1.05, 1e-7
 """A pose is as good as another if its squared distances are at most so many times the other's, and this much more."""
 MOST_STEPS = 60
+_ROUNDS = 6
+"""How often frames with gaps are solved again: each round leaves about half of what the pose was off."""
 _DOUBTED_RAD, _ANEW_RAD = 0.5, 1.0
 _DOUBTED, _DOUBTED_M = 2.0, 0.005
 """Frames that did not converge, are farther beyond a range than the first, or miss their markers by more than the third
@@ -109,8 +112,7 @@ def solve_ik(
         _carry_on(model, measured[coarse], markers.time[coarse], found, equal, choosing)
         if len(coarse) > 1:
             q[fine] = PchipInterpolator(coarse, equal.continuous(found.q))(fine)
-    converged, errors = np.zeros(len(q), dtype=bool), np.full(measured.shape[:2], np.nan)
-    informed = np.zeros(q.shape, dtype=bool)
+    converged, informed = np.zeros(len(q), dtype=bool), np.zeros(q.shape, dtype=bool)
     for some in (fine[piece] for piece in pieces(len(fine))):
         if not consecutive:
             q[some] = _best_fit(model, measured[some], q[some], choosing).q
@@ -118,10 +120,22 @@ def solve_ik(
         if consecutive:
             _carry_on(model, measured[some], markers.time[some], found, equal, stop)
         q[some], converged[some], informed[some] = found.q, found.converged, ~_uninformed(found.normal)
-        errors[some] = _misses(model, measured[some], found.q)
+    if consecutive:
+        _hold_in_gaps(model, measured, placed, q, stop)
+    errors = np.full(measured.shape[:2], np.nan)
+    for some in (fine[piece] for piece in pieces(len(fine))):
+        errors[some] = _misses(model, measured[some], q[some])
     q[~informed] = np.nan
     q = equal.continuous(q) if consecutive else equal.nearest(q, np.broadcast_to(equal.neutral, q.shape))
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
+
+
+def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: np.ndarray, stop: Stop) -> None:
+    """Solve frames that lack markers again, with these as far off the model as before and after (`held_errors`)."""
+    gaps = HeldErrors(measured, placed)
+    for _ in range(_ROUNDS):
+        for some in (gaps.frames[piece] for piece in pieces(len(gaps.frames))):
+            q[some] = fit_poses(model, gaps.filled(model, q, some), q[some], stop).q
 
 
 def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
