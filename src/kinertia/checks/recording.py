@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
-from kinertia.estimation.input_checks import CONTRADICTING_MASS
+from kinertia.estimation.force_mass import CONTRADICTING_MASS
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
 from kinertia.model.anatomy import segment_of

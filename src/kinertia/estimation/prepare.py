@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
+from kinertia.estimation.force_mass import check_forces
 from kinertia.estimation.input_checks import check_same_person, check_visible, complete_subject, known
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -98,6 +99,7 @@ def calibrate(
     model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
+    check_forces(model.skeleton, known(subject.mass_kg), trials)
     check_same_person(model.skeleton, trials)
     poses = first_poses(model.skeleton, trials)
     skeleton, held = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))

@@ -14,6 +14,7 @@ import numpy as np
 
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
+from kinertia.estimation.force_mass import check_forces
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
@@ -57,6 +58,7 @@ def prepare_osim(
     trials = [_trial(model, item, feet) for item in inputs]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
+    check_forces(skeleton, known(subject.mass_kg), trials)
     poses = first_poses(skeleton, trials)
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
     if calibrate:

@@ -50,7 +50,9 @@ class HeldErrors:
         pose = model.pose(q[frames])
         turned = pose.rotation[:, model.marker_segments]
         error = (turned @ (first + share * (last - first))[..., None])[..., 0]
-        return np.where(self._gap[frames][..., None], model.marker_positions(pose) + error, self._measured[frames])
+        held = model.marker_positions(pose) + error
+        result: np.ndarray = np.where(self._gap[frames][..., None], held, self._measured[frames])
+        return result
 
     def _errors(self, model: Skeleton, q: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """(f, m, 3) m, measured less model markers of these frames, in the axes of their segments."""
