@@ -60,19 +60,7 @@ def complete_subject(
 
 
 def check_visible(skeleton: Skeleton, trial: Trial) -> None:
-    """Raise TrialError when a marker is never seen, or a segment other than the arms' has no marker in the trial."""
-    lost = [
-        marker.label
-        for marker in skeleton.markers
-        if marker.label in trial.markers.labels
-        and not np.isfinite(trial.markers.select([marker.label]).positions).any()
-    ]
-    if lost:
-        raise TrialError(
-            trial.name,
-            f"no frame shows the marker{'s' if len(lost) > 1 else ''} {', '.join(lost)}; label them, or remove them "
-            f"from the file if they were not worn",
-        )
+    """Raise TrialError when a segment other than the arms' has no marker in the trial."""
     arms = tuple(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))
     for segment in set(skeleton.segments) - set(arms):
         worn = [m.label for m in skeleton.markers if m.segment == segment]

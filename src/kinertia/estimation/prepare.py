@@ -182,7 +182,7 @@ def prepare(
 
 def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
     """The trial with its loads sorted by foot, facing +X, and the angle (deg) it was turned by."""
-    recording = item.recording
+    recording = item.recording.without_empty_markers()
     for side in "rl":
         label = marker_set.landmarks[f"asis_{side}"][0]
         if label not in recording.markers.labels:

@@ -128,7 +128,7 @@ def _feet(model: OsimModel) -> dict[str, list[str]]:
 
 def _trial(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> Trial:
     """The trial with its loads sorted by foot."""
-    recording = item.recording
+    recording = item.recording.without_empty_markers()
     labels = {}
     for (side, bodies), name in zip(feet.items(), ("right", "left"), strict=True):
         worn = [marker.label for marker in model.skeleton.markers if marker.segment in bodies]

@@ -180,6 +180,16 @@ class Recording:
     length_unit: str = "m"
     vertical: str = "+Y"
 
+    def without_empty_markers(self) -> Recording:
+        """The same without markers that no frame shows, and a note that names them."""
+        seen = self.markers.seen
+        labels = [label for column, label in enumerate(self.markers.labels) if seen[:, column].any()]
+        if len(labels) == len(self.markers.labels):
+            return self
+        empty = [label for label in self.markers.labels if label not in labels]
+        note = f"{self.name}: visible in no frame, left out: {', '.join(empty)}"
+        return replace(self, markers=self.markers.select(labels), notes=(*self.notes, note))
+
     def _repr_html_(self) -> str:
         """What a notebook shows: frames, markers and their gaps, force plates, notes."""
         return display.html(self)
