@@ -207,6 +207,8 @@ class FootLoads:
         on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
             where each foot has a plate of its own.
         noise_n: deviation of the vertical force of the noisiest plate while nobody stands on it, N.
+        together: (k,) True where both feet stand on one plate, whose load goes to one of them; left out where they
+            never do.
 
     Examples:
         >>> loads = fit.trials[0].kinematics.trial.loads  # right foot, left foot
@@ -220,6 +222,7 @@ class FootLoads:
     plates: tuple[str, ...] = ("right foot", "left foot")
     on_plate: npt.NDArray[np.int_] | None = None
     noise_n: float = 0.0
+    together: BoolArray | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), 2, 3)
