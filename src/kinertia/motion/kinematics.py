@@ -146,7 +146,10 @@ def solve_kinematics(
     known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
     known &= np.abs(ik.time - ik.time[inside].mean()) <= np.ptp(ik.time[inside]) / 2 - _END_PERIODS / cutoff.hz + 1e-9
     usable = known & trial.measured
-    window, notes = _longest(trial, usable, known)
+    # one who stands tells little of inertia, however long
+    moving = np.zeros(len(known))
+    moving[inside] = np.square(spline(ik.time[inside], 1)[:, 3:]).sum(axis=1)
+    window, notes = _most_moving(trial, usable, known, moving)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
         notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
@@ -188,7 +191,10 @@ def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
     return filled
 
 
-def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple[float, float], list[str]]:
+def _most_moving(
+    trial: Trial, usable: np.ndarray, known: np.ndarray, moving: np.ndarray
+) -> tuple[tuple[float, float], list[str]]:
+    """The stretch of usable frames (n,) with most of the motion (n,), of those that are long enough."""
     time = trial.markers.time
     stretches = sorted(runs(usable), key=lambda run: run[0] - run[1])
     if not stretches:
@@ -199,6 +205,9 @@ def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple
             f"another trial",
         )
     first, last = stretches[0]
+    enough = [(a, b) for a, b in stretches if b - a + 1 >= FEWEST_FRAMES]
+    if enough:
+        first, last = max(enough, key=lambda run: moving[run[0] : run[1] + 1].sum())
     if last - first + 1 < FEWEST_FRAMES:
         raise TrialError(
             trial.name,
@@ -206,10 +215,10 @@ def _longest(trial: Trial, usable: np.ndarray, known: np.ndarray) -> tuple[tuple
             f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least {FEWEST_FRAMES} are needed",
         )
     notes = []
-    left_out = sum(end - start + 1 for start, end in stretches[1:])
+    left_out = int(usable.sum()) - (last - first + 1)
     if left_out:
         notes.append(
-            f"{trial.name}: only the longest measured stretch, {time[first]:.3f} to {time[last]:.3f} s, is used; "
-            f"{left_out} frames of {len(stretches) - 1} shorter ones are left out"
+            f"{trial.name}: only the measured stretch with most motion, {time[first]:.3f} to {time[last]:.3f} s, is "
+            f"used; {left_out} frames of {len(stretches) - 1} others are left out"
         )
     return (float(time[first]), float(time[last])), notes
