@@ -158,8 +158,8 @@ laboratories, with their own models or static trials, files as they were publish
 
 Exit status 0: every check passed; 1: there is an estimate, and a check of it failed; 2: refused. *Before*: the model's
 or the literature's body segment parameters on the measured motion, both smoothed at the cutoff in the table, as a
-colleague would compute them. *After*: motion, parameters and calibration together. RMS over the frames used. Seconds are
-this machine's.
+colleague would compute them. *After*: motion, parameters and calibration together. RMS over the frames used. Seconds
+are this machine's.
 
 {results}
 
