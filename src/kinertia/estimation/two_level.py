@@ -175,7 +175,8 @@ def vector_bounds(vector: ParameterVector) -> tuple[np.ndarray, np.ndarray]:
 
 def trust_scale(theta: np.ndarray) -> np.ndarray:
     """What counts as one unit of each parameter in the trust region."""
-    return np.maximum(np.abs(theta), _SMALLEST_SCALE)
+    scale: np.ndarray = np.maximum(np.abs(theta), _SMALLEST_SCALE)
+    return scale
 
 
 def _minimise(
