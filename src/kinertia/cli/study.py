@@ -65,21 +65,21 @@ def table1(
         else:
             table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     if variants:
-        _report_variants(found, name, seed, output)
+        _report_variants(found, name, seed)
+        save_variants(found, output)
+        _say_where(output, ("variants.md", "variants.csv"), "variants.png")
         return
     _report_table1(table, source.deviation)
     save_table1(table, output)
     _say_where(output, ("report.html", "table1.json", "table1.csv"), "table1.png")
 
 
-def _report_variants(found: Sequence[VariantResult], trial: str, seed: int, output: Path) -> None:
+def _report_variants(found: Sequence[VariantResult], trial: str, seed: int) -> None:
     out.print(f"\n{trial}; seed {seed}. RMS error without / with correction, both with noise: mean over the draws.\n")
     shown = plain_table(*VARIANT_HEADINGS)
     for row in variants_rows(found):
         shown.add_row(*row)
     out.print(shown)
-    save_variants(found, trial, seed, output)
-    _say_where(output, ("variants.md", "variants.json", "variants.csv"), "variants.png")
 
 
 def _report_table1(table: Table1, deviation: np.ndarray) -> None:

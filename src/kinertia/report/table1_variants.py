@@ -1,8 +1,7 @@
-"""The variants of Table 1 on paper and screen: `variants.json`, `variants.csv`, `variants.md` and a picture."""
+"""The variants of Table 1 on paper and screen: `variants.md` (means), `variants.csv` (draws) and a picture."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,10 +11,9 @@ import numpy as np
 import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
 from kinertia.report.extras import has_matplotlib
 from kinertia.report.table1 import QUANTITIES
-from kinertia.studies.table1 import PUBLISHED
+from kinertia.studies.table1 import PUBLISHED, Errors
 from kinertia.studies.table1_variants import BASE, CLASSES, GROUND, NOISY, VariantResult
 
 if TYPE_CHECKING:
@@ -29,35 +27,36 @@ HEADINGS = (
     "inertia without noise (kg m2)",
     "factor from published",
 )
+CLEAN = ("no_correction_no_noise", "correction_no_noise")
 _COLOURS = {BASE.title: "#0072B2", GROUND.title: "#D55E00"}
 
 
 def variants_frame(results: Sequence[VariantResult]) -> pd.DataFrame:
-    """One row per variant: RMS errors without and with correction, where correction helps, and the distance."""
+    """One row per variant, draw and condition, those without noise too: iterations and errors."""
     rows = []
     for result in results:
-        row: dict[str, object] = {"variant": result.variant.title, "draws": len(result.draws)}
-        for _, name, _ in QUANTITIES.values():
-            for corrected, condition in enumerate(NOISY):
-                row[f"{name}_{condition}"] = asdict(result.mean(bool(corrected)))[name]
-        row |= {f"helped_{name}": share for name, share in result.helped.items()}
-        row |= {f"clean_inertia_{c}": v.errors.inertia_rms_kgm2 for c, v in zip(NOISY, result.clean, strict=True)}
-        rows.append({**row, "factor_from_published": result.distance})
+        for number, courses in [(0, result.clean), *enumerate(result.draws)]:
+            conditions = CLEAN if courses is result.clean else NOISY
+            for condition, course in zip(conditions, courses, strict=True):
+                told = {"variant": result.variant.title, "draw": number, "condition": condition}
+                rows.append({**told, "iterations": len(course.costs) - 1, **asdict(course.errors)})
     return pd.DataFrame(rows)
 
 
 def variants_rows(results: Sequence[VariantResult]) -> list[list[str]]:
-    """The table as text, "without / with correction"; the published values come first."""
-    pairs = [[asdict(PUBLISHED[c])[name] for c in NOISY] for _, name, _ in QUANTITIES.values()]
-    clean = [PUBLISHED[c.replace("noise", "no_noise")].inertia_rms_kgm2 for c in NOISY]
-    rows = [["published", "1", *map(_pair, pairs), "100, 100, 100", _pair(clean), "1"]]
-    for row in variants_frame(results).to_dict("records"):
-        pairs = [[row[f"{name}_{c}"] for c in NOISY] for _, name, _ in QUANTITIES.values()]
-        helped = ", ".join(f"{100 * row[f'helped_{name}']:.0f}" for name in CLASSES)
-        clean = [row[f"clean_inertia_{c}"] for c in NOISY]
-        factor = f"{row['factor_from_published']:.2f}"
-        rows.append([row["variant"], str(row["draws"]), *map(_pair, pairs), helped, _pair(clean), factor])
+    """The table as text, RMS errors "without / with correction"; the published values come first."""
+    rows = [["published", "1", *_pairs([PUBLISHED[c] for c in NOISY]), "100, 100, 100"]]
+    rows[0] += [_pairs([PUBLISHED[c] for c in CLEAN])[0], "1"]
+    for result in results:
+        helped = ", ".join(f"{100 * share:.0f}" for share in result.helped.values())
+        means = _pairs([result.mean(False), result.mean(True)])
+        clean, factor = _pairs([course.errors for course in result.clean])[0], f"{result.distance:.2f}"
+        rows.append([result.variant.title, str(len(result.draws)), *means, helped, clean, factor])
     return rows
+
+
+def _pairs(errors: Sequence[Errors]) -> list[str]:
+    return [_pair([asdict(each)[name] for each in errors]) for _, name, _ in QUANTITIES.values()]
 
 
 def _pair(values: Sequence[float]) -> str:
@@ -95,19 +94,10 @@ def variants_figure(results: Sequence[VariantResult]) -> Figure:
     return figure
 
 
-def save_variants(results: Sequence[VariantResult], trial: str, seed: int, folder: str | Path) -> Path:
-    """Write `variants.json`, `.csv`, `.md` and, with matplotlib, `.png` into a folder; returns it."""
+def save_variants(results: Sequence[VariantResult], folder: str | Path) -> Path:
+    """Write `variants.csv`, `variants.md` and, with matplotlib, `variants.png` into a folder; returns it."""
     table = [list(HEADINGS), ["---"] * len(HEADINGS), *variants_rows(results)]
-    told = [
-        {
-            "title": result.variant.title,
-            "draws": [{c: asdict(of.errors) for c, of in zip(NOISY, draw, strict=True)} for draw in result.draws],
-        }
-        for result in results
-    ]
     with complete_folder(folder) as work:
-        text = json.dumps({"kinertia": VERSION, "trial": trial, "seed": seed, "variants": told}, indent=1)
-        (work / "variants.json").write_text(text + "\n", encoding="utf-8")
         variants_frame(results).to_csv(work / "variants.csv", index=False, lineterminator="\n")
         (work / "variants.md").write_text("".join(f"| {' | '.join(row)} |\n" for row in table), encoding="utf-8")
         if has_matplotlib():
