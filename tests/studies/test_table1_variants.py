@@ -9,8 +9,9 @@ from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, TwoLevelResult, Window
 from kinertia.motion.dynamics import residual
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.studies import table1_variants
+from kinertia.studies import table1_guesses
 from kinertia.studies.table1 import PUBLISHED, Errors, inner_frames, random_start, run_draw, study_trial
+from kinertia.studies.table1_guesses import trust_region
 from kinertia.studies.table1_variants import (
     BASE,
     CLASSES,
@@ -23,7 +24,6 @@ from kinertia.studies.table1_variants import (
     VariantResult,
     run_variant_draw,
     run_variants,
-    trust_region,
 )
 from kinertia.synthetic.noise import displaced, study_noise
 from kinertia.synthetic.walk import balancing_wrench
@@ -65,7 +65,7 @@ def test_one_thing_is_changed_at_a_time(variant):
         assert changed(variant) == two[variant.title]
     else:
         assert len(changed(variant)) == (variant is not BASE)
-    assert TODAY.estimate is table1_variants.as_today
+    assert TODAY.estimate is table1_guesses.as_today
 
 
 def test_titles_differ():
@@ -83,7 +83,7 @@ def test_today_is_table_1_bit_for_bit(trial):
 
     with (
         mock.patch("kinertia.studies.table1.estimate_two_level", given_back),
-        mock.patch("kinertia.studies.table1_variants.estimate_two_level", given_back),
+        mock.patch("kinertia.studies.table1_guesses.estimate_two_level", given_back),
         mock.patch("kinertia.studies.table1_variants.correct_pelvis", lambda skeleton, bsp, window: window.motion),
     ):
         draw = run_draw(trial, 1, 2)
@@ -108,7 +108,7 @@ def test_noise_per_marker_and_segment(trial):
     def moved(noise):
         return noise(trial, np.random.default_rng(1)).positions - trial.markers.positions
 
-    per_marker, per_segment = moved(table1_variants.noise_per_marker), moved(table1_variants.noise_per_segment)
+    per_marker, per_segment = moved(table1_guesses.noise_per_marker), moved(table1_guesses.noise_per_segment)
     np.testing.assert_allclose(per_marker, np.repeat(per_marker[..., :1], 3, axis=2), atol=1e-14)
     assert len(np.unique(per_marker[40, :, 0])) == 41
     segments = [marker.segment for marker in trial.skeleton.markers]
@@ -120,7 +120,7 @@ def test_noise_per_marker_and_segment(trial):
 
 
 def test_slower_noise_is_the_same_at_half_the_speed(trial):
-    slow = table1_variants.slower_noise(trial, np.random.default_rng(1)).positions
+    slow = table1_guesses.slower_noise(trial, np.random.default_rng(1)).positions
     half = replace(trial.markers, time=trial.time / 2)
     shape = half.positions.shape[1:]
     np.testing.assert_allclose(slow, displaced(half, shape, np.random.default_rng(1)).positions, atol=1e-12)
@@ -129,7 +129,7 @@ def test_slower_noise_is_the_same_at_half_the_speed(trial):
 def test_moments_about_the_ground(trial, vector, problem):
     """Against the ground reactions that the body asks for; and the derivative, against differences."""
     theta = random_start(vector.values(trial.bsp), np.random.default_rng(1))
-    signal = table1_variants.about_ground(replace(problem, length=0.5))
+    signal = table1_guesses.about_ground(replace(problem, length=0.5))
     missing = balancing_wrench(trial.skeleton, vector.bsp(theta), trial.motion) - trial.window.wrench
     missing[:, 3:] /= 0.5
     np.testing.assert_allclose(signal.residuals(theta).reshape(-1, 6), missing, atol=1e-8)
@@ -141,11 +141,11 @@ def test_moments_about_the_ground(trial, vector, problem):
 
 def test_every_fifth_frame_and_lengths(vector, trial, problem):
     theta = 1.1 * vector.values(trial.bsp)
-    every, fifth = problem.residuals(theta).reshape(-1, 6), table1_variants.every_fifth(problem)
+    every, fifth = problem.residuals(theta).reshape(-1, 6), table1_guesses.every_fifth(problem)
     np.testing.assert_array_equal(fifth.residuals(theta).reshape(-1, 6), every[::5])
     rows = problem.jacobian(theta).reshape(-1, 6, 49)[::5]
     np.testing.assert_array_equal(fifth.jacobian(theta), rows.reshape(-1, 49))
-    halved = table1_variants.with_length(2.0, problem).residuals(theta).reshape(-1, 6)
+    halved = table1_guesses.with_length(2.0, problem).residuals(theta).reshape(-1, 6)
     np.testing.assert_allclose(halved, every / [1, 1, 1, 2, 2, 2])
 
 
@@ -153,7 +153,7 @@ def test_starts_differ_where_they_say(vector, trial):
     truth = vector.values(trial.bsp)
     usual, mass, com = (
         start(vector, truth, np.random.default_rng(1)).reshape(-1, 7)
-        for start in (BASE.start, table1_variants.mass_of_scale, table1_variants.com_by_distance)
+        for start in (BASE.start, table1_guesses.mass_of_scale, table1_guesses.com_by_distance)
     )
     np.testing.assert_array_equal(usual.ravel(), random_start(truth, np.random.default_rng(1)))
     assert vector.bsp(mass.ravel()).total_mass_kg == pytest.approx(trial.bsp.total_mass_kg)
@@ -167,7 +167,7 @@ def test_starts_differ_where_they_say(vector, trial):
 
 
 def test_29_markers_still_show_every_coordinate(trial):
-    fewer = table1_variants.fewer_markers(trial)
+    fewer = table1_guesses.fewer_markers(trial)
     assert len(fewer.markers.labels) == 29
     np.testing.assert_array_equal(fewer.motion.q, trial.motion.q)
     few = slice(0, 20)
@@ -176,7 +176,7 @@ def test_29_markers_still_show_every_coordinate(trial):
 
 
 def test_slow_walk_is_consistent(trial):
-    slow = table1_variants.slow_walk(trial)
+    slow = table1_guesses.slow_walk(trial)
     assert slow.motion.qd[:, 0].mean() == pytest.approx(1.0, abs=0.02)
     assert np.abs(residual(slow.skeleton, slow.bsp, slow.motion, slow.window.wrench)).max() < 1e-9
     np.testing.assert_array_equal(slow.bsp.table(), trial.bsp.table())
@@ -185,7 +185,7 @@ def test_slow_walk_is_consistent(trial):
 def test_known_variance_moves_coordinates_by_their_errors(trial):
     noisy = BASE.noise(trial, np.random.default_rng(1))
     q = solve_ik(trial.skeleton, noisy).q
-    spline = table1_variants.known_variance(trial, noisy)
+    spline = table1_guesses.known_variance(trial, noisy)
     moved, wrong = (np.sqrt(np.square(q - other).mean(axis=0)) for other in (spline(trial.time), trial.motion.q))
     met = np.abs(moved / wrong - 1.0) < 0.05
     assert met.sum() >= 24

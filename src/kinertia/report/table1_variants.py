@@ -23,7 +23,7 @@ HEADINGS = (
     "variant",
     "draws",
     *(heading for heading, *_ in QUANTITIES.values()),
-    "correction helps, % of draws: inertia, mass, CoM",
+    "correction helps (% of draws): inertia, mass, CoM",
     "inertia without noise (kg m2)",
     "factor from published",
 )
