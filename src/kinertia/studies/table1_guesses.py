@@ -37,8 +37,8 @@ from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 
 LEFT_OUT = tuple(f"{side}.{name}" for side in "RL" for name in ("Temple", "Midfoot.Sup", "Toe.Lat", "Toe.Med", "Bicep"))
-"""Without these and the lateral wrist markers 29 of the package's 41 remain, at least three to a chain of joints."""
 LEFT_OUT += ("R.Wrist.Lat", "L.Wrist.Lat")
+"""Without these 29 of the package's 41 markers remain."""
 _MOST_ITERATIONS = 100
 
 
@@ -161,7 +161,8 @@ def every_fifth(problem: TwoLevelProblem) -> _Signal:
 
 
 def fewer_markers(trial: SyntheticTrial) -> SyntheticTrial:
-    """Without the markers `LEFT_OUT`."""
+    """The package's walk without the markers `LEFT_OUT`, whatever the trial, which may have markers of other names."""
+    trial = study_trial()
     worn = [marker for marker in trial.skeleton.markers if marker.label not in LEFT_OUT]
     return replace(trial, skeleton=trial.skeleton.with_markers(worn))
 
