@@ -132,6 +132,8 @@ def test_moments_about_the_ground(trial, vector, problem):
     signal = table1_guesses.about_ground(replace(problem, length=0.5))
     missing = balancing_wrench(trial.skeleton, vector.bsp(theta), trial.motion) - trial.window.wrench
     missing[:, 3:] /= 0.5
+    as_it_is = table1_guesses.about_ground(replace(problem, length=0.5), length_m=1.0)
+    np.testing.assert_allclose(as_it_is.residuals(theta).reshape(-1, 6), missing * [1, 1, 1, 0.5, 0.5, 0.5], atol=1e-8)
     np.testing.assert_allclose(signal.residuals(theta).reshape(-1, 6), missing, atol=1e-8)
     step = np.zeros(49)
     step[8] = 1e-4  # the torso's CoM

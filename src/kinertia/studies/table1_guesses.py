@@ -147,8 +147,9 @@ def with_length(length_m: float, problem: TwoLevelProblem) -> TwoLevelProblem:
     return replace(problem, length=length_m)
 
 
-def about_ground(problem: TwoLevelProblem) -> _Signal:
-    """Moments about the ground origin, instead of the (measured) pelvis."""
+def about_ground(problem: TwoLevelProblem, length_m: float | None = None) -> _Signal:
+    """Moments about the ground origin, instead of the (measured) pelvis, divided by this or the usual length."""
+    problem = problem if length_m is None else with_length(length_m, problem)
     place = problem.windows[0].motion.q[:, :3]
     weights = np.tile(np.eye(6), (len(place), 1, 1))
     weights[:, 3:, :3] = np.swapaxes(np.cross(place[:, None, :], np.eye(3)), 1, 2) / problem.length

@@ -114,6 +114,10 @@ VARIANTS = (
     Variant("starts with the scale's mass", start=mass_of_scale),
     Variant("CoM starts off by distance", start=com_by_distance),
     Variant(
+        "moments about the ground, N and N m as they are",
+        partial(trust_region, signal=partial(about_ground, length_m=1.0)),
+    ),
+    Variant(
         "moments about the ground, 400 iterations",
         partial(trust_region, signal=about_ground, most_iterations=400),
         share=0.3,
