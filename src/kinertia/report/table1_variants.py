@@ -28,7 +28,9 @@ HEADINGS = (
     "factor from published",
 )
 CLEAN = ("no_correction_no_noise", "correction_no_noise")
-_COLOURS = {BASE.title: "#0072B2", GROUND.title: "#D55E00"}
+_MARKS = {1e-2: "v", 1e-4: "s"}
+"""Relative change of the cost, and what marks the iteration that falls below it first."""
+_SHOWN = {BASE.title: ("moments about the pelvis", "#0072B2"), GROUND.title: ("moments about the ground", "#D55E00")}
 
 
 def variants_frame(results: Sequence[VariantResult]) -> pd.DataFrame:
@@ -69,22 +71,22 @@ def variants_figure(results: Sequence[VariantResult]) -> Figure:
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, len(CLASSES))
-    shown = [result for result in results if result.variant.title in _COLOURS]
     for column, (axis, (name, field)) in enumerate(zip(axes, CLASSES.items(), strict=True)):
-        for result in shown:
+        for result in (result for result in results if result.variant.title in _SHOWN):
+            named, colour = _SHOWN[result.variant.title]
             for corrected, condition in enumerate(NOISY):
                 courses = [draw[corrected] for draw in result.draws]
                 longest = max(len(course.along) for course in courses)
                 # what has stopped stays where it is
                 held = [np.pad(c.along[:, column], (0, longest - len(c.along)), "edge") for c in courses]
                 mean = np.exp(np.log(held).mean(axis=0))
-                label = f"{result.variant.title.partition(',')[0]}, {'corrected' if corrected else 'uncorrected'}"
-                line, colour = "-" if corrected else "--", _COLOURS[result.variant.title]
-                axis.plot(mean, line, color=colour, label=label)
-                for tolerance, mark in ((1e-2, "v"), (1e-4, "s")):
+                line, kind = ("-", "corrected") if corrected else ("--", "uncorrected")
+                axis.plot(mean, line, color=colour, label=f"{named}, {kind}")
+                for tolerance, mark in _MARKS.items():
                     stop = round(float(np.median([course.stopped_by(tolerance) for course in courses])))
-                    axis.plot(stop, mean[stop], mark, color=colour, label=f"below {tolerance:.0e}", markersize=7)
-                axis.axhline(asdict(PUBLISHED[condition])[field], color="#999999", linestyle=line, linewidth=1)
+                    axis.plot(stop, mean[stop], mark, color=colour, markersize=7)
+                value = asdict(PUBLISHED[condition])[field]
+                axis.axhline(value, color="#999999", linestyle=line, linewidth=1, label=f"published, {kind}")
         axis.set_yscale("log")
         axis.set_title(f"{QUANTITIES[name.lower()][0]}, RMS error")
         axis.set_xlabel("iteration")
