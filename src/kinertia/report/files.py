@@ -42,7 +42,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     Raises:
         FileError: the folder cannot be written to.
     """
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
         _write_bsp(fit, work / "bsp.csv")
