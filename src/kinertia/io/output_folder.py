@@ -222,9 +222,7 @@ def _uninterrupted() -> Iterator[None]:
         yield
         return
     caught: list[int] = []
-    before = {
-        number: signal.signal(number, lambda n, _: caught.append(n)) for number in INTERRUPTIONS
-    }
+    before = {number: signal.signal(number, lambda n, _: caught.append(n)) for number in INTERRUPTIONS}
     try:
         yield
     finally:

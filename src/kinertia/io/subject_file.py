@@ -183,7 +183,7 @@ def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
                 'give the trial a name = "..." of its own'
             )
         if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
-            return index, f"the results have a file {taken}, not a folder; give this trial a name = \"...\" of its own"
+            return index, f'the results have a file {taken}, not a folder; give this trial a name = "..." of its own'
         for before in names[:index]:
             if same_folder(before, name):
                 same = "" if before == name else "; Windows and macOS take both for one folder"
