@@ -128,7 +128,7 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
         length, group = struct.unpack_from("bb", section, at)
         length = abs(length)
         link = at + 2 + length
-        if not group or link + 3 > len(section):
+        if not group or link + 3 + (group > 0) > len(section):
             raise broken("an entry without a group or end")
         name = section[at + 2 : link].decode("latin-1").upper()
         called = f"'{name}'" if name.isprintable() else "an entry"

@@ -99,8 +99,8 @@ def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict
     away, half = (after - before) / scale, _INTERVAL_SD * sd / scale
     place = np.arange(len(shown))
     told = [
-        f"{plain(segment_name(fit.estimate.segments[i]))}: {start.word} {_interval(k, b, p)}, estimate {_interval(k, a, s)} "
-        f"{read_in(k)[0]}"
+        f"{plain(segment_name(fit.estimate.segments[i]))}: {start.word} {_interval(k, b, p)}, "
+        f"estimate {_interval(k, a, s)} {read_in(k)[0]}"
         for i, b, p, a, s in zip(shown, before, prior_sd, after, sd, strict=True)
     ]
     prior = {
