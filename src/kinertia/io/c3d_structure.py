@@ -90,7 +90,8 @@ def doubts_about(path: Path) -> str:
             section += stream.read(_BLOCK * section[2] - 4) if section[2] else b""
     size = path.stat().st_size
     if len(block) < _BLOCK or len(section) < 4:
-        raise FileError(path, f"truncated: it has {size} of at least {start + _BLOCK} bytes; copy or export it again")
+        needed = _BLOCK if len(block) < _BLOCK else start + _BLOCK
+        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
     order, sign_byte = _BYTE_ORDERS.get(section[3], ("<", 15))
     header = _header(block, order)
     number = 4 if block[sign_byte] & 0x80 else 2
