@@ -26,6 +26,7 @@ from kinertia.model.anthropometry import check_subject
 from kinertia.model.marker_set import MarkerSet
 from kinertia.report.check_page import save_check_page
 from kinertia.trial.data import Recording
+from kinertia.trial.marker_quality import travel
 
 _MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")
 _LISTED = 8
@@ -153,10 +154,18 @@ def _check_recordings(
     told = {recording.mass_kg for _, recording in recordings if recording.mass_kg is not None}
     shared = told.pop() if mass_kg is None and len(told) == 1 else mass_kg  # files of one person
     found = []
+    standing = [recording for _, recording in recordings if travel(recording.markers).kind == "stands still"]
     for one, recording in recordings:
         mass = shared if mass_kg is not None or recording.mass_kg is None else recording.mass_kg
-        found.append((one.title, check_recording(recording, marker_set, mass, one.window_s)))
+        found.append(
+            (one.title, check_recording(recording, marker_set, mass, one.window_s, _static_of(recording, standing)))
+        )
     return found, mistakes
+
+
+def _static_of(recording: Recording, standing: Sequence[Recording]) -> Recording | None:
+    """The static trial of a recording, where it is clear which that is."""
+    return standing[0] if len(standing) == 1 and recording is not standing[0] else None
 
 
 def _wanted(

@@ -83,9 +83,7 @@ def _odd_one_out(fronts: Mapping[str, FloatArray]) -> str:
     """The part that points backwards by the other two; of two parts nobody knows which is wrong."""
     if len(fronts) < 3:
         return ""
-    agreed = {
-        (one, other): _cosine(fronts[one], fronts[other]) for one in fronts for other in fronts if one < other
-    }
+    agreed = {(one, other): _cosine(fronts[one], fronts[other]) for one in fronts for other in fronts if one < other}
     for part in fronts:
         with_it = [cosine for pair, cosine in agreed.items() if part in pair]
         without = [cosine for pair, cosine in agreed.items() if part not in pair]
