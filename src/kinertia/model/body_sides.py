@@ -42,11 +42,11 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
     right = np.cross(forward, _UP)
     across = {pair: _cosine(places[f"{pair}_r"] - places[f"{pair}_l"], right) for pair in _both(places)}
     wrong = [pair for pair, cosine in across.items() if cosine < -_CLEAR]
-    if wrong and len(wrong) == sum(abs(cosine) > _CLEAR for cosine in across.values()) and len(wrong) > 2:
+    if wrong and len(wrong) == sum(abs(cosine) > _CLEAR for cosine in across.values()) and len(wrong) > 1:
         return (
-            f"all {len(wrong)} pairs of landmarks have left and right the wrong way round, as toes and pelvis face; either "
-            f"all left and right labels are swapped, or an axis of the laboratory is mirrored: correct the labels, or "
-            f"export in right-handed axes"
+            f"all {len(wrong)} pairs of landmarks have left and right the wrong way round, as toes and pelvis face; "
+            f"either all left and right labels are swapped, or an axis of the laboratory is mirrored: correct the "
+            f"labels, or export in right-handed axes"
         )
     if wrong:
         pairs = ", ".join(_names(marker_set, f"{pair}_r", f"{pair}_l") for pair in wrong)
@@ -95,7 +95,7 @@ def _odd_one_out(fronts: Mapping[str, FloatArray]) -> str:
 def _front_trouble(part: str, marker_set: MarkerSet) -> str:
     if part == "pelvis":
         labels = _names(marker_set, *(f"{name}_{side}" for name in ("asis", "psis") for side in "rl"), "sacrum")
-        return f"the pelvis points backwards by both feet: front and back look swapped in the labels {labels}; correct them"
+        return f"the pelvis points backwards by both feet: front and back look swapped in {labels}; correct the labels"
     side = part[-1]
     labels = _names(marker_set, f"heel_{side}", f"metatarsal_{side}", f"toe_{side}")
     return (

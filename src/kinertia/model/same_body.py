@@ -39,10 +39,10 @@ def body_trouble(static: Markers, trial: Markers, marker_set: MarkerSet) -> str:
     worst = int(np.argmax(np.where(known, np.abs(after - before), 0.0)))
     word = "longer" if ratio > 1 else "shorter"
     return (
-        f"the distances between markers of one segment are {100 * abs(ratio - 1):.0f} % {word} than in the static trial "
-        f"(median of {known.sum()}; {pairs[worst][0]} to {pairs[worst][1]}: {1e3 * after[worst]:.0f} mm, there "
-        f"{1e3 * before[worst]:.0f} mm); the static trial is of another person or in another unit: give the one of this "
-        f"person and session"
+        f"the distances between markers of one segment are {100 * abs(ratio - 1):.0f} % {word} than in the static "
+        f"trial (median of {known.sum()}; {pairs[worst][0]} to {pairs[worst][1]}: {1e3 * after[worst]:.0f} mm, there "
+        f"{1e3 * before[worst]:.0f} mm); the static trial is of another person or in another unit: give the one of "
+        f"this person and session"
     )
 
 

@@ -1,8 +1,8 @@
 """Do the forces belong to the motion? Wrong axes, signs, units and zeros of force plates, before any model.
 
-The ground accelerates the body as the markers show it: forces integrated over time are the changes of the velocity of the
-centre of mass, and the pelvis moves nearly as that does. On sound walks the two correlate by 0.7 and more along each
-horizontal axis, and their trends agree within 8 N.
+The ground accelerates the body as the markers show it: forces integrated over time are the changes of the velocity of
+the centre of mass, and the pelvis moves nearly as that does. On sound walks the two correlate by 0.7 and more along
+each horizontal axis, and their trends agree within 8 N.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def loads_trouble(plates: PlateLoads) -> str:
     axis = "XYZ"[int(np.argmax(peaks))]
     if axis != "Y" and peaks[1] < 0.7 * peaks.max():
         return (
-            f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is up "
-            f"in the markers; export forces and markers in the same axes"
+            f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is "
+            f"up in the markers; export forces and markers in the same axes"
         )
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
     arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > _FIRM_LOAD_N]
@@ -45,8 +45,8 @@ def loads_trouble(plates: PlateLoads) -> str:
     typical = float(np.median(arms)) if arms.size else 0.0
     if typical > _LONGEST_ARM_M:
         return (
-            f"the torques are those of vertical forces at {typical:.2g} m from the foot; expected less than 0.04 m: they "
-            f"are in N mm, or not about the centre of pressure; export them in N m, about the point of the force"
+            f"the torques are those of vertical forces at {typical:.2g} m from the foot; expected less than 0.04 m: "
+            f"they are in N mm, or not about the centre of pressure; export them in N m, about the point of the force"
         )
     return ""
 

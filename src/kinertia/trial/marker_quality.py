@@ -119,8 +119,8 @@ def spikes_trouble(markers: Markers) -> str:
     more = f" and {often.size - _LISTED} more" if often.size > _LISTED else ""
     first = float(markers.time[1 + int(np.argmax(spike[:, often[0]]))])
     return (
-        f"spikes: single frames in which markers are up to {1e3 * away[spike].max():.0f} mm off their way: {told}{more}; "
-        f"the first at {first:.3f} s: delete those frames of the marker, a gap is bridged, or label them"
+        f"spikes: single frames in which markers are up to {1e3 * away[spike].max():.0f} mm off their way: "
+        f"{told}{more}; the first at {first:.3f} s: delete those frames of the marker, a gap is bridged, or label them"
     )
 
 
