@@ -76,7 +76,9 @@ def check(
     Measured: rates, units, axes; markers and gaps; force plates and which foot
     is on them; the stretch in which all ground contact is measured; the
     vertical force against body mass; the mean vertical
-    moment over whole strides, which should be near zero.
+    moment over whole strides, which should be near zero; swapped labels,
+    mirrored axes, spikes; forces with a wrong axis, sign, unit or zero.
+    With the static trial: whether it is of the same person.
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.
