@@ -33,6 +33,7 @@ kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
+kinertia instruments A.toml B.toml   plates and clock, from a whole session
 kinertia warm-up              compile now what the first fit would compile
 
 Every command says more with --help, and has an example there.
@@ -65,6 +66,7 @@ _MODULES = {
     "fit": "fit",
     "crossval": "plan",
     "plan": "plan",
+    "instruments": "instruments",
     "study": "study",
     "warm-up": "warm_up",
 }
