@@ -23,6 +23,7 @@ from kinertia.estimation.warnings import mass_from_force_kg
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
+from kinertia.io.spreadsheet import inert
 from kinertia.io.sto import TimeTable, write_table
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
@@ -42,7 +43,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     Raises:
         FileError: the folder cannot be written to.
     """
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
         _write_bsp(fit, work / "bsp.csv")
@@ -61,7 +62,7 @@ def _write_bsp(fit: Fit, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([None if cell != cell else cell for cell in row] for row in zip(*cells, strict=True))
+        writer.writerows([None if cell != cell else inert(cell) for cell in row] for row in zip(*cells, strict=True))
 
 
 def _write_model(fit: Fit, folder: Path) -> None:
@@ -75,7 +76,7 @@ def _write_model(fit: Fit, folder: Path) -> None:
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
     changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
-    changes.to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
+    changes.map(inert).to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
 
 
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
