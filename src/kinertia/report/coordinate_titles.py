@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
+from kinertia.model.sides import by_side
 from kinertia.model.skeleton import Skeleton
 
 _GAIT27 = {
@@ -41,11 +41,7 @@ class Coordinate:
 
 def panels_of(skeleton: Skeleton) -> list[Coordinate]:
     """The coordinates of a skeleton in their order, left and right together."""
-    names = skeleton.coordinates
-    found: dict[str, dict[str, int]] = {}
-    for column, name in enumerate(names):
-        base, side = _split(name, names)
-        found.setdefault(base, {})[side] = column
+    found = by_side(skeleton.coordinates)
     known = _GAIT27 if skeleton.name == "gait27" else {}
     return [
         Coordinate(known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())]))
@@ -62,10 +58,3 @@ def title_of(skeleton: Skeleton, column: int) -> str:
                 return words[0].lower() + words[1:] + {"r": ", right", "l": ", left", "": ""}[side]
     raise IndexError(column)
 
-
-def _split(name: str, names: Sequence[str]) -> tuple[str, str]:
-    """Name without its side, and the side, where the other side is there too."""
-    base, _, side = name.rpartition("_")
-    if side in ("r", "l") and {f"{base}_r", f"{base}_l"} <= set(names):
-        return base, side
-    return name, ""
