@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -55,7 +56,7 @@ def test_strides_run_from_contact_to_contact(walked, measured):
     for side in FEET:
         own = [stride for stride in found if stride.side == side]
         assert [stride.number for stride in own] == list(range(1, len(own) + 1))
-        assert all(a.end_s == b.start_s for a, b in zip(own, own[1:], strict=False))
+        assert all(a.end_s == b.start_s for a, b in pairwise(own))
 
 
 def test_where_no_plate_sees_a_contact_the_motion_tells_it(walked, trial, measured):

@@ -28,7 +28,7 @@ from report_page import Elements, figures_of
 MOST_BYTES = 2_500_000
 MOST_BYTES_OF_MANY = 4_500_000
 """However many trials there are, and however long."""
-PARTS = ["verdict", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
+PARTS = ["verdict", "cycle", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
 
 
 @pytest.fixture(scope="module")

@@ -36,21 +36,36 @@ class Estimated(Protocol):
     """What is needed of a fitted trial; its attributes are those of `TrialFit`."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The trial's."""
+
     @property
-    def kinematics(self) -> Kinematics: ...
+    def kinematics(self) -> Kinematics:
+        """Before the estimate."""
+
     @property
-    def skeleton(self) -> Skeleton: ...
+    def skeleton(self) -> Skeleton:
+        """The model."""
+
     @property
-    def motion(self) -> Motion: ...
+    def motion(self) -> Motion:
+        """At the frames of the window."""
+
     @property
-    def reactions(self) -> GroundReactions: ...
+    def reactions(self) -> GroundReactions:
+        """That go with the estimate."""
+
     @property
-    def joint_loads(self) -> Mapping[str, np.ndarray]: ...
+    def joint_loads(self) -> Mapping[str, np.ndarray]:
+        """Per stage (w, c), N m."""
+
     @property
-    def joint_load_sd(self) -> np.ndarray | None: ...
+    def joint_load_sd(self) -> np.ndarray | None:
+        """(w, c), if there is any."""
+
     @property
-    def strides(self) -> tuple[Stride, ...]: ...
+    def strides(self) -> tuple[Stride, ...]:
+        """Of the whole trial."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
+from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.fit import Posterior
@@ -44,6 +44,9 @@ class FitPictures(Protocol):
 
     def moments(self, trial: str | None = None) -> Figure:
         """Joint moments per body mass, before against estimate."""
+
+    def cycles(self, kind: Kind = "moment") -> Figure | None:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides."""
 
     def markers(self, trial: str | None = None) -> Figure:
         """Distance between every measured and modelled marker."""
@@ -205,8 +208,8 @@ class Fit:
     def cycles(self, stage: Stage = "estimate") -> pd.DataFrame:
         """Curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.
 
-        Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent, quantity,
-        value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle grows),
+        Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent,
+        quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle grows),
         "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward", "..._medial"
         (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value` is NaN. `sd`
         is the posterior deviation of moments, and of powers as far as the moment makes it.

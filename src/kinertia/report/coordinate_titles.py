@@ -32,8 +32,9 @@ _GAIT27 = {
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One panel: its title, and per side ("r", "l", or "" where there is none) the column in q."""
+    """One panel: its name without side, its title, and per side ("r", "l", "" where there is none) the column in q."""
 
+    name: str
     title: str
     columns: dict[str, int]
     rotational: bool
@@ -44,7 +45,9 @@ def panels_of(skeleton: Skeleton) -> list[Coordinate]:
     found = by_side(skeleton.coordinates)
     known = _GAIT27 if skeleton.name == "gait27" else {}
     return [
-        Coordinate(known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())]))
+        Coordinate(
+            base, known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())])
+        )
         for base, columns in found.items()
     ]
 
@@ -58,3 +61,10 @@ def title_of(skeleton: Skeleton, column: int) -> str:
                 return words[0].lower() + words[1:] + {"r": ", right", "l": ", left", "": ""}[side]
     raise IndexError(column)
 
+
+def load_title(one: Coordinate, what: str) -> str:
+    """Moment or power of a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +"."""
+    if not one.title.endswith(" +"):
+        return f"{one.title} {what}"
+    joint, _, direction = one.title.partition(" ")
+    return f"{joint} {what}, {direction.replace(',', '')}"

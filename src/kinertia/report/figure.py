@@ -52,6 +52,8 @@ def compact(values: np.ndarray) -> np.ndarray:
 
 def _typed_array(values: object) -> dict[str, str]:
     """plotly.js' form of a binary array: little-endian, in base64. Here NaN, a gap in a curve, needs no word."""
-    if not (isinstance(values, np.ndarray) and values.dtype == np.float32 and values.ndim == 1):
-        raise TypeError(f"a figure holds lists and one-dimensional arrays of float32, not {values!r}")
-    return {"dtype": "f4", "bdata": base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")}
+    known = {np.dtype(np.float32): "f4", np.dtype(np.uint8): "u1"}
+    if not (isinstance(values, np.ndarray) and values.dtype in known and values.ndim == 1):
+        raise TypeError(f"a figure holds lists and one-dimensional arrays of float32 or uint8, not {values!r}")
+    name = known[values.dtype]
+    return {"dtype": name, "bdata": base64.b64encode(values.astype(f"<{name}").tobytes()).decode("ascii")}

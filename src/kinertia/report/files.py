@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.checks.verdict import verdicts
+from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
@@ -24,6 +25,7 @@ from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.sto import TimeTable, write_table
+from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 from kinertia.trial.rms import rms, rms_length
@@ -45,7 +47,8 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     with complete_folder(folder) as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
-        _write_bsp(fit, work / "bsp.csv")
+        write_columns(work / "bsp.csv", fit.bsp_columns())
+        _write_cycles(fit, work)
         _write_model(fit, work)
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
@@ -54,9 +57,18 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     return Path(folder)
 
 
-def _write_bsp(fit: Fit, path: Path) -> None:
-    """The table of `Fit.bsp`, as pandas would write it: a cell without a number is empty."""
-    columns = fit.bsp_columns()
+def _write_cycles(fit: Fit, folder: Path) -> None:
+    """The tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
+    if not any(trial.strides for trial in fit.trials):
+        return
+    write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials))
+    names: dict[Stage, str] = {"estimate": "cycles.csv", "literature": "cycles_literature.csv"}
+    for stage, name in names.items():
+        write_columns(folder / name, cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES))
+
+
+def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
+    """A table as pandas would write it: a cell without a number is empty."""
     cells = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
