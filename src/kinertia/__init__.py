@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
     from kinertia.motion.dynamics import residual as residual
     from kinertia.report.files import save_fit as save_fit
+    from kinertia.report.saved_fit import load_fit as load_fit
     from kinertia.settings import Settings as Settings
     from kinertia.settings import Subject as Subject
     from kinertia.studies.cross_validation import HeldOut as HeldOut
@@ -109,6 +110,7 @@ _ROOMS = {
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",
     "report.files": "save_fit",
+    "report.saved_fit": "load_fit",
 }
 """Where the public names are, from the lowest room up."""
 _HOMES = {name: module for module, names in _ROOMS.items() for name in names.split()}

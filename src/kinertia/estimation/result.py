@@ -209,10 +209,10 @@ class Fit:
         """Curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.
 
         Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent,
-        quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle grows),
-        "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward", "..._medial"
-        (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value` is NaN. `sd`
-        is the posterior deviation of moments, and of powers as far as the moment makes it.
+        quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle
+        grows), "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward",
+        "..._medial" (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value`
+        is NaN. `sd` is the posterior deviation of moments, and of powers as far as the moment makes it.
 
         Args:
             stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.

@@ -39,7 +39,7 @@ def cycle_figures(fit: Fit) -> dict[Kind, Figure]:
     """All figures over the gait cycle, by kind; none where no trial has a stride."""
     if not any(trial.strides for trial in fit.trials):
         return {}
-    drawn = _Drawn(fit, _curves(fit, "estimate"), _curves(fit, "literature"))
+    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"))
     return {kind: drawn.figure(kind) for kind in UNITS}
 
 
@@ -48,7 +48,8 @@ def cycle_figure(fit: Fit, kind: Kind) -> Figure | None:
     return cycle_figures(fit).get(kind)
 
 
-def _curves(fit: Fit, stage: Stage) -> Curves:
+def curves_of(fit: Fit, stage: Stage) -> Curves:
+    """All curves of a fit that figures are drawn from."""
     found: dict[tuple[str, str], list[CycleCurve]] = {}
     for trial in fit.trials:
         for one in cycle_curves(trial, fit.mass_kg, stage, spread_evenly(trial.strides, MOST_STRIDES)):
@@ -92,7 +93,7 @@ class _Drawn:
                 yield from _estimate(curves, word, colour)
             if usual:
                 line = {"color": colour, "dash": "dot", "width": 1.6}
-                yield {**_line(_mean(usual)), "name": f"{word}, {values}", "line": line}
+                yield {**mean_line(mean_curve(usual)), "name": f"{word}, {values}", "line": line}
 
     def _toe_offs(self) -> list[dict[str, Any]]:
         """A vertical line per side at its mean toe off."""
@@ -123,7 +124,7 @@ class _Drawn:
 
 def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:
     """Bands below, strides, and their mean on top."""
-    mean, spread = _mean(curves), _spread(curves)
+    mean, spread = mean_curve(curves), _spread(curves)
     if spread is not None:
         yield {**_band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
     sds = [one.sd for one in curves if one.sd is not None]
@@ -136,10 +137,10 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
         line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
         yield {**_strides(shown), "name": f"{word}, strides", "line": line}
     name = f"{word}, mean" if len(curves) > 1 else f"{word}, one stride"
-    yield {**_line(mean), "name": name, "line": {"color": colour, "width": 2.2}}
+    yield {**mean_line(mean), "name": name, "line": {"color": colour, "width": 2.2}}
 
 
-def _mean(curves: Sequence[CycleCurve]) -> np.ndarray:
+def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
     """(101,) of the strides that were measured there; NaN where none was."""
     return _over_strides(np.nanmean, np.array([one.value for one in curves]))
 
@@ -161,7 +162,8 @@ def _over_strides(statistic: Any, values: np.ndarray) -> np.ndarray:
         return np.asarray(statistic(values, axis=0))
 
 
-def _line(values: np.ndarray) -> dict[str, Any]:
+def mean_line(values: np.ndarray) -> dict[str, Any]:
+    """The trace of one curve (101,)."""
     return {
         "type": "scatter",
         "mode": "lines",

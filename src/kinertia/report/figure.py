@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,12 @@ class Figure:
         """
         plain = {"data": self.data, "layout": self.layout}
         return json.dumps(plain, default=_typed_array, allow_nan=False, separators=(",", ":"))
+
+
+def written(figure: Figure) -> dict[str, Any]:
+    """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
+    text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
+    return {"alt": figure.alt, "json": Markup(text), "height": figure.layout["height"]}
 
 
 def compact(values: np.ndarray) -> np.ndarray:

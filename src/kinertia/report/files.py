@@ -1,4 +1,4 @@
-"""Writes a `Fit` to a folder: `report.html`, `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
+"""Writes a `Fit` to a folder: the report, the result to open again, tables, and files that OpenSim opens.
 
 Everything is written to a hidden folder first and moved when complete, so a run never leaves half a result.
 """
@@ -28,6 +28,7 @@ from kinertia.io.sto import TimeTable, write_table
 from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
+from kinertia.report.saved_fit import FIT_FILE, write_fit
 from kinertia.trial.rms import rms, rms_length
 
 _PARTS = (slice(0, 3), slice(3, 6))
@@ -46,6 +47,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     """
     with complete_folder(folder) as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
+        write_fit(fit, provenance, work / FIT_FILE)
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
         write_columns(work / "bsp.csv", fit.bsp_columns())
         _write_cycles(fit, work)

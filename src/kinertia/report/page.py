@@ -21,7 +21,7 @@ from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
 from kinertia.report.cycle_figures import MOST_STRIDES, cycle_figures
 from kinertia.report.cycle_table import stride_rows
-from kinertia.report.figure import Figure
+from kinertia.report.figure import written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
@@ -44,8 +44,11 @@ _VIEW_FRAMES = 800
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
-def render(fit: Fit, provenance: Provenance | None = None) -> str:
-    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command."""
+def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[str, str] | None = None) -> str:
+    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command.
+
+    `computed_by` are the versions that the fit is from, where they are not the present ones.
+    """
     shown = fit.trials[:MOST_TRIALS]
     information = information_figure(fit)
     return rendered(
@@ -65,7 +68,7 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
         provenance=provenance,
-        versions=versions(),
+        versions=computed_by or versions(),
         shown_unit=SHOWN_UNIT,
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
@@ -85,12 +88,6 @@ def _cycle(fit: Fit) -> dict[str, Any] | None:
         "on_plates": sum(stride.on_plates for stride in strides),
         **{kind: written(figure) for kind, figure in figures.items()},
     }
-
-
-def written(figure: Figure) -> dict[str, Any]:
-    """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
-    text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
-    return {"alt": figure.alt, "json": Markup(text), "height": figure.layout["height"]}
 
 
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
