@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from kinertia.checks.model import check_model as check_model
     from kinertia.checks.recording import RecordingCheck as RecordingCheck
     from kinertia.checks.recording import check_recording as check_recording
+    from kinertia.checks.uses import Use as Use
+    from kinertia.checks.uses import uses as uses
     from kinertia.checks.verdict import Verdict as Verdict
     from kinertia.checks.verdict import verdicts as verdicts
     from kinertia.errors import FileError as FileError
@@ -105,6 +107,7 @@ _ROOMS = {
     "estimation.simultaneous.fit": "Posterior",
     "checks.model": "ModelCheck check_model",
     "checks.recording": "RecordingCheck check_recording",
+    "checks.uses": "Use uses",
     "checks.verdict": "Verdict verdicts",
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",

@@ -44,6 +44,7 @@ class Opened:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
+        self.page.evaluate("document.querySelectorAll('details.seconds').forEach((part) => (part.open = true))")
         playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
 
     def picture(self, locator):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.checks.verdict import Level, verdicts
+from kinertia.checks.verdict import verdicts, worst_level
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report import style
@@ -146,8 +146,6 @@ def _strides(fit: Fit) -> bool:
 
 
 def _head(name: str, fit: Fit) -> dict[str, Any]:
-    levels = [verdict.level for verdict in verdicts(fit)]
-    worst: Level = next(one for one in ("fail", "caution", "pass") if one in levels)
     return {
         "name": name,
         "subject": fit.subject.name,
@@ -155,7 +153,7 @@ def _head(name: str, fit: Fit) -> dict[str, Any]:
         "method": fit.settings.method,
         "model": fit.skeleton.name,
         "trials": ", ".join(trial.name for trial in fit.trials),
-        "level": worst,
+        "level": worst_level(verdicts(fit)),
     }
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
 from kinertia.estimation.result import Fit
+from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.coordinate_titles import load_title, panels_of
@@ -82,6 +83,9 @@ class _Drawn:
         coordinates = [one for one in panels_of(self.fit.skeleton) if one.rotational]
         if kind == "angle":
             return [(f"{one.name}_angle", one.title) for one in coordinates]
+        if kind == "power":  # of arms and trunk next to nothing
+            legs = _leg_coordinates(self.fit.skeleton)
+            coordinates = [one for one in coordinates if legs & set(one.columns.values())]
         return [(f"{one.name}_{kind}", load_title(one, kind)) for one in coordinates]
 
     def _traces(self, quantity: str) -> Iterator[dict[str, Any]]:
@@ -120,6 +124,12 @@ class _Drawn:
             f"{names[kind]} ({unit}) over the gait cycle, estimate against {start.values}; strides: {counts[0]} right, "
             f"{counts[1]} left."
         )
+
+
+def _leg_coordinates(skeleton: Skeleton) -> set[int]:
+    """Those that move a foot."""
+    feet = [skeleton.segments.index(foot) for foot in skeleton.feet]
+    return set(skeleton.map.owner[skeleton.support[feet].any(axis=0)].tolist())
 
 
 def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:

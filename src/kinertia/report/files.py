@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from kinertia.checks.uses import uses
 from kinertia.checks.verdict import verdicts
 from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
@@ -147,6 +148,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         "converged": fit.converged,
         **_posterior_summary(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
+        "uses": [{"output": use.output, "use": use.word, "reason": use.reason} for use in uses(fit)],
         "verdicts": [verdict._asdict() for verdict in verdicts(fit)],
         "warnings": list(fit.warnings),
         "notes": list(fit.notes),
