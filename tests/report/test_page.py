@@ -386,3 +386,10 @@ def test_pictures_are_those_of_the_report(fit, page):
     assert plot.gaps() is None or isinstance(plot.gaps(), go.Figure)
     with pytest.raises(KeyError, match=fit.trials[0].name):
         plot.residuals("nowhere")
+
+
+def test_three_trials_with_strides_stay_below_3_mb(fit):
+    posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 3)
+    made = render(replace(fit, trials=fit.trials * 3, posterior=posterior))
+    assert 'id="cycle"' in made
+    assert len(made.encode()) < 3_000_000

@@ -40,7 +40,7 @@ from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
-_VIEW_FRAMES = 500
+_VIEW_FRAMES = 400
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
