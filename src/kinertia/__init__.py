@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from kinertia.errors import KinertiaError as KinertiaError
     from kinertia.errors import MarkerSetError as MarkerSetError
     from kinertia.errors import OsimError as OsimError
+    from kinertia.errors import SessionError as SessionError
     from kinertia.errors import SettingsError as SettingsError
     from kinertia.errors import SubjectError as SubjectError
     from kinertia.errors import TrialError as TrialError
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import residual as residual
     from kinertia.report.files import save_fit as save_fit
     from kinertia.report.saved_fit import load_fit as load_fit
+    from kinertia.settings import Instruments as Instruments
     from kinertia.settings import Settings as Settings
     from kinertia.settings import Subject as Subject
     from kinertia.studies.cross_validation import HeldOut as HeldOut
@@ -84,8 +86,8 @@ if TYPE_CHECKING:
     from kinertia.trial.plate_assignment import build_trial as build_trial
 
 _ROOMS = {
-    "errors": "FileError KinertiaError MarkerSetError OsimError SettingsError SubjectError TrialError",
-    "settings": "Settings Subject",
+    "errors": "FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
+    "settings": "Instruments Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",
     "model.anthropometry": "BodyGeometry literature_bsp",

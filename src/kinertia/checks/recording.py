@@ -24,6 +24,7 @@ from kinertia.trial.free_moment import mean_turning
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, Visibility, axes_trouble, extent_m, travel, visibility
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.trial.telling_movements import TellingMovements
 
 OFF_PLATE_SHARE = 0.05
 """More of the firm load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
@@ -61,6 +62,7 @@ class RecordingCheck:
         marker_set: how its labels fit.
         markers: visibility, over the whole recording, of the set's markers, or of all where no set fits.
         travel: what the person does.
+        telling: how far trunk and pelvis move, or None.
         plates: one entry per plate; empty without forces.
         windows: stretches in which every foot on the ground stands on a plate, longest first.
         mass: by the vertical force, or None.
@@ -79,6 +81,7 @@ class RecordingCheck:
     marker_set: MarkerSetMatch
     markers: tuple[Visibility, ...]
     travel: Travel
+    telling: TellingMovements | None
     plates: tuple[PlateCheck, ...]
     windows: tuple[tuple[float, float], ...]
     mass: ForceMass | None
@@ -101,6 +104,8 @@ class RecordingCheck:
             ("labels", f"{len(markers.labels)}, {len(match.others)} not in the marker set"),
             ("marker set", named if had else "none known"),
         ]
+        if self.telling is not None:
+            told.append(("movement", self.telling.sentence()))
         if missing and had:
             told.append(("missing labels", ", ".join(missing)))
         if plates is None:
@@ -155,7 +160,15 @@ def check_recording(
     scale = recording.mass_kg if mass_kg is None else mass_kg
     found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
     found += [] if trial is None or used is None else _turning(trial, used)
-    return RecordingCheck(recording, match, seen, moves, plates, windows, mass, scale, tuple(found), tuple(notes))
+    telling = None if used is None else _telling(recording.markers, used)
+    return RecordingCheck(
+        recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)
+    )
+
+
+def _telling(markers: Markers, marker_set: MarkerSet) -> TellingMovements | None:
+    pelvis, torso = (marker_set.segments.get(name, ()) for name in ("pelvis", "torso"))
+    return TellingMovements.of(markers, pelvis, torso)
 
 
 def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:

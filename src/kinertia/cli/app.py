@@ -31,6 +31,7 @@ kinertia compare out1 out2    what differs between fits, and by how much
 kinertia export out --csv     all tables of a fit, for other programs
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
+kinertia instruments A.toml B.toml   plates and clock, from a whole session
 kinertia warm-up              compile now what the first fit would compile
 
 Every command says more with --help, and has an example there.
@@ -65,6 +66,7 @@ _MODULES = {
     "export": "export",
     "crossval": "plan",
     "plan": "plan",
+    "instruments": "instruments",
     "study": "study",
     "warm-up": "warm_up",
 }

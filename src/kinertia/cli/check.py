@@ -26,6 +26,7 @@ from kinertia.model.anthropometry import check_subject
 from kinertia.model.marker_set import MarkerSet
 from kinertia.report.check_page import save_check_page
 from kinertia.trial.data import Recording
+from kinertia.trial.telling_movements import missing_movements
 
 _MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")
 _LISTED = 8
@@ -121,6 +122,9 @@ def _show(
     """Everything on the terminal."""
     for title, recording in recordings:
         _show_recording(title, recording, verbose)
+    lacking = missing_movements(recording.telling for _, recording in recordings if recording.plates)
+    if lacking is not None:
+        out.print(f"\n{lacking}")
     for title, model in models:
         _show_model(title, model)
     if page is not None:

@@ -19,6 +19,10 @@
     [settings]                     # every one has a default, see `kinertia.settings.Settings`
     cutoff_hz = 6.0
 
+    [instruments]                  # what the laboratory knows of plates and clock; all may be left out
+    plate_sd_mm = 2.0              # from a spot check of the centre of pressure
+    session = "instruments.toml"   # what `kinertia instruments` wrote
+
 `read_subject` checks it whole and names the line of what is wrong; `kinertia.io.subject_draft` drafts one.
 """
 
@@ -44,7 +48,7 @@ from kinertia.io.file_names import fits_everywhere, path_from, path_trouble, sam
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Settings, Subject, Table, folder_of
+from kinertia.settings import Instruments, Settings, Subject, Table, folder_of
 
 
 def _file(value: object, info: ValidationInfo) -> Path:
@@ -124,6 +128,12 @@ class TrialFiles(Table):
         return {"name": PureWindowsPath(markers).stem if isinstance(markers, str | Path) else "trial", **data}
 
 
+class InstrumentsFiles(Instruments):
+    """What the laboratory states of its instruments, and the file of its session."""
+
+    session: File | None = Field(default=None, description="what kinertia instruments wrote of the same session")
+
+
 class SubjectFile(Table):
     """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist.
 
@@ -137,6 +147,7 @@ class SubjectFile(Table):
     model: Model
     trials: tuple[TrialFiles, ...] = Field(alias="trial", strict=False, min_length=1)
     settings: Settings = Settings()
+    instruments: InstrumentsFiles = InstrumentsFiles()
 
 
 def subject_file_in(folder: Path) -> Path:

@@ -10,6 +10,7 @@ from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.io.object_archive import read_archive, write_archive
 from kinertia.io.provenance import VERSION, Provenance, versions
@@ -44,7 +45,8 @@ class SavedFit:
 
 
 _KINDS = (
-    SavedFit, Provenance, Fit, TrialFit, Posterior, MarkerNoise, BaseParameters, Combination, Subject, Settings,
+    SavedFit, Provenance, Fit, TrialFit, Subject, Settings,
+    Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
     Skeleton, Joint, Axis, Marker, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads,
