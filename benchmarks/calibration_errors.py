@@ -9,7 +9,7 @@ import numpy as np
 
 from bsp_errors import errors
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.model.gait27 import HIP_OFFSETS
@@ -83,7 +83,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
 
     marker_sd = np.full(len(off.skeleton.markers), 0.005)
     centres = dict.fromkeys(HIP_OFFSETS, LARGEST.hips_m)
-    free = CalibrationPrior(centres, marker_sd, PLATE_PRIOR, FLOOR_PRIOR, CLOCK_PRIOR_S)
+    free = CalibrationPrior(centres, marker_sd, InstrumentPrior())
     result = estimate(free)
     offsets, sds = result.plates["right foot"]
     clock, clock_sd = result.clock_s

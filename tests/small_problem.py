@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
@@ -30,6 +31,7 @@ KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow",
 PLATES = {name: SoundOrFaulty.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
 FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3)}
 CLOCK = SoundOrFaulty.certain(0.01)
+INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK)
 SWITCH_S = 0.1
 """When the right foot steps from one plate to another, without a flight."""
 LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
@@ -85,7 +87,7 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
 
 def small_problem(n_trials: int = 1) -> MapProblem:
     trial = small_trial()
-    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), PLATES, FLOOR, CLOCK)
+    calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), INSTRUMENTS)
     observations = [small_observation(trial, seed) for seed in range(n_trials)]
     return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations, 0.1)
 
@@ -118,7 +120,7 @@ def curved_problem(path: Path) -> MapProblem:
         skin=small_skin(skeleton, 13),
     )
     prior = BspPrior(ours.bsp, np.diag(np.square(np.full(20, 0.01))), 13.0, 0.1)
-    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), PLATES, FLOOR, CLOCK)
+    calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), INSTRUMENTS)
     return MapProblem(skeleton, prior, calibration, [observation], 0.1)
 
 

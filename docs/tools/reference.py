@@ -15,7 +15,7 @@ from typing import Any
 import typer
 
 from kinertia.cli.app import application
-from kinertia.io.subject_file import Model, TrialFiles
+from kinertia.io.subject_file import InstrumentsFiles, Model, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
 from kinertia.settings import Settings, Subject, Table
 
@@ -104,6 +104,7 @@ _GENERATED = {
     "trial": lambda: _table(TrialFiles),
     "marker set": _marker_set,
     "settings": lambda: _table(Settings),
+    "instruments": lambda: _table(InstrumentsFiles),
 }
 
 

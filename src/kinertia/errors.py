@@ -122,6 +122,15 @@ class SettingsError(KinertiaError):
     """
 
 
+class SessionError(KinertiaError):
+    """What trials say of plates and clock cannot be put together with what others say.
+
+    Examples:
+        >>> isinstance(kinertia.SessionError("plates are told by their names"), kinertia.KinertiaError)
+        True
+    """
+
+
 class OsimError(FileError):
     """An OpenSim model file cannot be used: broken, of an unknown format, or a model that Kinertia cannot represent.
 

@@ -88,3 +88,24 @@ class Settings(Table):
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
     )
+
+
+class Instruments(Table):
+    """How well the laboratory knows its instruments; the literature's deviations for what it does not state.
+
+    Examples:
+        >>> kinertia.Instruments(plate_sd_mm=2.0).clock_sd_ms is None
+        True
+    """
+
+    plate_sd_mm: float | None = Field(
+        default=None,
+        gt=0.0,
+        description="how far centres of pressure are off along each axis, from a spot check, mm",
+    )
+    clock_sd_ms: float | None = Field(
+        default=None, gt=0.0, description="how far forces are late or early, from a synchronisation check, ms"
+    )
+    same_plates: bool = Field(
+        default=False, description="true: columns of the same name are the same plate in all force files (.mot, .sto)"
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import TrialError
-from kinertia.estimation.force_mass import check_forces, check_masses, force_mass
+from kinertia.estimation.force_mass import check_force_masses, check_masses, force_mass
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
 
@@ -47,12 +47,12 @@ def test_gaps_change_little(made):
 
 def said(made, force) -> str:
     with pytest.raises(TrialError, match="the vertical force corresponds to") as caught:
-        check_forces(made.skeleton, made.bsp.total_mass_kg, [trial(made, force)])
+        check_force_masses(made.skeleton, made.bsp.total_mass_kg, [trial(made, force)])
     return str(caught.value)
 
 
 def test_each_cause_is_told_by_its_evidence_and_none_is_accused_without(made):
-    check_forces(made.skeleton, made.bsp.total_mass_kg, [trial(made)])
+    check_force_masses(made.skeleton, made.bsp.total_mass_kg, [trial(made)])
     gain = said(made, lambda time, force: 0.75 * force)
     chair = said(made, lambda time, force: force - np.array([0.0, 100.0, 0.0]))
     for text in (gain, chair):

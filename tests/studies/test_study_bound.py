@@ -8,6 +8,7 @@ import pytest
 import study_bound
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fisher_information import Information
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.studies.accuracy import at_truth, held
@@ -31,8 +32,9 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     )
     calibration = replace(held(trial.skeleton), marker_sd_m=np.full(len(trial.skeleton.markers), 1e-8))
     exact = SoundOrFaulty.certain(1e-9)
-    plate, floor = (dict.fromkeys(names, exact) for names in (calibration.plate, calibration.floor))
-    calibration = replace(calibration, plate=plate, floor=floor, clock_s=exact)
+    known = calibration.instruments
+    plate, floor = (dict.fromkeys(names, exact) for names in (known.plate, known.floor))
+    calibration = replace(calibration, instruments=InstrumentPrior(plate, floor, exact))
     own = Information(
         MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], BANDWIDTH.spacing_s),
         np.ones((1, 1)),

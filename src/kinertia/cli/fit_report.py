@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from rich.table import Table
-from rich.text import Text
 
 from kinertia.checks.verdict import Verdict
-from kinertia.cli.terminal import out, plain_table, show_verdicts
+from kinertia.cli.terminal import out, plain_table, show_verdicts, show_warning
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
 from kinertia.report.files import summary
@@ -37,7 +36,7 @@ def report_fit(fit: Fit) -> None:
     masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
     out.print(f"total mass (kg): {masses}\n")
     for warning in fit.warnings:
-        out.print(Text("warning: ", style="bold yellow").append(warning, style="not bold default"))
+        show_warning(warning)
 
 
 def report_verdicts(

@@ -32,6 +32,11 @@ def show_error(message: str) -> None:
     err.print(text, soft_wrap=True)
 
 
+def show_warning(sentence: str) -> None:
+    """One of a result's, on standard output."""
+    out.print(Text("warning: ", style="bold yellow").append(sentence, style="not bold default"))
+
+
 def show_verdicts(verdicts: Iterable[Verdict]) -> None:
     """One paragraph each, the level first."""
     for level, sentence in verdicts:

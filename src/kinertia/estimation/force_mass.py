@@ -137,7 +137,7 @@ def check_masses(mass_kg: float, by_force: Sequence[ForceMass]) -> None:
             )
 
 
-def check_forces(skeleton: Skeleton, mass_kg: float, trials: Sequence[Trial]) -> None:
+def check_force_masses(skeleton: Skeleton, mass_kg: float, trials: Sequence[Trial]) -> None:
     """`check_masses` of the trials whose forces tell a mass."""
     check_masses(mass_kg, [found for trial in trials if (found := force_mass(skeleton, trial)) is not None])
 

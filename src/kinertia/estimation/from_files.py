@@ -6,13 +6,16 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from kinertia.errors import SettingsError
+from kinertia.errors import SessionError, SettingsError
 from kinertia.estimation.estimate import estimate
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.result import Fit
+from kinertia.estimation.session import with_instruments
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.provenance import recordings
 from kinertia.io.recording import read_recording
-from kinertia.io.subject_file import SubjectFile, read_subject
+from kinertia.io.session_file import read_session
+from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 
@@ -41,6 +44,36 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
+    known = wanted.instruments
+    session = () if known.session is None else read_session(known.session)
+    if session:
+        check_plates(wanted)
+    ready = _prepared(wanted, progress)
+    if known == InstrumentsFiles():
+        return ready
+    if wanted.settings.method == "two-level":
+        return replace(
+            ready, notes=(*ready.notes, "[instruments] is not used: two-level takes plates and clock as exact")
+        )
+    return with_instruments(ready, known, session, recordings(wanted))
+
+
+def check_plates(wanted: SubjectFile) -> None:
+    """The plates of this person are those of the session, by their names.
+
+    Raises:
+        SessionError: they are columns of force files, and nobody has said that those are plates.
+    """
+    files = [trial.forces for trial in wanted.trials if trial.forces is not None]
+    if files and not wanted.instruments.same_plates:
+        raise SessionError(
+            f"{files[0].name}: columns of force files need not be plates (some laboratories sort steps into them, a "
+            "column for each foot); if the same columns are the same plate in all files of the session, say so in the "
+            "subject file: same_plates = true under [instruments]"
+        )
+
+
+def _prepared(wanted: SubjectFile, progress: Progress) -> Prepared:
     if wanted.model.osim is not None:
         from kinertia.estimation.prepare_osim import prepare_osim
         from kinertia.io.osim.reader import read_osim
@@ -75,7 +108,8 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
     """The trials by their names in the subject file.
 
     Columns of the same name in the force files of two trials need not come from the same plate (laboratories sort steps
-    into such files), so each trial's are plates of their own; the plates of C3D files are those of the laboratory.
+    into such files), so each trial's are plates of their own, unless the subject file says that they are the same; the
+    plates of C3D files are those of the laboratory.
 
     Raises:
         KinertiaError: a file is missing or broken.
@@ -87,7 +121,8 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
         recording = read_recording(files.markers, files.forces, files.loads)
         seconds = time.perf_counter() - started
         plates = recording.plates
-        if plates is not None and files.forces is not None and len(wanted.trials) > 1:
+        apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
+        if plates is not None and apart:
             plates = replace(plates, names=tuple(f"{name} ({files.name})" for name in plates.names))
         inputs.append(TrialInput(replace(recording, name=files.name, plates=plates), files.window_s, seconds))
     return inputs

@@ -34,12 +34,18 @@ class Provenance:
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     """The command with the hashes of all files that the subject file names."""
-    model = wanted.model
-    paths = [path for path in (model.static, model.osim, model.markers) if isinstance(path, Path)]
+    model, session = wanted.model, wanted.instruments.session
+    paths = [path for path in (model.static, model.osim, model.markers, session) if isinstance(path, Path)]
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
     names = names_from_common_folder(paths)
     return Provenance(command, {name: _sha256(path) for name, path in zip(names, paths, strict=True)})
+
+
+def recordings(wanted: SubjectFile) -> tuple[str, ...]:
+    """SHA-256 of the person's static trial or model, and of the gait trials: those of no other person."""
+    paths = [wanted.model.static, wanted.model.osim, *(trial.markers for trial in wanted.trials)]
+    return tuple(_sha256(path) for path in paths if path is not None)
 
 
 def names_from_common_folder(paths: Sequence[PurePath]) -> list[str]:

@@ -19,6 +19,10 @@
     [settings]                     # every one has a default, see `kinertia.settings.Settings`
     cutoff_hz = 6.0
 
+    [instruments]                  # what the laboratory knows of plates and clock; all may be left out
+    plate_sd_mm = 2.0              # from a spot check of the centre of pressure
+    session = "instruments.toml"   # what `kinertia instruments` wrote
+
 `read_subject` checks it whole and names the line of what is wrong; `kinertia.io.subject_draft` drafts one.
 """
 
@@ -40,11 +44,11 @@ from pydantic import (
 )
 
 from kinertia.errors import FileError, SettingsError, SubjectError
-from kinertia.io.file_names import fits_everywhere, path_from, path_trouble, same_folder
+from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, path_trouble, same_folder
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Settings, Subject, Table, folder_of
+from kinertia.settings import Instruments, Settings, Subject, Table, folder_of
 
 
 def _file(value: object, info: ValidationInfo) -> Path:
@@ -124,6 +128,12 @@ class TrialFiles(Table):
         return {"name": PureWindowsPath(markers).stem if isinstance(markers, str | Path) else "trial", **data}
 
 
+class InstrumentsFiles(Instruments):
+    """What the laboratory states of its instruments, and the file of its session."""
+
+    session: File | None = Field(default=None, description="what kinertia instruments wrote of the same session")
+
+
 class SubjectFile(Table):
     """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist.
 
@@ -137,6 +147,23 @@ class SubjectFile(Table):
     model: Model
     trials: tuple[TrialFiles, ...] = Field(alias="trial", strict=False, min_length=1)
     settings: Settings = Settings()
+    instruments: InstrumentsFiles = InstrumentsFiles()
+
+
+def subject_file_in(folder: Path) -> Path:
+    """The subject file of a folder: `subject.toml`, or the only .toml file there.
+
+    Raises:
+        FileError: there is none, or several of which none is called subject.toml.
+    """
+    found = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml")
+    named = [path for path in found if path.name.lower() == "subject.toml"] or found
+    if len(named) == 1:
+        return named[0]
+    if not named:
+        raise FileError(folder, f"holds no subject file; draft one with: kinertia init {folder}")
+    listed = ", ".join(path.name for path in named)
+    raise FileError(folder, f"holds several .toml files ({listed}) and none is subject.toml; name the one you mean")
 
 
 def read_subject(path: str | Path) -> SubjectFile:
@@ -182,6 +209,8 @@ def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
                 "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...); "
                 'give the trial a name = "..." of its own'
             )
+        if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
+            return index, f'the results have a file {taken}, not a folder; give this trial a name = "..." of its own'
         for before in names[:index]:
             if same_folder(before, name):
                 same = "" if before == name else "; Windows and macOS take both for one folder"

@@ -18,6 +18,7 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
@@ -84,6 +85,11 @@ PROOF = {
         Faults("clusters", calibration=True),
     ),
     "walks": Scenario("skin motion, twelve strides at two paces", Faults("artefact"), others=("walk", "fast walk")),
+    "faulty_walks": Scenario(
+        "skin motion; left plate 20 mm off, forces 10 ms late, hip centres 10 mm off; three walks of a session",
+        Faults("artefact", hips_m=0.010, plate_m=0.020, late_s=0.010),
+        others=("walk", "fast walk"),
+    ),
     "session": Scenario(
         "skin motion, calibration errors; squats, arm swings and trunk sway besides the walk",
         Faults("artefact", calibration=True),
@@ -242,7 +248,7 @@ def held(skeleton: Skeleton) -> CalibrationPrior:
     places = np.full(len(skeleton.markers), _HELD_SD_M)
     exact = SoundOrFaulty.certain(_HELD_SD_M)
     plate, floor = (dict.fromkeys(names, exact) for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS))
-    return CalibrationPrior({}, places, plate, floor, exact)
+    return CalibrationPrior({}, places, InstrumentPrior(plate, floor, exact))
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:

@@ -10,7 +10,8 @@ from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.fit import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR, fit_simultaneous
+from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.report.files import save_fit
@@ -234,3 +235,33 @@ def test_files_of_a_simultaneous_fit(measured, tmp_path):
     assert noise["correlation_s"] > 0
     assert min(noise["sd_m"].values()) >= 0.001
     assert isinstance(noise["wandering"], list)
+
+
+def test_others_of_the_session_tell_what_a_plate_reads_and_the_clock(trial):
+    """Three people on a plate that reads 5 % too little, forces a frame late: two of them help the third."""
+
+    def off(loads):
+        loads[:] = np.roll(loads, 1, axis=0)
+        loads[:, 1] /= 1.05
+
+    def fit_of(seed, session=()):
+        positions = camera_noise(trial.markers, 0.004, np.random.default_rng(seed)).positions
+        loads = trial.foot_loads.copy()
+        off(loads)
+        kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
+        instruments = replace(GAIT27_UNCERTAINTY.instruments, session=session)
+        uncertainty = replace(GAIT27_UNCERTAINTY, instruments=instruments)
+        prior = literature_prior(walking_subject().literature)
+        return fit_simultaneous(trial.skeleton, prior, [kinematics], uncertainty=uncertainty).result
+
+    with threadpool_limits(1, user_api="blas"):
+        alone, *others = (fit_of(seed) for seed in range(3))
+        helped = fit_of(0, tuple(other.instruments for other in others))
+    gains = [(each.plates["left foot"][0][2], each.plates["left foot"][1][2]) for each in (alone, helped)]
+    clocks = [each.clock_s for each in (alone, helped)]
+    for (_, sd_alone), (value, sd), truth in ((*gains, 0.05), (*clocks, 0.01)):
+        assert sd < 0.7 * sd_alone
+        assert value == pytest.approx(truth, abs=2.5 * sd)
+    # what a person says does not grow by what it was told
+    own = [np.diag(each.instruments.information)[[6, 10]] for each in (alone, helped)]
+    np.testing.assert_allclose(own[1], own[0], rtol=0.1)

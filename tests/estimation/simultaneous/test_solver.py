@@ -7,6 +7,7 @@ from threadpoolctl import threadpool_limits
 import kinertia.estimation.simultaneous.solver as simultaneous
 from calibration_errors import DISTURBANCES, calibrated
 from kinertia.estimation.prior import literature_prior, with_symmetry
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Observation
@@ -46,7 +47,9 @@ def trial(person):
 @pytest.fixture(scope="module")
 def calibration(trial):
     plates, clock = {name: SoundOrFaulty.certain(sd) for name, sd in PLATES.items()}, SoundOrFaulty.certain(0.005)
-    return CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), plates, {"x": EXACT, "z": EXACT}, clock)
+    return CalibrationPrior(
+        {}, np.full(len(trial.skeleton.markers), 0.005), InstrumentPrior(plates, {"x": EXACT, "z": EXACT}, clock)
+    )
 
 
 def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: float = 0.0, seed: int = 0) -> Observation:

@@ -10,34 +10,19 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
 
-FAULTY_SHARE = 0.05
-PLATE_PRIOR = {
-    "x": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
-    "z": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
-    "gain": SoundOrFaulty(0.002, 0.03, FAULTY_SHARE),
-    "free moment": SoundOrFaulty(0.0003, 0.003, FAULTY_SHARE),
-}
-"""Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
-and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
-scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
-the vertical force at 0.3 m, and ten times that (no source)."""
-FLOOR_PRIOR = {"x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE), "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE)}
-"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes."""
-CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
-"""Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""
 _STAYING_SD_M = 1e-6
 """Of markers that stay where they are."""
 _NOTABLE = 2.0
@@ -57,6 +42,7 @@ class Posterior:
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
         base: which combinations of parameters these motions show, and which none ever shows.
+        instruments: what these trials say of plates and clock.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -70,6 +56,7 @@ class Posterior:
     marker_noise: tuple[MarkerNoise, ...]
     iterations: int
     base: BaseParameters
+    instruments: InstrumentInformation
 
     @property
     def information(self) -> np.ndarray:
@@ -142,6 +129,7 @@ def fit_simultaneous(
         base_parameters(
             result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in together]
         ),
+        result.instruments,
     )
     return SimultaneousFit(
         result,
@@ -177,13 +165,14 @@ def observed(
 def calibration_prior(skeleton: Skeleton, uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY) -> CalibrationPrior:
     """How far a calibrated skeleton with these markers, plates and clock may be off."""
     places = np.full(len(skeleton.markers), uncertainty.marker_sd_m or _STAYING_SD_M)
-    return CalibrationPrior(uncertainty.coordinates, places, PLATE_PRIOR, FLOOR_PRIOR, CLOCK_PRIOR_S)
+    return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments)
 
 
 def _calibration(
     skeleton: Skeleton, uncertainty: ModelUncertainty, result: SimultaneousResult
 ) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {}
+    known = uncertainty.instruments
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
         told = {"value": change, "prior_sd": uncertainty.coordinates[name], "sd": sd}
@@ -191,11 +180,12 @@ def _calibration(
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
-            expected = np.hypot(PLATE_PRIOR[unknown].sd, FLOOR_PRIOR[unknown].sd if unknown in FLOOR_PRIOR else 0.0)
-            told = {"value": float(value), "prior_sd": float(expected), "sd": float(deviation)}
+            floor = known.floor[unknown].sd if unknown in known.floor else 0.0
+            expected = float(np.hypot(known.plate[unknown].sd, floor))
+            told = {"value": float(value), "prior_sd": expected, "sd": float(deviation)}
             found[f"{name}: {unknown}"] = {**told, "unit": unit}
     clock, clock_sd = result.clock_s
-    found["clock: forces late by"] = {"value": clock, "prior_sd": CLOCK_PRIOR_S.sd, "sd": clock_sd, "unit": "s"}
+    found["clock: forces late by"] = {"value": clock, "prior_sd": known.clock_s.sd, "sd": clock_sd, "unit": "s"}
     return found
 
 

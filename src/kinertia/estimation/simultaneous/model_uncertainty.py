@@ -1,4 +1,4 @@
-"""What the simultaneous estimate may move of a model beside the segments of its prior, and what it leaves alone."""
+"""What the simultaneous estimate may move beside the segments of its prior, and what it leaves alone."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 
@@ -18,7 +19,7 @@ MARKER_SD_M = 0.005
 
 @dataclass(frozen=True, eq=False)
 class ModelUncertainty:
-    """Joint centres and markers that may move, and segments that are not estimated.
+    """Joint centres, markers and instruments that may move, and segments that are not estimated.
 
     Attributes:
         centres: static coordinate of the skeleton (locked) -> prior deviation, m.
@@ -26,6 +27,7 @@ class ModelUncertainty:
         held: parameters of the segments that the prior does not have; None where it has all.
         source: where the prior's mean comes from, for messages.
         axes: static coordinate that tilts a joint's axis -> prior deviation, rad.
+        instruments: priors of plates and clock.
     """
 
     centres: Mapping[str, float]
@@ -33,6 +35,7 @@ class ModelUncertainty:
     held: BodySegmentParameters | None
     source: str
     axes: Mapping[str, float] = field(default_factory=dict)
+    instruments: InstrumentPrior = field(default_factory=InstrumentPrior)
 
     @property
     def coordinates(self) -> dict[str, float]:

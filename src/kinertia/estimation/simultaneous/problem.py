@@ -15,13 +15,14 @@ import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.elimination import TrialNormal, summed
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.skin import SkinPatterns
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
@@ -105,21 +106,12 @@ class CalibrationPrior:
     Attributes:
         coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
-        plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
-        floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
-        clock_s: prior of the time between forces and markers.
+        instruments: priors of plates and clock.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
-    plate: Mapping[str, SoundOrFaulty]
-    floor: Mapping[str, SoundOrFaulty]
-    clock_s: SoundOrFaulty
-
-    def of_instruments(self, n_plates: int) -> list[SoundOrFaulty]:
-        """Priors of all plates' unknowns and of the clock, in the order of `Layout.instruments`."""
-        plates = [self.plate[name] for _ in range(n_plates) for name in PLATE_UNKNOWNS]
-        return [*plates, *(self.floor[name] for name in FLOOR_UNKNOWNS), self.clock_s]
+    instruments: InstrumentPrior
 
 
 @dataclass(frozen=True)
@@ -240,7 +232,8 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        self.instruments = calibration.of_instruments(len(self.plates))
+        self.instruments = calibration.instruments.of_unknowns(len(self.plates))
+        self.session = calibration.instruments.of_session(self.plates)
         self.weight = 1.0 / np.square(deviation)
         self.skin_information = self.skin[0].information()
 
@@ -276,7 +269,9 @@ class MapProblem:
         return result
 
     def prior_terms(self, static: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Information (S, S), right-hand side (S,) and cost of all priors but the instruments'."""
+        """Information (S, S), right-hand side (S,) and cost of all priors but the instruments'; of these, of what other
+        people of the session have shown.
+        """
         bsp = self.bsp(static)
         jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
         gap = (bsp.table() - self.prior.mean.table()).ravel()
@@ -285,7 +280,11 @@ class MapProblem:
         information = np.diag(self.weight)
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))
-        theta, skin = self.layout.theta, self.layout.skin
+        theta, skin, instruments = self.layout.theta, self.layout.skin, self.layout.instruments
+        told = self.session.information @ static[instruments]
+        information[instruments, instruments] += self.session.information
+        right[instruments] += self.session.right - told
+        cost += float(static[instruments] @ (told - 2.0 * self.session.right))
         information[skin, skin] += self.skin_information
         pulled = self.skin_information @ static[skin]
         right[skin] -= pulled

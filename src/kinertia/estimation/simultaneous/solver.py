@@ -20,6 +20,7 @@ import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.elimination import Reduced, reduced
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
@@ -49,6 +50,7 @@ class SimultaneousResult:
         motions: per trial q, qd, qdd at its frames.
         displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
         moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
+        instruments: what these trials say of plates and clock, to be added to what others say.
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
@@ -65,6 +67,7 @@ class SimultaneousResult:
     motions: tuple[Motion, ...]
     displacements_m: tuple[np.ndarray, ...]
     moment_sd: tuple[np.ndarray, ...]
+    instruments: InstrumentInformation
     converged: bool
     iterations: int
     cost: tuple[float, float]
@@ -91,8 +94,7 @@ def estimate_simultaneous(
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
     found = _searched(problem)
     covariance, moment_sd = _deviations(problem, found.under)
-    cost = (found.begin, found.under.cost)
-    return _result(problem, found.under.point, covariance, moment_sd, found.converged, found.iterations, cost)
+    return _result(problem, found, covariance, moment_sd)
 
 
 class _Found(NamedTuple):
@@ -101,6 +103,7 @@ class _Found(NamedTuple):
     """
 
     under: Linearised
+    instruments: GaussianPrior
     converged: bool
     iterations: int
     begin: float
@@ -113,7 +116,8 @@ def _searched(problem: MapProblem) -> _Found:
     while iterations < _MAX_ITERATIONS and not state.converged and state.damping < _STUCK:
         iterations += 1
         state = _iterated(problem, state, iterations > 1)
-    return _Found(state.here.under(state.instruments, problem.layout.instruments), state.converged, iterations, begin)
+    under = state.here.under(state.instruments, problem.layout.instruments)
+    return _Found(under, state.instruments, state.converged, iterations, begin)
 
 
 class _State(NamedTuple):
@@ -220,15 +224,10 @@ def _step(
 
 
 def _result(
-    problem: MapProblem,
-    point: Point,
-    covariance: np.ndarray,
-    moment_sd: tuple[np.ndarray, ...],
-    converged: bool,
-    iterations: int,
-    cost: tuple[float, float],
+    problem: MapProblem, ended: _Found, covariance: np.ndarray, moment_sd: tuple[np.ndarray, ...]
 ) -> SimultaneousResult:
-    layout, values = problem.layout, point.static
+    point, layout = ended.under.point, problem.layout
+    values = point.static
     bsp = problem.bsp(values)
     chain = block_diagonal(table_jacobian(values[layout.theta]))
     sd = np.sqrt(np.diag(covariance))
@@ -252,7 +251,19 @@ def _result(
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
         tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
         moment_sd,
-        converged,
-        iterations,
-        cost,
+        _shown(
+            problem, ended.instruments, values[layout.instruments], covariance[layout.instruments, layout.instruments]
+        ),
+        ended.converged,
+        ended.iterations,
+        (ended.begin, ended.under.cost),
     )
+
+
+def _shown(
+    problem: MapProblem, prior: GaussianPrior, mean: np.ndarray, covariance: np.ndarray
+) -> InstrumentInformation:
+    """What the trials say of the instruments, without what was known before."""
+    session = problem.session
+    before = ((prior.precision, prior.pull), (session.information, session.right))
+    return InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)

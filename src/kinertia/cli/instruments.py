@@ -1,0 +1,79 @@
+"""`kinertia instruments`: what the trials of a session say of its plates and clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.options import Quiet
+from kinertia.cli.terminal import out, plain_table, show_warning, shown_progress
+from kinertia.errors import FileError, SessionError
+from kinertia.estimation.from_files import check_plates, fit_subject
+from kinertia.estimation.session import SessionInstruments, person_instruments, session_instruments
+from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
+from kinertia.io.provenance import VERSION, recordings
+from kinertia.io.session_file import session_text
+from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
+
+
+def instruments(
+    subjects: Annotated[
+        list[Path], typer.Argument(help="Subject files (.toml) of the people that were measured in the session.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("instruments.toml"),
+    quiet: Quiet = False,
+) -> None:
+    """Read force plates and clock of a session from all its trials, for use in all its fits.
+
+    Writes a file for session = "..." under [instruments] in the subject files
+    of the session: what one person's walks leave open of a plate's place, those
+    of the others tell. A fit leaves out what its own trials have said.
+
+    [bold]Example[/]
+
+    kinertia instruments anna/subject.toml ben/subject.toml -o instruments.toml
+    """
+    wanted = [_wanted(path) for path in subjects]
+    for path, each in zip(subjects, wanted, strict=True):
+        if each.instruments != wanted[0].instruments:
+            raise SessionError(f"{path}: [instruments] differs from that of {subjects[0]}; it is the session's")
+    _check_output(output)
+    people = []
+    for each in wanted:
+        with shown_progress() as progress:
+            fit = fit_subject(each, progress)
+        people.append(person_instruments(fit, recordings(each)))
+    found = session_instruments(people, wanted[0].instruments)
+    output.write_text(session_text(VERSION, found.found, found.people), encoding="utf-8")
+    _report(found)
+    out.print(f"written to {output}; name it in the subject files: session = ... under [instruments]", soft_wrap=True)
+
+
+def _wanted(path: Path) -> SubjectFile:
+    """What to estimate: without what an earlier run has found of the session."""
+    if path.suffix.lower() != ".toml":
+        raise FileError(path, "expected a subject file (.toml); kinertia init FOLDER drafts one of a person's files")
+    wanted = read_subject(path)
+    check_plates(wanted)
+    own = InstrumentsFiles.model_validate({**wanted.instruments.model_dump(), "session": None})
+    return wanted.model_copy(update={"instruments": own})
+
+
+def _check_output(output: Path) -> None:
+    if output.is_dir():
+        raise FileError(output, "a folder; give the name of a file")
+    if not output.absolute().parent.is_dir():
+        raise FileError(output, f"no such folder: {output.absolute().parent}")
+
+
+def _report(found: SessionInstruments) -> None:
+    table = plain_table("instrument", "unknown", "found", "sd", "unit")
+    for instrument, told in found.found.items():
+        for unknown, (value, sd, unit) in told.items():
+            factor, shown = SHOWN_UNIT[unit]
+            table.add_row(instrument, unknown, f"{value * factor:+.1f}", f"{sd * factor:.1f}", shown)
+    out.print(table)
+    for sentence in found.contradictions:
+        show_warning(sentence)

@@ -1,0 +1,154 @@
+"""How far force plates and clock may be off: by the literature, as the laboratory states it, and as other people of the
+same session have shown it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.settings import Instruments
+
+FAULTY_SHARE = 0.05
+PLATE_PRIOR = MappingProxyType(
+    {
+        "x": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
+        "z": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
+        "gain": SoundOrFaulty(0.002, 0.03, FAULTY_SHARE),
+        "free moment": SoundOrFaulty(0.0003, 0.003, FAULTY_SHARE),
+    }
+)
+"""Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
+and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
+scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
+the vertical force at 0.3 m, and ten times that (no source)."""
+FLOOR_PRIOR = MappingProxyType(
+    {"x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE), "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE)}
+)
+"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes."""
+CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
+"""Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentInformation:
+    """What the trials of one person say of the k = 4 p + 3 unknowns of p plates, the floor and the clock.
+
+    They stand in this order, each plate's and the floor's as PLATE_UNKNOWNS and FLOOR_UNKNOWNS. No prior is in it.
+
+    Attributes:
+        plates: names.
+        information: (k, k) of normal equations in m, 1, N m/N and s.
+        right: (k,) their right-hand side: information times the values that these trials show.
+
+    >>> shown = InstrumentInformation(("left",), np.diag([1e6, 1e6, 1e4, 1e6, 1e6, 1e6, 1e8]), np.zeros(7))
+    >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
+    (11, 11)
+    """
+
+    plates: tuple[str, ...]
+    information: np.ndarray
+    right: np.ndarray
+
+    @classmethod
+    def of_posterior(
+        cls, plates: Sequence[str], mean: np.ndarray, covariance: np.ndarray, before: Sequence[tuple[np.ndarray, ...]]
+    ) -> InstrumentInformation:
+        """What a posterior, mean (k,) and covariance (k, k), adds to what was known before: information and right-hand
+        side of each that knew something.
+        """
+        after = np.linalg.inv(covariance)
+        information = after - sum(each for each, _ in before)
+        right = after @ mean - sum(each for _, each in before)
+        # rounding, and what one Gaussian cannot say of two components, may leave directions below zero
+        scale = np.sqrt(np.diag(after))
+        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+        told = vectors[:, values > 0.0] * scale[:, None]
+        information = told * values[values > 0.0] @ told.T
+        kept = vectors[:, values > 0.0]
+        return cls(tuple(plates), information, scale * (kept @ (kept.T @ (right / scale))))
+
+    def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
+        """The same about these plates. Of one that is not among them no more is known than its prior."""
+        every = tuple(dict.fromkeys([*plates, *self.plates]))
+        each = len(PLATE_UNKNOWNS)
+        here = np.concatenate([each * every.index(name) + np.arange(each) for name in self.plates]).astype(int)
+        size = each * len(every)
+        here = np.concatenate([here, size + np.arange(len(FLOOR_UNKNOWNS) + 1)])
+        information, right = np.zeros((size + len(FLOOR_UNKNOWNS) + 1,) * 2), np.zeros(size + len(FLOOR_UNKNOWNS) + 1)
+        information[np.ix_(here, here)], right[here] = self.information, self.right
+        other = np.arange(each * len(plates), size)
+        kept = np.setdiff1d(np.arange(len(right)), other)
+        deviations = np.tile([prior.plate[name].sd for name in PLATE_UNKNOWNS], len(every) - len(plates))
+        own = information[np.ix_(other, other)] + np.diag(1.0 / np.square(deviations))
+        through = np.linalg.solve(own, np.column_stack([information[np.ix_(other, kept)], right[other]]))
+        across = information[np.ix_(kept, other)]
+        return InstrumentInformation(
+            tuple(plates),
+            information[np.ix_(kept, kept)] - across @ through[:, :-1],
+            right[kept] - across @ through[:, -1],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentPrior:
+    """What is known of plates and clock before a person's trials are looked at.
+
+    Attributes:
+        plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
+        floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
+        clock_s: prior of the time between forces and markers.
+        session: what other people have shown, measured with the same instruments.
+
+    >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
+    >>> stated.plate["x"].sd, stated.clock_s == InstrumentPrior().clock_s
+    (0.001, True)
+    """
+
+    plate: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: PLATE_PRIOR)
+    floor: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: FLOOR_PRIOR)
+    clock_s: SoundOrFaulty = CLOCK_PRIOR_S
+    session: tuple[InstrumentInformation, ...] = ()
+
+    @classmethod
+    def stated(cls, instruments: Instruments, session: Sequence[InstrumentInformation] = ()) -> InstrumentPrior:
+        """As the laboratory states it: what it has checked is normal with that deviation.
+
+        The rest is the literature's. A check of the centre of pressure against the cameras sees plates and floor
+        together.
+        """
+        result = cls(session=tuple(session))
+        if instruments.plate_sd_mm is not None:
+            place, none = (SoundOrFaulty.certain(mm / 1e3) for mm in (instruments.plate_sd_mm, _NO_FLOOR_MM))
+            result = replace(
+                result,
+                plate={**result.plate, **dict.fromkeys(FLOOR_UNKNOWNS, place)},
+                floor=dict.fromkeys(FLOOR_UNKNOWNS, none),
+            )
+        if instruments.clock_sd_ms is not None:
+            result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
+        return result
+
+    def of_unknowns(self, n_plates: int) -> list[SoundOrFaulty]:
+        """Priors of all plates' unknowns, the floor's and the clock's."""
+        plates = [self.plate[name] for _ in range(n_plates) for name in PLATE_UNKNOWNS]
+        return [*plates, *(self.floor[name] for name in FLOOR_UNKNOWNS), self.clock_s]
+
+    def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
+        """What the others have shown of these plates, all together."""
+        size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
+        information, right = np.zeros((size, size)), np.zeros(size)
+        for each in self.session:
+            shown = each.among(plates, self)
+            information += shown.information
+            right += shown.right
+        return InstrumentInformation(tuple(plates), information, right)
+
+
+_NO_FLOOR_MM = 0.1
+"""Deviation of the floor's place where that of the plates has been checked against the cameras."""

@@ -1,0 +1,110 @@
+"""What `kinertia instruments` found about the plates and the clock of a session: one TOML text, for use in its fits.
+
+At its top stands, for people, what was found of all trials together. Below it is what each person's trials say, as
+information (inverse covariance) and right-hand side, so that a fit can add what the others say without its own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError, model_validator
+
+from kinertia.errors import FileError
+from kinertia.io.toml_lines import read_toml
+from kinertia.settings import Table
+
+_UNITS = {"m": ("mm", 1e3), "1": ("percent", 1e2), "N m/N": ("Nm_per_kN", 1e3), "s": ("ms", 1e3)}
+"""Name and factor of the unit in which people read a value."""
+
+
+class PersonInstruments(Table):
+    """What the trials of one person say of plates and clock.
+
+    Attributes:
+        name: of the person.
+        files: SHA-256 of every file that this is from.
+        plates: names.
+        information: (k, k) on the unknowns of each plate, of the floor and of the clock, SI.
+        right: (k,) its right-hand side.
+
+    Examples:
+        >>> from kinertia.io.session_file import PersonInstruments
+        >>> zeros = (0.0,) * 7
+        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 7, right=zeros).name
+        'A'
+    """
+
+    name: str
+    files: tuple[str, ...] = Field(strict=False)
+    plates: tuple[str, ...] = Field(strict=False)
+    information: tuple[Annotated[tuple[float, ...], Field(strict=False)], ...] = Field(strict=False)
+    right: tuple[float, ...] = Field(strict=False)
+
+    @model_validator(mode="after")
+    def _square(self) -> PersonInstruments:
+        size = 4 * len(self.plates) + 3
+        if {len(self.information), len(self.right), *map(len, self.information)} != {size}:
+            raise ValueError(f"information and right must have {size} rows and columns for {len(self.plates)} plates")
+        return self
+
+
+class SessionFile(Table):
+    """A whole file. What stands in it for people is not read again."""
+
+    kinertia: str
+    found: dict[str, dict[str, float]]
+    people: tuple[PersonInstruments, ...] = Field(alias="person", strict=False, min_length=1)
+
+
+def read_session(path: Path) -> tuple[PersonInstruments, ...]:
+    """What each person's trials say.
+
+    Raises:
+        FileError: no such file, or not one that `kinertia instruments` wrote; with the line.
+    """
+    document = read_toml(path, "what kinertia instruments wrote (instruments.toml)")
+    try:
+        return SessionFile.model_validate(document.content).people
+    except ValidationError as error:
+        first = error.errors()[0]
+        told = f"not what kinertia instruments wrote: {'.'.join(map(str, first['loc']))}: {first['msg']}; write it anew"
+        raise FileError(path, told, document.line(first["loc"]) or document.last_line) from None
+
+
+def session_text(
+    version: str, found: Mapping[str, Mapping[str, tuple[float, float, str]]], people: Sequence[PersonInstruments]
+) -> str:
+    """The text of the file.
+
+    Args:
+        version: of Kinertia.
+        found: per instrument, per unknown its value, deviation and unit (m, 1, N m/N or s).
+        people: what each says.
+    """
+    lines = [
+        "# Plates and clock of a session, found by kinertia instruments. For use in its fits, in the subject files:",
+        "#     [instruments]",
+        '#     session = "instruments.toml"',
+        "# A fit leaves out what its own trials have said here.",
+        f"kinertia = {json.dumps(version)}",
+    ]
+    for instrument, told in found.items():
+        lines += ["", f"[found.{json.dumps(instrument, ensure_ascii=False)}]"]
+        for unknown, (value, sd, unit) in told.items():
+            name, factor = _UNITS[unit]
+            key = unknown.replace(" ", "_")
+            lines += [f"{key}_{name} = {value * factor:.3f}", f"{key}_sd_{name} = {sd * factor:.3f}"]
+    for person in people:
+        lines += ["", "[[person]]", f"name = {json.dumps(person.name, ensure_ascii=False)}"]
+        lines += [f"files = {json.dumps(person.files)}", f"plates = {json.dumps(person.plates, ensure_ascii=False)}"]
+        rows = ",\n".join(f"    {_numbers(row)}" for row in person.information)
+        lines += [f"information = [\n{rows},\n]", f"right = {_numbers(person.right)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return f"[{', '.join(repr(float(value)) for value in values)}]"

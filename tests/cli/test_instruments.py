@@ -1,0 +1,122 @@
+"""`kinertia instruments`: what people of a session say of plates and clock, and fits that know it."""
+
+import re
+
+import numpy as np
+import pytest
+
+from command_line import run
+from kinertia.errors import SessionError
+from kinertia.estimation.from_files import check_plates, prepare_subject
+from kinertia.estimation.session import session_instruments
+from kinertia.io.session_file import PersonInstruments, read_session
+from kinertia.io.subject_file import read_subject
+from kinertia.settings import Instruments
+
+
+@pytest.fixture(scope="module")
+def session(measured_walk, tmp_path_factory):
+    """The file of the measured walk alone, and the outcome of the command."""
+    path = tmp_path_factory.mktemp("session") / "instruments.toml"
+    return path, run("instruments", measured_walk / "subject.toml", "-o", path)
+
+
+def subject_with(folder, measured_walk, entries):
+    """The measured walk's subject file with these lines under [instruments]."""
+    text = (measured_walk / "subject.toml").read_text(encoding="utf-8")
+    for name in ("static.c3d", "walk.c3d"):
+        text = text.replace(f'"{name}"', f'"{(measured_walk / name).as_posix()}"')
+    path = folder / "subject.toml"
+    path.write_text(f"{text}\n[instruments]\n{entries}\n", encoding="utf-8")
+    return path
+
+
+def test_the_command_writes_what_it_shows(session):
+    path, outcome = session
+    assert outcome.status == 0, outcome.err
+    (person,) = read_session(path)
+    assert person.plates == ("plate 1", "plate 2")
+    shown = re.search(r"plate 2\s+gain\s+([+-][\d.]+)\s+([\d.]+)\s+%", outcome.out)
+    written = re.search(r'\[found\."plate 2"\].*?gain_percent = ([-\d.]+)', path.read_text(encoding="utf-8"), re.DOTALL)
+    assert float(shown[1]) == pytest.approx(float(written[1]), abs=0.06)
+    assert np.linalg.eigvalsh(np.array(person.information))[0] > -1e-6
+
+
+def test_a_fit_leaves_out_what_it_has_said_itself(session, measured_walk, tmp_path):
+    path, _ = session
+    own = prepare_subject(subject_with(tmp_path, measured_walk, f'session = "{path.as_posix()}"'))
+    assert own.uncertainty.instruments.session == ()
+    assert any("nothing of others; what 1 person" in note for note in own.notes)
+    (person,) = read_session(path)
+    text = path.read_text(encoding="utf-8")
+    for known in person.files:
+        text = text.replace(known, f"of somebody else: {known}")
+    (tmp_path / "others.toml").write_text(text, encoding="utf-8")
+    helped = prepare_subject(subject_with(tmp_path, measured_walk, 'session = "others.toml"'))
+    (told,) = helped.uncertainty.instruments.session
+    np.testing.assert_array_equal(told.information, person.information)
+    (tmp_path / "elsewhere.toml").write_text(text.replace('"plate 1", "plate 2"', '"left", "right"'), encoding="utf-8")
+    with pytest.raises(SessionError, match="none of the session's plates"):
+        prepare_subject(subject_with(tmp_path, measured_walk, 'session = "elsewhere.toml"'))
+
+
+def test_what_the_laboratory_states_is_used_and_checked(measured_walk, tmp_path):
+    ready = prepare_subject(subject_with(tmp_path, measured_walk, "plate_sd_mm = 2\nclock_sd_ms = 0.5"))
+    known = ready.uncertainty.instruments
+    assert (known.plate["x"].sd, known.clock_s.sd) == (0.002, 0.0005)
+    outcome = run("fit", subject_with(tmp_path, measured_walk, "plate_sd_mm = -2"), "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "plate_sd_mm = -2" in outcome.err
+
+
+def test_people_who_contradict_each_other_are_named():
+    def person(name, late_s):
+        information = np.diag([1e4] * 6 + [1e8])
+        right = tuple((information @ [*[0.0] * 6, late_s]).tolist())
+        rows = tuple(map(tuple, information.tolist()))
+        return PersonInstruments(name=name, files=(name,), plates=("plate 1",), information=rows, right=right)
+
+    alike = session_instruments([person("A", 0.010), person("B", 0.0101)], Instruments())
+    assert alike.contradictions == ()
+    assert alike.found["clock"]["late"][0] == pytest.approx(0.010, abs=1e-4)
+    assert alike.found["clock"]["late"][1] == pytest.approx(1e-4 / np.sqrt(2.0), rel=0.01)
+    (told,) = session_instruments([person("A", 0.010), person("B", 0.002)], Instruments()).contradictions
+    assert told.startswith("clock: late: +10.0 ms by the trials of A, +2.0 by those of the others")
+
+
+def test_columns_of_force_files_are_plates_only_where_somebody_says_so(shared_data, tmp_path):
+    walk = shared_data / "gait2354" / "subject01_walk1"
+    text = f"""
+[subject]
+mass_kg = 72.6
+height_m = 1.803
+sex = "male"
+[model]
+static = "{(walk.parent / "subject01_static.trc").as_posix()}"
+[[trial]]
+markers = "{walk.as_posix()}.trc"
+forces = "{walk.as_posix()}_grf.mot"
+loads = "{walk.as_posix()}_grf.xml"
+"""
+    path = tmp_path / "subject.toml"
+    path.write_text(text, encoding="utf-8")
+    outcome = run("instruments", path, "-o", tmp_path / "instruments.toml")
+    assert outcome.status == 2
+    assert "same_plates = true under [instruments]" in outcome.err
+    path.write_text(f"{text}[instruments]\nsame_plates = true\n", encoding="utf-8")
+    check_plates(read_subject(path))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["walk.c3d"], "expected a subject file"),
+        (["subject.toml", "-o", "."], "a folder; give the name of a file"),
+        (["subject.toml", "-o", "nowhere/x.toml"], "no such folder"),
+    ],
+)
+def test_what_cannot_be_is_refused_first(arguments, told, measured_walk, monkeypatch):
+    monkeypatch.chdir(measured_walk)
+    outcome = run("instruments", *arguments)
+    assert outcome.status == 2
+    assert told in outcome.err

@@ -1,0 +1,87 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.small_problem import INSTRUMENTS, small_problem
+
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.settings import Instruments
+
+PRIOR = InstrumentPrior()
+
+
+def shown(plates, seed=0):
+    rng = np.random.default_rng(seed)
+    size = 4 * len(plates) + 3
+    root = rng.normal(size=(size, size)) * 1e3
+    return InstrumentInformation(plates, root @ root.T, rng.normal(size=size) * 1e3)
+
+
+def test_what_a_posterior_adds_is_what_was_put_in():
+    told, rng = shown(("a", "b")), np.random.default_rng(1)
+    before = [(np.diag(rng.uniform(1e4, 1e6, 11)), rng.normal(size=11)) for _ in range(2)]
+    covariance = np.linalg.inv(told.information + sum(each for each, _ in before))
+    mean = covariance @ (told.right + sum(each for _, each in before))
+    found = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
+    np.testing.assert_allclose(found.information, told.information, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(found.right, told.right, rtol=1e-6, atol=1e-3)
+
+
+def test_a_posterior_that_knows_less_than_before_adds_nothing_negative():
+    before = [(np.diag([1e6] * 7), np.zeros(7))]
+    covariance = np.linalg.inv(np.diag([4e6, 0.9e6, *[2e6] * 5]))
+    found = InstrumentInformation.of_posterior(("a",), np.full(7, 1e-3), covariance, before)
+    np.testing.assert_allclose(np.linalg.eigvalsh(found.information), [0.0, *[1e6] * 5, 3e6], atol=1.0)
+
+
+@pytest.mark.parametrize("plates", [("a", "b"), ("b", "a"), ("b",), ("c", "b"), ("c",)])
+def test_plates_that_are_not_there_are_marginalised(plates):
+    """Against the dense posterior of all plates."""
+    told = shown(("a", "b"))
+    every = tuple(dict.fromkeys([*plates, "a", "b"]))
+    wide = told.among(every, PRIOR)
+    sd = np.array([*[PRIOR.plate[name].sd for _ in every for name in ("x", "z", "gain", "free moment")], *[1e-3] * 3])
+    precision = np.diag(1.0 / np.square(sd))
+    covariance = np.linalg.inv(wide.information + precision)
+    kept = [*range(4 * len(plates)), *range(len(sd) - 3, len(sd))]
+    found = told.among(plates, PRIOR)
+    own = np.linalg.inv(found.information + precision[np.ix_(kept, kept)])
+    np.testing.assert_allclose(own, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)
+    mean = covariance @ wide.right
+    np.testing.assert_allclose(own @ found.right, mean[kept], rtol=1e-6, atol=1e-12)
+
+
+def test_what_the_laboratory_states_replaces_the_literature():
+    stated = InstrumentPrior.stated(Instruments(plate_sd_mm=2.0, clock_sd_ms=1.0))
+    assert (stated.plate["x"].sd, stated.plate["z"].faulty_share, stated.clock_s.sd) == (0.002, 0.0, 0.001)
+    assert stated.plate["gain"] == PRIOR.plate["gain"]
+    assert np.hypot(stated.plate["x"].sd, stated.floor["x"].sd) == pytest.approx(0.002, rel=0.01)
+    assert (
+        InstrumentPrior.stated(Instruments()) == replace(PRIOR) or InstrumentPrior.stated(Instruments()).session == ()
+    )
+
+
+def test_the_session_counts_in_the_normal_equations():
+    """Cost, right-hand side and information go together: by finite differences."""
+    problem = small_problem()
+    told = shown(problem.plates)
+    calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(told, told)))
+    with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials, 0.1)
+    places, static = problem.layout.instruments, problem.start_static.copy()
+    static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
+    (before, right_before, cost_before), (information, right, cost) = (
+        each.prior_terms(static) for each in (problem, with_session)
+    )
+    np.testing.assert_allclose((information - before)[places, places], 2.0 * told.information)
+
+    def extra(values):
+        moved = static.copy()
+        moved[places] = values
+        return with_session.prior_terms(moved)[2] - problem.prior_terms(moved)[2]
+
+    assert cost - cost_before == pytest.approx(extra(static[places]))
+    for i in range(places.stop - places.start):
+        h = np.zeros(places.stop - places.start)
+        h[i] = 1e-4
+        slope = (extra(static[places] + h) - extra(static[places] - h)) / 2e-4
+        assert slope == pytest.approx(-(right - right_before)[places][i], rel=1e-6, abs=1e-3)

@@ -1,0 +1,45 @@
+import pytest
+
+from kinertia.errors import FileError
+from kinertia.io.session_file import PersonInstruments, read_session, session_text
+
+ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 1.0 / 3.0)
+PERSON = PersonInstruments(
+    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 7, right=ROW
+)
+FOUND = {
+    "plate 1": {"x": (0.0182, 0.0011, "m"), "free moment": (0.001, 0.0002, "N m/N")},
+    "clock": {"late": (0.01, 0.001, "s")},
+}
+
+
+@pytest.fixture
+def written(tmp_path):
+    path = tmp_path / "instruments.toml"
+    path.write_text(session_text("0.1", FOUND, [PERSON, PERSON]), encoding="utf-8")
+    return path
+
+
+def test_what_is_written_is_read(written):
+    assert read_session(written) == (PERSON, PERSON)
+
+
+def test_people_read_millimetres_and_milliseconds(written):
+    text = written.read_text(encoding="utf-8")
+    for line in ("x_mm = 18.200", "x_sd_mm = 1.100", "free_moment_Nm_per_kN = 1.000", "late_ms = 10.000"):
+        assert f"\n{line}\n" in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 11 rows"),
+        ("right = [0.1", 'right = ["0.1"', "not what kinertia instruments wrote"),
+        ("[[person]]", "[[people]]", "not what kinertia instruments wrote"),
+        ("kinertia = ", "x = ", "not what kinertia instruments wrote"),
+    ],
+)
+def test_another_file_is_refused(written, old, new, told):
+    written.write_text(written.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    with pytest.raises(FileError, match=told):
+        read_session(written)
