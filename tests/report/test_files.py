@@ -33,7 +33,7 @@ def saved(short_fit, tmp_path_factory):
 
 def test_files(saved):
     _, folder = saved
-    assert {path.name for path in folder.iterdir()} == RESULTS
+    assert {path.name for path in folder.glob("[!.]*")} == RESULTS
     assert [path.name for path in folder.parent.iterdir()] == ["out"]
 
 
@@ -170,9 +170,9 @@ def test_marker_rms_is_over_visible_markers(short_fit):
 
 def test_several_trials_have_a_folder_each(short_fit, tmp_path):
     folder = save_fit(short_fit, tmp_path / "out")
-    assert {path.name for path in folder.iterdir()} == {*FOR_ALL, "early", "late"}
+    assert {path.name for path in folder.glob("[!.]*")} == {*FOR_ALL, "early", "late"}
     for name in ("early", "late"):
-        assert {path.name for path in (folder / name).iterdir()} == RESULTS - FOR_ALL
+        assert {path.name for path in (folder / name).glob("[!.]*")} == RESULTS - FOR_ALL
     assert [trial["name"] for trial in json.loads((folder / "fit.json").read_text())["trials"]] == ["early", "late"]
 
 

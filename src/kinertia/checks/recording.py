@@ -15,14 +15,25 @@ from kinertia.estimation.input_checks import CONTRADICTING_MASS
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
 from kinertia.model.anatomy import segment_of
+from kinertia.model.body_sides import sides_trouble
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet, check_marker_set, nearest_labels
+from kinertia.model.same_body import body_trouble
+from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.free_moment import mean_turning
 from kinertia.trial.ground_contact import FootMarkers
-from kinertia.trial.marker_quality import Travel, Visibility, axes_trouble, extent_m, travel, visibility
+from kinertia.trial.marker_quality import (
+    Travel,
+    Visibility,
+    axes_trouble,
+    extent_m,
+    spikes_trouble,
+    travel,
+    visibility,
+)
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.telling_movements import TellingMovements
 
@@ -130,6 +141,7 @@ def check_recording(
     marker_set: MarkerSet | None = None,
     mass_kg: float | None = None,
     window_s: tuple[float, float] | None = None,
+    static: Recording | None = None,
 ) -> RecordingCheck:
     """Look at one recording as a fit would, up to the first model.
 
@@ -138,6 +150,7 @@ def check_recording(
         marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
         mass_kg: by the scale; the file's own if None.
         window_s: the stretch that the user vouches for.
+        static: the static trial that goes with it, if there is one.
     """
     match, used = _match(recording.markers.labels, marker_set)
     own = recording.markers
@@ -150,8 +163,11 @@ def check_recording(
         feet, trouble = _feet(recording.markers.labels, used)
         found += trouble
         if used.landmarks:
+            found += _labelled(recording.markers, used, static)
             found += _facing(recording.markers, used, moves)
             found += _static(recording, used) if standing else []
+    found += _failed(spikes_trouble(own))
+    found += [] if recording.plates is None else _failed(loads_trouble(recording.plates))
     plates = check_plates(recording, feet)
     trial, notes, told = _trial(recording, feet, window_s, standing)
     windows = () if trial is None else tuple(trial.windows())
@@ -159,7 +175,9 @@ def check_recording(
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
     found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
-    found += [] if trial is None or used is None else _turning(trial, used)
+    if trial is not None and used is not None:
+        found += _turning(trial, used)
+        found += _moving(trial, used)
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
         recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)
@@ -283,6 +301,24 @@ def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | N
     if bare:
         found.append(Verdict("fail", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
     return (feet if all(feet.values()) else None), found
+
+
+def _failed(trouble: str) -> list[Verdict]:
+    return [Verdict("fail", trouble)] if trouble else []
+
+
+def _labelled(markers: Markers, marker_set: MarkerSet, static: Recording | None) -> list[Verdict]:
+    """Whether the labels make a body, and the one of the static trial."""
+    found = _failed(sides_trouble(markers, marker_set))
+    return found if static is None else found + _failed(body_trouble(static.markers, markers, marker_set))
+
+
+def _moving(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
+    """Whether the forces move the body as the markers show it."""
+    pelvis = marker_set.segments.get("pelvis", ())
+    found = _failed(direction_trouble(trial, pelvis))
+    offset = "" if found else offset_trouble(trial, pelvis)
+    return [*found, Verdict("caution", offset)] if offset else found
 
 
 def _facing(markers: Markers, marker_set: MarkerSet, moves: Travel) -> list[Verdict]:

@@ -38,7 +38,7 @@ def compare(
         raise typer.BadParameter("one folder is named twice")
     results_folder(output, force)
     fits = {name: load_fit(path) for name, path in zip(names_from_common_folder(paths), paths, strict=True)}
-    with complete_folder(output) as work:
+    with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")
         write_columns(work / "compare.csv", comparison_columns(fits))
     (first_name, first), *others = fits.items()

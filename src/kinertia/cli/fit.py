@@ -77,7 +77,8 @@ def fit(
         "--calibrate": calibrate or None,
     }
     wanted = _wanted(trial, options, method)
-    results_folder(output, force)
+    names = [one.name for one in wanted.trials]
+    results_folder(output, force, names if len(names) > 1 else ())
     result = _run(wanted)
     folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
     judged = verdicts(result)

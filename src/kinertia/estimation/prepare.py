@@ -8,7 +8,14 @@ from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
-from kinertia.estimation.input_checks import check_same_person, check_visible, complete_subject, known
+from kinertia.estimation.input_checks import (
+    check_forces,
+    check_recordings,
+    check_same_person,
+    check_visible,
+    complete_subject,
+    known,
+)
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.io.marker_set_file import choose_marker_set
@@ -143,7 +150,9 @@ def prepare(
 
     progress("calibration", 0.0)
     started = time.perf_counter()
+    check_recordings(recordings, static, marker_set)
     turned = [_turned(item, marker_set) for item in inputs]
+    warnings += check_forces([trial for trial, _ in turned], marker_set.segments.get("pelvis", ()))
     model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
     literature = literature_bsp(
         known(subject.mass_kg), known(subject.height_m), known(subject.sex), model.geometry, settings.bsp

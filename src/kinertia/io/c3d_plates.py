@@ -61,6 +61,7 @@ def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, li
         name = f"plate {number}"
         places = unit * platform["corners"].T
         trouble = _corner_trouble(places) or _unit_trouble(file, group, number - 1)
+        trouble = trouble or ("" if platform["force"].size else "it has no samples")
         if trouble:
             notes.append(f"{path.name}: {name} was left out, {trouble}")
             continue

@@ -44,7 +44,7 @@ from pydantic import (
 )
 
 from kinertia.errors import FileError, SettingsError, SubjectError
-from kinertia.io.file_names import fits_everywhere, path_from, path_trouble, same_folder
+from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, path_trouble, same_folder
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
@@ -209,6 +209,8 @@ def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
                 "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...); "
                 'give the trial a name = "..." of its own'
             )
+        if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
+            return index, f'the results have a file {taken}, not a folder; give this trial a name = "..." of its own'
         for before in names[:index]:
             if same_folder(before, name):
                 same = "" if before == name else "; Windows and macOS take both for one folder"

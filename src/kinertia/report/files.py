@@ -25,6 +25,7 @@ from kinertia.estimation.warnings import mass_from_force_kg
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
+from kinertia.io.spreadsheet import inert
 from kinertia.io.sto import TimeTable, write_table
 from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
@@ -46,7 +47,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     Raises:
         FileError: the folder cannot be written to.
     """
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         write_fit(fit, provenance, work / FIT_FILE)
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
@@ -76,7 +77,7 @@ def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray])
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([None if cell != cell else cell for cell in row] for row in zip(*cells, strict=True))
+        writer.writerows([None if cell != cell else inert(cell) for cell in row] for row in zip(*cells, strict=True))
 
 
 def _write_model(fit: Fit, folder: Path) -> None:
@@ -90,7 +91,7 @@ def _write_model(fit: Fit, folder: Path) -> None:
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
     changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
-    changes.to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
+    changes.map(inert).to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
 
 
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:

@@ -6,9 +6,9 @@ cannot be represented is an error that names it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from xml.parsers.expat import ExpatError
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from kinertia.errors import OsimError
 from kinertia.io.number_table import expect_file
 from kinertia.io.osim.joints import Frames, JointElement, coupled, read_joint, read_joint_in_body
 from kinertia.io.osim.properties import Values
-from kinertia.io.osim.xml import Element, parse
+from kinertia.io.osim.xml import Element, XmlError, parse
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import Coupling, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
@@ -70,13 +70,13 @@ def read_osim(path: str | Path) -> OsimModel:
 def _model(path: Path, content: bytes) -> tuple[Element, int]:
     try:
         document = parse(content)
-    except ExpatError as error:
-        raise OsimError(path, f"not XML ({error}); expected an OpenSim model, export it again", error.lineno) from None
+    except XmlError as error:
+        raise OsimError(path, f"not XML ({error}); expected an OpenSim model, export it again", error.line) from None
     model = document.child("Model")
     if document.tag != "OpenSimDocument" or model is None:
         raise OsimError(path, f"no Model in it (outermost element <{document.tag}>); expected an OpenSim model")
     told = document.attributes.get("Version", "")
-    version = int(told) if told.isdigit() else 0
+    version = int(told) if re.fullmatch("[0-9]{1,9}", told) else 0
     if version > NEWEST_VERSION:
         raise OsimError(
             path,
