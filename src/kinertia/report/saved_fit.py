@@ -16,6 +16,7 @@ from kinertia.io.object_archive import read_archive, write_archive
 from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.axis_functions import Composed, PiecewisePolynomial
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.coordinate_range import Range
 from kinertia.model.imported import Coupling, OsimCoordinate, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion
@@ -47,7 +48,7 @@ class SavedFit:
 _KINDS = (
     SavedFit, Provenance, Fit, TrialFit, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
-    Skeleton, Joint, Axis, Marker, PiecewisePolynomial, Composed, BodySegmentParameters,
+    Skeleton, Joint, Axis, Range, Marker, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads,
 )  # fmt: skip
