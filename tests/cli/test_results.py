@@ -24,17 +24,20 @@ def results(demo_run, tmp_path):
 
 def test_the_report_is_written_again_as_it_was(results):
     before = (results / "report.html").read_text(encoding="utf-8")
+    others = sorted(path.name for path in results.iterdir())
     (results / "report.html").unlink()
     told = run("report", results)
     assert told.status == 0, told.err
     assert (results / "report.html").read_text(encoding="utf-8") == before
+    assert sorted(path.name for path in results.iterdir()) == others  # nothing else is touched
     assert "<code>kinertia " in before  # command and files stay known
 
 
 def test_export_says_what_the_tables_say(fit, results):
-    told = run("export", results, "--csv", "--json", "--mat")
-    assert told.status == 0, told.err
-    folder = results / "export"
+    folder = results.parent / "export"
+    for _ in range(2):  # its own results are replaced
+        told = run("export", results, "--csv", "--json", "--mat", "-o", folder)
+        assert told.status == 0, told.err
     (trial,) = fit.trials
     csv = pd.read_csv(folder / "cycles.csv")
     pd.testing.assert_frame_equal(csv, fit.cycles(), check_dtype=False, rtol=1e-15, atol=0)
@@ -53,17 +56,19 @@ def test_export_says_what_the_tables_say(fit, results):
 
 
 def test_export_asks_for_a_form(results):
-    told = run("export", results)
+    told = run("export", results, "-o", results.parent / "export")
     assert told.status == 2
     assert "--csv, --json or --mat" in " ".join(told.err.split())
 
 
-@pytest.mark.parametrize("command", [["report"], ["export", "--csv"]])
-def test_a_folder_without_results_is_told(tmp_path, command):
-    told = run(command[0], tmp_path, *command[1:])
+@pytest.mark.parametrize("command", [["report"], ["export", "--csv", "-o", "tables"]])
+def test_a_folder_without_results_is_told(tmp_path, monkeypatch, command):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    told = run(command[0], tmp_path / "here", *command[1:])
     assert told.status == 2
     assert "no results of kinertia fit are there" in " ".join(told.err.split())
-    assert not list(tmp_path.iterdir())
+    assert not list((tmp_path / "here").iterdir())
 
 
 def test_fit_takes_a_folder_with_a_subject_file(tmp_path):

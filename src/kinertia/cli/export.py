@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from json import dumps
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 from kinertia.cli.options import Force, Quiet, results_folder
 from kinertia.cli.terminal import out
 from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
 from kinertia.report.saved_fit import load_fit
 from kinertia.report.tables import write_csv, write_json, write_mat
 
@@ -19,9 +21,7 @@ def export(
     csv: Annotated[bool, typer.Option("--csv", help="A file per table, for Excel, R and others.")] = False,
     json: Annotated[bool, typer.Option("--json", help="One file, tables.json, for scripts.")] = False,
     mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder for the tables; export in the results if left out.")
-    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the tables.")] = Path("export"),
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -35,15 +35,15 @@ def export(
     """
     if not (csv or json or mat):
         raise typer.BadParameter("say in which form: --csv, --json or --mat (several at once are fine)")
+    results_folder(output, force)
     fit = load_fit(results)
-    folder = results / "export" if output is None else output
-    if output is not None:
-        results_folder(output, force)
-    with complete_folder(folder, "export") as work:
+    with complete_folder(output, "export") as work:
+        told = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}
+        (work / "export.json").write_text(dumps(told, indent=2) + "\n", encoding="utf-8")
         if csv:
             write_csv(fit, work)
         if json:
             write_json(fit, work / "tables.json")
         if mat:
             write_mat(fit, work / "tables.mat")
-    out.print(f"tables in {folder}", soft_wrap=True)
+    out.print(f"tables in {output}", soft_wrap=True)

@@ -9,7 +9,7 @@ import typer
 
 from kinertia.cli.options import Quiet
 from kinertia.cli.terminal import out
-from kinertia.io.output_folder import complete_folder
+from kinertia.io.output_folder import write_then_rename
 from kinertia.report.page import render
 from kinertia.report.saved_fit import read_saved
 
@@ -26,6 +26,5 @@ def report(
     """
     saved = read_saved(results)
     page = render(saved.fit, saved.provenance, saved.versions)
-    with complete_folder(results, "report") as work:
-        (work / "report.html").write_text(page, encoding="utf-8")
+    write_then_rename(results / "report.html", page)
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)

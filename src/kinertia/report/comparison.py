@@ -21,7 +21,7 @@ from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
-from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
 from kinertia.report.wording import decimals, fixed, read_in
 from kinertia.trial.data import FEET
@@ -187,7 +187,7 @@ def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
     for joint, title in titles.items():
         for side in FEET:
             traces = [
-                {**mean_line(mean_curve(found)), "name": name, "line": {"color": colour, "width": 2}}
+                {**mean_line(mean_curve(found)), "name": plain(name), "line": {"color": colour, "width": 2}}
                 for (name, own), colour in zip(curves.items(), _COLOURS, strict=False)
                 if (found := own.get((f"{joint}_moment", side)))
             ]

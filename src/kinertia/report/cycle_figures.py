@@ -20,7 +20,7 @@ from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.figure import Figure, compact
-from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.wording import start_of
 from kinertia.trial.data import FEET, runs
 
@@ -188,7 +188,7 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """All of them as one line with gaps between them."""
     x = np.tile(np.append(PERCENT, 100), len(curves)).astype(np.uint8)
     y = np.concatenate([np.append(one.value, np.nan) for one in curves])
-    said = [f"{one.trial}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
+    said = [f"{plain(one.trial)}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
     hover = "%{x:.0f} %: %{y:.3g}<extra>" + (said[0] if len(said) == 1 else "%{fullData.name}") + "</extra>"
     return {"type": "scatter", "mode": "lines", "x": x, "y": compact(y), "hovertemplate": hover}
 
