@@ -182,7 +182,7 @@ def test_results_replace_older_ones_and_leave_other_files_alone(saved, tmp_path)
     save_fit(fit, tmp_path)
     assert json.loads((tmp_path / "fit.json").read_text())["kinertia"] == version("kinertia")
     assert (tmp_path / "mine.txt").read_text() == "kept"
-    assert {path.name for path in tmp_path.iterdir()} == RESULTS | {"mine.txt"}
+    assert {path.name for path in tmp_path.glob("[!.]*")} == RESULTS | {"mine.txt"}
 
 
 def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
