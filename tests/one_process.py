@@ -23,5 +23,6 @@ def in_one_process() -> Iterator[None]:
     with (
         mock.patch("kinertia.studies.accuracy.in_parallel", _one_by_one),
         mock.patch("kinertia.studies.table1.in_parallel", _one_by_one),
+        mock.patch("kinertia.studies.table1_variants.in_parallel", _one_by_one),
     ):
         yield

@@ -210,7 +210,7 @@ def test_not_a_number_in_forces(lab):
         ({"sex": None}, ("--sex",)),
         ({"static": None}, ("--static",)),
         ({"method": "three-level"}, ("method", "two-level")),
-        ({"markers": "cleveland"}, ("cleveland", "cleveland-clinic", "plug-in-gait", "rajagopal")),
+        ({"markers": "cleveland"}, ("cleveland", "cleveland-clinic", "plug-in-gait", "rajagopal", "rajagopal-run")),
     ],
 )
 def test_implausible_or_missing_option(lab, changes, parts):

@@ -15,11 +15,12 @@ from kinertia.settings import Settings
 
 STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {
-    "report.html", "fit.json", "model.osim",
+    "report.html", "fit.json", "fit.npz", "model.osim", "cycles.csv", "cycles_literature.csv", "spatiotemporal.csv",
     "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
     "ground_reactions.mot", "external_loads.xml",
 }  # fmt: skip
-FOR_ALL = {"report.html", "fit.json", "bsp.csv", "model.osim"}
+CYCLES = {"cycles.csv", "cycles_literature.csv", "spatiotemporal.csv"}
+FOR_ALL = {"report.html", "fit.json", "fit.npz", "bsp.csv", "model.osim", *CYCLES}
 PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
 
 

@@ -11,7 +11,7 @@ from kinertia.studies.table1 import (
     CONDITIONS,
     PUBLISHED,
     Table1,
-    _errors,
+    errors_by_class,
     run_draw,
     run_table1,
     study_trial,
@@ -137,7 +137,7 @@ def test_truth_is_symmetric_and_off_axis(trial):
 def test_errors_are_rms_and_largest_by_class():
     parameters = np.tile([2.0, 0.1, -0.3, 0.2, 1.0, -2.0, 2.0], 7)
     residual = np.array([[3.0, -4.0, 0.0, 0.0, 0.0, 6.0]])
-    errors = _errors(parameters, residual)
+    errors = errors_by_class(parameters, residual)
     assert errors.mass_rms_kg == errors.mass_max_kg == pytest.approx(2.0)
     assert errors.com_rms_m == pytest.approx(np.sqrt(0.14 / 3))
     assert errors.com_max_m == pytest.approx(0.3)

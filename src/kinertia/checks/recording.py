@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
-from kinertia.estimation.input_checks import CONTRADICTING_MASS
+from kinertia.estimation.force_mass import CONTRADICTING_MASS
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
 from kinertia.model.anatomy import segment_of
@@ -174,7 +174,7 @@ def check_recording(
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
-    found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
+    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
     if trial is not None and used is not None:
         found += _turning(trial, used)
         found += _moving(trial, used)
@@ -254,13 +254,12 @@ def _labels(match: MarkerSetMatch) -> list[Verdict]:
     ]
 
 
-def _never(seen: Sequence[Visibility], known: bool) -> list[Verdict]:
-    """Markers of the set that no frame shows; a fit refuses them."""
+def _never(seen: Sequence[Visibility]) -> list[Verdict]:
+    """Markers that no frame shows; a fit leaves them out, and says what it then lacks."""
     never = [one.label for one in seen if one.share == 0.0]
     if not never:
         return []
-    told = f"visible in no frame: {_some(never)}; label them, or remove them from the file if they were not worn"
-    return [Verdict("fail" if known else "caution", told)]
+    return [Verdict("caution", f"visible in no frame, left out: {_some(never)}; label them if they were worn")]
 
 
 def _gaps(markers: Markers) -> list[Verdict]:

@@ -31,6 +31,9 @@ kinertia demo --measured      see it work, on a measured walk
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
+kinertia report out           write the report of a fit again
+kinertia compare out1 out2    what differs between fits, and by how much
+kinertia export out --csv     all tables of a fit, for other programs
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
 kinertia instruments A.toml B.toml   plates and clock, from a whole session
@@ -64,6 +67,9 @@ _MODULES = {
     "init": "init",
     "check": "check",
     "fit": "fit",
+    "report": "report",
+    "compare": "compare",
+    "export": "export",
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",

@@ -15,12 +15,15 @@ from kinertia.errors import FileError
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.provenance import command_line, provenance_of
-from kinertia.io.subject_file import SubjectFile, read_subject, subject_from_options, with_settings
+from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.report.files import save_fit
 
 
 def fit(
-    trial: Annotated[Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")],
+    trial: Annotated[
+        Path,
+        typer.Argument(help="A subject file (.toml), a folder with one, or the markers of one trial (.c3d, .trc)."),
+    ],
     output: Output = Path("out"),
     static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
     forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
@@ -53,6 +56,8 @@ def fit(
     [bold]Examples[/]
 
     kinertia fit subject.toml -o out
+
+    kinertia fit FOLDER -o out
 
     kinertia fit walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male -o out
 
@@ -98,6 +103,8 @@ def _command(trial: Path, options: dict[str, Any], method: str | None, output: P
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
     """What to estimate, by the subject file or by options."""
+    if trial.is_dir():
+        trial = subject_file_in(trial)
     if trial.suffix.lower() == ".toml":
         given = [name for name, value in options.items() if value is not None]
         if given:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.forces_used import forces_used
-from kinertia.estimation.input_checks import check_masses, known, mass_by_force_kg
+from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.estimation.warnings import fit_warnings, turning_warnings, two_level_warnings
+from kinertia.estimation.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
@@ -107,9 +107,8 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
         *outcome.warnings,
-        *fit_warnings(
-            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.uncertainty.source
-        ),
+        *force_warnings(known(ready.subject.mass_kg), ready.literature, outcome.trials, ready.skeleton),
+        *fit_warnings(known(ready.subject.mass_kg), ready.literature, outcome.bsp, ready.uncertainty.source),
     )
     return Fit(
         subject=ready.subject,
@@ -176,11 +175,6 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
 
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
-    by_force = {}
-    for k in ready.kinematics:
-        left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
-        by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
-    check_masses(known(ready.subject.mass_kg), by_force)
     bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
     fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.uncertainty)
     result = fitted.result

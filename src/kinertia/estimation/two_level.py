@@ -156,17 +156,27 @@ def estimate_two_level(
         progress: called with the share of the evaluations' limit that is used up.
     """
     vector = ParameterVector(start, symmetric)
-    length = _radius_of_gyration(skeleton, start, windows)
+    length = radius_of_gyration(skeleton, start, windows)
     problem = TwoLevelProblem(skeleton, vector, windows, correct, length)
     theta = vector.values(start)
     begin = 0.5 * float(np.square(problem.residuals(theta)).sum())
-    positive = vector.lower_bounds == 0.0
-    bounds = (np.where(positive, _SMALLEST_POSITIVE, -_FARTHEST_COM_M), np.where(positive, np.inf, _FARTHEST_COM_M))
-    fit = _minimise(problem, theta, bounds, _EXACT * begin, progress)
+    fit = _minimise(problem, theta, vector_bounds(vector), _EXACT * begin, progress)
     bsp = vector.bsp(fit.x)
     motions = tuple(problem.motion(bsp, window) for window in windows)
     loads = tuple(residual(skeleton, bsp, m, w.wrench) for m, w in zip(motions, windows, strict=True))
     return TwoLevelResult(bsp, motions, loads, (begin, float(fit.cost)), int(fit.nfev), fit.status > 0)
+
+
+def vector_bounds(vector: ParameterVector) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest theta: masses and moments positive, CoM coordinates within 1 m."""
+    positive = vector.lower_bounds == 0.0
+    return np.where(positive, _SMALLEST_POSITIVE, -_FARTHEST_COM_M), np.where(positive, np.inf, _FARTHEST_COM_M)
+
+
+def trust_scale(theta: np.ndarray) -> np.ndarray:
+    """What counts as one unit of each parameter in the trust region."""
+    scale: np.ndarray = np.maximum(np.abs(theta), _SMALLEST_SCALE)
+    return scale
 
 
 def _minimise(
@@ -182,7 +192,7 @@ def _minimise(
     if it does not, the trust region method keeps to them from the start on; it may end on a bound short of the minimum.
     Where it creeps along a valley until its limit, Levenberg-Marquardt goes on from there.
     """
-    scale = np.maximum(np.abs(theta), _SMALLEST_SCALE)
+    scale = trust_scale(theta)
     free = _minimise_freely(problem, theta, scale, bounds, exact)
     if free is not None:
         return free
@@ -236,7 +246,8 @@ def _minimise_freely(
     return None
 
 
-def _radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:
+def radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:
+    """Of the body about the pelvis in the first frame, m; moments divided by it add up with forces."""
     first = windows[0]
     one = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
     mass = root_derivatives(skeleton, bsp, one, first.wrench[:1]).qdd[0]

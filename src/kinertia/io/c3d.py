@@ -26,6 +26,8 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
+_PERSON_M = (0.3, 2.8)
+"""How far a person's markers reach in one frame."""
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
 
 
@@ -48,8 +50,10 @@ def read_c3d(path: str | Path) -> Recording:
     path = Path(path)
     file, notes = _open(path)
     parameters = file["parameters"]
-    unit_name, unit = _length_unit(path, parameters)
     labels, positions, label_notes = _markers(path, file)
+    unit_name, unit_notes = _length_unit(path, parameters, positions)
+    unit = METRES_PER_UNIT[unit_name]
+    notes += unit_notes
     time = _times(file, "points")
     plates, plate_notes = lab_plates(path, file, unit)
     rotation, up, axis_notes = _to_ground(path, parameters, unit * positions, plates)
@@ -91,12 +95,27 @@ def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
     return default
 
 
-def _length_unit(path: Path, parameters: Any) -> tuple[str, float]:
-    """Its name and how many metres it is."""
+def _length_unit(path: Path, parameters: Any, positions: FloatArray) -> tuple[str, list[str]]:
+    """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
     unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
-    if unit not in METRES_PER_UNIT:
+    if unit in METRES_PER_UNIT:
+        return unit, []
+    if unit:
         raise FileError(path, f"POINT:UNITS is '{unit}'; expected mm, cm or m, correct the parameter")
-    return unit, METRES_PER_UNIT[unit]
+    whole = positions[np.isfinite(positions).all(axis=(1, 2))]
+    size = float(np.median(np.ptp(whole, axis=1).max(axis=1))) if len(whole) else np.nan
+    low, high = _PERSON_M
+    likely = [name for name, metres in METRES_PER_UNIT.items() if low < size * metres < high]
+    if len(likely) != 1:
+        raise FileError(
+            path,
+            f"POINT:UNITS is empty, and its markers, which reach {size:.3g} units, are a person's in none of mm, cm "
+            f"and m; write the unit into the parameter",
+        )
+    return likely[0], [
+        f"{path.name}: POINT:UNITS is empty; taken as {likely[0]}, in which the markers reach "
+        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, write the unit into the parameter"
+    ]
 
 
 def _times(file: Any, kind: str) -> FloatArray:

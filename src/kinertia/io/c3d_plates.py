@@ -139,7 +139,7 @@ def _unit_trouble(file: Any, group: Any, plate: int) -> str:
     told = units[channel] if channel < len(units) else ""
     said = "".join(letter for letter in str(told).lower() if letter.isalpha())
     length = str(file["parameters"]["POINT"]["UNITS"]["value"][0]).strip().lower()
-    if said in ("nm", "nmm", "ncm") and said != "n" + length:
+    if length and said in ("nm", "nmm", "ncm") and said != "n" + length:
         return f"its moments are in {told} while points are in {length}"
     return ""
 

@@ -79,7 +79,7 @@ def read_forces_with_notes(
         tuple(group.foot for group in groups),
         noise_n=tuple(plate.noise_n for plate in wrenches),
     )
-    return loads, (*notes, *_remarks(path, loads, groups))
+    return loads, (*notes, *table.notes, *_remarks(path, loads, groups))
 
 
 def _expect_steady_time(path: Path, time: FloatArray) -> None:

@@ -150,6 +150,22 @@ class SubjectFile(Table):
     instruments: InstrumentsFiles = InstrumentsFiles()
 
 
+def subject_file_in(folder: Path) -> Path:
+    """The subject file of a folder: `subject.toml`, or the only .toml file there.
+
+    Raises:
+        FileError: there is none, or several of which none is called subject.toml.
+    """
+    found = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml")
+    named = [path for path in found if path.name.lower() == "subject.toml"] or found
+    if len(named) == 1:
+        return named[0]
+    if not named:
+        raise FileError(folder, f"holds no subject file; draft one with: kinertia init {folder}")
+    listed = ", ".join(path.name for path in named)
+    raise FileError(folder, f"holds several .toml files ({listed}) and none is subject.toml; name the one you mean")
+
+
 def read_subject(path: str | Path) -> SubjectFile:
     """Read and check a subject file.
 

@@ -22,10 +22,11 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.motion.smoothing import smooth
+from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.noise import study_noise
 from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
+from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 
 CONDITIONS = {
@@ -129,10 +130,10 @@ def symmetric_truth(bsp: BodySegmentParameters) -> BodySegmentParameters:
     return vector.bsp(vector.values(bsp))
 
 
-def study_trial() -> SyntheticTrial:
-    """One stride of the package's walk, with margins, of a subject with exactly symmetric BSPs."""
+def study_trial(pace: float = 1.0) -> SyntheticTrial:
+    """One stride of the package's walk, this many times as fast, with margins; left mirrors right exactly."""
     subject = walking_subject()
-    return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S + 2 * MARGIN_S)
+    return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S / pace + 2 * MARGIN_S, pace=pace)
 
 
 @one_blas_thread
@@ -194,12 +195,12 @@ def run_draw(trial: SyntheticTrial, seed: int, number: int) -> Draw:
     rng = np.random.default_rng([seed, number])
     vector = ParameterVector(trial.bsp, symmetric=True)
     truth = vector.values(trial.bsp)
-    theta = truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))
+    theta = random_start(truth, rng)
     start = vector.bsp(theta)
-    inner = _inner(trial.time)
+    inner = inner_frames(trial.time, MARGIN_S)
     windows = {
         "no_noise": Window(trial.time[inner], trial.motion.cut(inner), trial.window.wrench[inner]),
-        "noise": _noisy_window(trial, inner, rng),
+        "noise": smoothed_window(trial, inner, coordinates(trial, study_noise(trial.markers, rng))),
     }
     errors, found, converged = {}, {}, {}
     for condition in CONDITIONS:
@@ -207,25 +208,37 @@ def run_draw(trial: SyntheticTrial, seed: int, number: int) -> Draw:
         window = windows["no_noise" if condition.endswith("no_noise") else "noise"]
         result = estimate_two_level(trial.skeleton, start, [window], correct=correct)
         found[condition] = vector.values(result.bsp) - truth
-        errors[condition] = _errors(found[condition], result.residuals[0])
+        errors[condition] = errors_by_class(found[condition], result.residuals[0])
         converged[condition] = result.converged
     return Draw(number, errors, found, theta - truth, converged)
 
 
-def _inner(time: np.ndarray) -> slice:
-    margin = round(MARGIN_S / (time[1] - time[0]))
+def random_start(truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Every parameter off by uniform +/-50 %."""
+    return truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))
+
+
+def inner_frames(time: np.ndarray, margin_s: float) -> slice:
+    """The frames of a uniform time base that are not within this margin (s) of its ends."""
+    margin = round(margin_s / (time[1] - time[0]))
     return slice(margin, len(time) - margin)
 
 
-def _noisy_window(trial: SyntheticTrial, inner: slice, rng: np.random.Generator) -> Window:
-    ik = solve_ik(trial.skeleton, study_noise(trial.markers, rng))
-    spline = smooth(ik.time, ik.q, "gcv")
+def coordinates(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
+    """Coordinates of the markers: inverse kinematics with the true skeleton, then GCV."""
+    ik = solve_ik(trial.skeleton, markers)
+    return smooth(ik.time, ik.q, "gcv")
+
+
+def smoothed_window(trial: SyntheticTrial, inner: slice, spline: SmoothedSpline) -> Window:
+    """The splines at these frames, with the exact ground reactions."""
     time = trial.time[inner]
     motion = Motion(*(spline(time, order) for order in range(3)))
     return Window(time, motion, trial.window.wrench[inner])
 
 
-def _errors(parameters: np.ndarray, residual: np.ndarray) -> Errors:
+def errors_by_class(parameters: np.ndarray, residual: np.ndarray) -> Errors:
+    """Errors of the parameters (49) by class, and of a residual (n, 6)."""
     by_segment = parameters.reshape(-1, 7)
     groups = (by_segment[:, 4:], by_segment[:, :1], by_segment[:, 1:4], residual[:, :3], residual[:, 3:])
     values = [value for group in groups for value in (rms(group), np.abs(group).max())]

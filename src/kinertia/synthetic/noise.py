@@ -29,9 +29,22 @@ def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
     Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm
     RMS, below 4 Hz: no low-pass filter removes it (Chèze et al. 1995).
     """
-    shape = markers.positions.shape[1:]
+    return displaced(markers, markers.positions.shape[1:], rng)
+
+
+def displaced(
+    markers: Markers, shape: tuple[int, int], rng: np.random.Generator, most_rad_s: float = STUDY_RATE_RAD_S
+) -> Markers:
+    """The markers moved by sinusoids of the study's amplitudes and phases.
+
+    Args:
+        markers: m of them.
+        shape: how many sinusoids are drawn: (m, 3) one per coordinate, (m, 1) one per marker, (1, 3) one per axis.
+        rng: of amplitudes, rates and phases, in this order.
+        most_rad_s: rates are uniform from 0 to this.
+    """
     amplitude = rng.uniform(0.0, STUDY_AMPLITUDE_M, shape)
-    rate = rng.uniform(0.0, STUDY_RATE_RAD_S, shape)
+    rate = rng.uniform(0.0, most_rad_s, shape)
     phase = rng.uniform(0.0, 2 * np.pi, shape)
     time = (markers.time - markers.time[0])[:, None, None]
     return replace(markers, positions=markers.positions + amplitude * np.sin(rate * time + phase))
