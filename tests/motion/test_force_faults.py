@@ -72,6 +72,13 @@ def test_horizontal_offsets(walk, axis, name, offset):
     assert f"show {'+' if offset > 0 else '-'}" in found
 
 
+@pytest.mark.parametrize("offset", [30.0, 50.0, 100.0])
+def test_vertical_offsets(walk, offset):
+    found = told(with_force(walk, lambda force: force + offset * np.eye(3)[1]))
+    assert f"a steady {offset:.0f} N while nobody stands on it" in found
+    assert "zero" in found
+
+
 def test_torques_in_newton_millimetres(walk):
     assert "they are in N mm" in told(with_force(walk, lambda force: force, torque=1000.0))
 

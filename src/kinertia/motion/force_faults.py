@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -20,6 +19,9 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads, Trial
 _FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
 _LONGEST_ARM_M = 0.15
 """Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
+_STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
+_IDLE_PERCENT = (2.0, 15.0)
+"""A plate that somebody walks over is idle for at least so many percent of the record."""
 _PELVIS_HZ = 6.0
 _OPPOSED = -0.4
 _LEAST_CHANGE_M_S = 0.02
@@ -39,6 +41,8 @@ def loads_trouble(plates: PlateLoads) -> str:
             f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is "
             f"up in the markers; export forces and markers in the same axes"
         )
+    if trouble := _never_unloaded(plates):
+        return trouble
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
     arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > _FIRM_LOAD_N]
     arms /= plates.force[..., 1][plates.force[..., 1] > _FIRM_LOAD_N]
@@ -48,6 +52,20 @@ def loads_trouble(plates: PlateLoads) -> str:
             f"the torques are those of vertical forces at {typical:.2g} m from the foot; expected less than 0.04 m: "
             f"they are in N mm, or not about the centre of pressure; export them in N m, about the point of the force"
         )
+    return ""
+
+
+def _never_unloaded(plates: PlateLoads) -> str:
+    """Which plate somebody walked over shows a small steady force where others show none; empty where none does."""
+    for name, vertical in zip(plates.names, plates.force[..., 1].T, strict=True):
+        low, high = np.percentile(vertical, _IDLE_PERCENT)
+        steady = high - low < _STEADY_N
+        if vertical.max() > _STEP_N and low > LOAD_THRESHOLD_N and high < _MOST_IDLE_N and steady:
+            return (
+                f"{name} never shows less than {vertical.min():.0f} N, and a steady {(low + high) / 2:.0f} N while "
+                f"nobody stands on it: the zero of its vertical force is wrong; zero the plates without load, or "
+                f"subtract it before export"
+            )
     return ""
 
 
@@ -127,7 +145,8 @@ def agreement(trial: Trial, pelvis: Sequence[str]) -> dict[str, Agreement]:
         return {}
     mass_kg = weight / 9.81
     velocity = pelvis_m(time, 1)
-    caused = cumulative_trapezoid(force, time, axis=0, initial=0.0) / mass_kg
+    impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
+    caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
     found = {}
     for axis, k in _HORIZONTAL.items():
         one, other = (_without_trend(time, values[:, k]) for values in (velocity, caused))
