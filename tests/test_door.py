@@ -54,7 +54,7 @@ def test_the_house_has_few_rooms():
 @pytest.fixture
 def workshop(demo_run, tmp_path, monkeypatch):
     """A folder as `kinertia demo` leaves it, to work in."""
-    for path in demo_run[1].iterdir():
+    for path in demo_run[1].glob("[!.]*"):
         (tmp_path / path.name).symlink_to(path)
     monkeypatch.chdir(tmp_path)
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from kinertia.checks.model import check_model as check_model
     from kinertia.checks.recording import RecordingCheck as RecordingCheck
     from kinertia.checks.recording import check_recording as check_recording
+    from kinertia.checks.uses import Use as Use
+    from kinertia.checks.uses import uses as uses
     from kinertia.checks.verdict import Verdict as Verdict
     from kinertia.checks.verdict import verdicts as verdicts
     from kinertia.errors import FileError as FileError
@@ -64,6 +66,7 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
     from kinertia.motion.dynamics import residual as residual
     from kinertia.report.files import save_fit as save_fit
+    from kinertia.report.saved_fit import load_fit as load_fit
     from kinertia.settings import Instruments as Instruments
     from kinertia.settings import Settings as Settings
     from kinertia.settings import Subject as Subject
@@ -106,11 +109,13 @@ _ROOMS = {
     "estimation.simultaneous.fit": "Posterior",
     "checks.model": "ModelCheck check_model",
     "checks.recording": "RecordingCheck check_recording",
+    "checks.uses": "Use uses",
     "checks.verdict": "Verdict verdicts",
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",
     "report.files": "save_fit",
+    "report.saved_fit": "load_fit",
 }
 """Where the public names are, from the lowest room up."""
 _HOMES = {name: module for module, names in _ROOMS.items() for name in names.split()}

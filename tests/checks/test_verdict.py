@@ -145,7 +145,7 @@ def test_centre_of_mass_far_from_the_literature():
     assert not stands_against(verdicts(fit(estimate=near)))
 
 
-@pytest.mark.parametrize(("away", "expected"), [(2.9, "pass"), (-3.1, "fail")])
+@pytest.mark.parametrize(("away", "expected"), [(2.9, "pass"), (-3.1, "caution"), (3.9, "caution"), (-4.1, "fail")])
 def test_parameters_by_prior_deviations(away, expected):
     sd = np.full((2, 10), 0.01)
     estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + np.eye(2, 10) * away * 0.01)
@@ -153,3 +153,18 @@ def test_parameters_by_prior_deviations(away, expected):
     (told,) = [one for one in found if "3 prior SDs from" in one.sentence]
     assert told.level == expected
     assert "mass of pelvis" in told.sentence or "com_x of thigh_r" in told.sentence
+
+
+@pytest.mark.parametrize(("doubted", "expected"), [(1, "caution"), (2, "caution"), (3, "fail")])
+def test_more_than_two_doubted_segments_contradict_the_model(doubted, expected):
+    """Several parameters of one segment go together and count once."""
+    segments = ("pelvis", "thigh_r", "thigh_l", "torso")
+    table = np.tile(BODY.table()[:1], (4, 1))
+    away = table.copy()
+    away[:doubted, :3] += 0.031
+    before, after = (BodySegmentParameters.from_table(segments, one) for one in (table, away))
+    posterior = SimpleNamespace(prior_sd=np.full((4, 10), 0.01))
+    found = verdicts(fit(literature=before, estimate=after, posterior=posterior))
+    (told,) = [one for one in found if "3 prior SDs from" in one.sentence]
+    assert told.level == expected
+    assert ("take pelvis" in told.sentence) == (expected == "caution")

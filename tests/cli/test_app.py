@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from dataclasses import replace
 from importlib.metadata import version
@@ -39,6 +40,7 @@ def test_help_reads_like_a_manual():
         "0 done",
         "1 done, but a check failed",
         "2 an error in files or options, reported in one line",
+        "70 Kinertia itself failed",
         "130 interrupted",
     ):
         assert status in text
@@ -292,6 +294,63 @@ def test_interruption_leaves_nothing(tmp_path, person, arguments, stage):
     assert "Traceback" not in rest
     assert not (tmp_path / "deep").exists()
     assert [path.name for path in tmp_path.iterdir()] == [person.name]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_the_request_to_end_leaves_nothing(tmp_path, person, name):
+    code = """
+        import contextlib, os, signal, sys
+        from kinertia.cli.app import main
+        from kinertia.report import check_page
+        name, made = sys.argv.pop(), check_page.complete_folder
+        @contextlib.contextmanager
+        def ended(*arguments):
+            with made(*arguments) as work:
+                os.kill(os.getpid(), getattr(signal, name))
+                yield work
+        check_page.complete_folder = ended
+        main()
+    """
+    command = [sys.executable, "-c", textwrap.dedent(code), "check", person / "walk.c3d", "-o", tmp_path / "out", name]
+    done = subprocess.run(list(map(str, command)), capture_output=True, check=False)
+    assert done.returncode == 128 + getattr(signal, name), done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == [person.name]
+
+
+def test_a_failure_of_kinertia_is_one_line_a_status_and_a_log(tmp_path, monkeypatch):
+    def fail(_):
+        raise ZeroDivisionError("division by\nzero")
+
+    monkeypatch.setattr("kinertia.cli.check.check_subject", lambda *_: fail(0))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    outcome = run("check", "wälk.trc")
+    assert outcome.status == 70
+    assert outcome.out == ""
+    (line,) = outcome.err.splitlines()
+    (log,) = tmp_path.iterdir()
+    assert line.startswith("error: Kinertia failed, which it should not on any input (ZeroDivisionError: division by")
+    assert str(log) in line
+    text = log.read_text(encoding="utf-8")
+    for part in ("wälk.trc", f"kinertia {version('kinertia')}", "Traceback", "in fail", "numpy"):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (OSError(28, "No space left on device"), "error: No space left on device; check the path"),
+        (OSError("gone"), "error: gone; check the path"),
+    ],
+)
+def test_trouble_of_the_system_without_a_file(monkeypatch, error, line):
+    def full(*_):
+        raise error
+
+    monkeypatch.setattr("kinertia.cli.check.check_subject", full)
+    outcome = run("check", "walk.trc")
+    assert outcome.status == 2
+    assert outcome.err.startswith(line)
 
 
 def test_trouble_with_the_disk_is_one_line(person, monkeypatch):

@@ -175,8 +175,8 @@ def test_ankles_push_off(measured_demo):
 
 def test_results_are_those_of_a_fit(measured_demo):
     folder = measured_demo.folder
-    assert {path.name for path in folder.iterdir()} == {*RESULTS, "lab"}
-    assert {path.name for path in (folder / "lab").iterdir()} == LAB
+    assert {path.name for path in folder.glob("[!.]*")} == {*RESULTS, "lab"}
+    assert {path.name for path in (folder / "lab").glob("[!.]*")} == LAB
     told = json.loads((folder / "fit.json").read_text())
     assert (told["method"], told["subject"]["name"]) == ("simultaneous", "Plug-in Gait, subject A")
     (trial,) = told["trials"]

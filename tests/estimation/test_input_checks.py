@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from kinertia.errors import SubjectError, TrialError
-from kinertia.estimation.input_checks import check_masses, check_same_person, complete_subject
-from kinertia.estimation.warnings import fit_warnings, mass_from_force_kg, two_level_warnings
+from kinertia.estimation.force_mass import force_mass
+from kinertia.estimation.input_checks import check_same_person, complete_subject
+from kinertia.estimation.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.settings import Subject
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Markers, Recording, Trial
@@ -67,13 +68,14 @@ def test_mass_by_force_knows_the_movement_of_the_body(short_fit):
 
 def warned(fit, mass_kg=None, **changes):
     result = SimpleNamespace(**{"bsp": fit.literature, "converged": True, "evaluations": 7, **changes})
-    mass = mass_from_force_kg(fit.literature, fit.trials[0]) if mass_kg is None else mass_kg
-    return fit_warnings(mass, fit.literature, result.bsp, fit.trials[:1]) + two_level_warnings(result)
+    mass = force_mass(fit.skeleton, fit.trials[0].kinematics.trial).mass_kg if mass_kg is None else mass_kg
+    said = force_warnings(mass, fit.literature, fit.trials[:1], fit.skeleton)
+    return said + fit_warnings(mass, fit.literature, result.bsp) + two_level_warnings(result)
 
 
 def test_warnings_come_one_by_one(short_fit):
     literature = short_fit.literature
-    by_force = mass_from_force_kg(literature, short_fit.trials[0])
+    by_force = force_mass(short_fit.skeleton, short_fit.trials[0].kinematics.trial).mass_kg
     fine = replace(literature, mass_kg=literature.mass_kg * by_force / literature.total_mass_kg)
     assert warned(short_fit, bsp=fine) == []
     assert any("did not converge within 7" in w for w in warned(short_fit, bsp=fine, converged=False))
@@ -88,14 +90,6 @@ def test_warnings_come_one_by_one(short_fit):
     assert "physically impossible for 1 of 12 segments (thigh_r)" in said
 
 
-def test_masses_that_contradict_each_other_or_the_scale():
-    check_masses(70.0, {"a": 68.0, "b": 72.0})
-    with pytest.raises(TrialError, match=r"trial 'b'.*90\.0 kg.*'a' 70\.0 kg.*one person"):
-        check_masses(70.0, {"a": 70.0, "b": 90.0})
-    with pytest.raises(TrialError, match=r"trial 'a'.*60\.0 kg; stated mass 70\.0 kg"):
-        check_masses(70.0, {"a": 60.0, "b": 63.5})
-
-
 def two_trials(stretch_m=0.0, label="R.Shank.Rear"):
     made = walk(walking_subject(), 0.3)
     trials = []
@@ -105,6 +99,16 @@ def two_trials(stretch_m=0.0, label="R.Shank.Rear"):
         loads = FootLoads(made.time, made.foot_loads[..., :3], made.foot_loads[..., 3:])
         trials.append(Trial(name, replace(made.markers, positions=positions), loads, np.ones(len(made.time), bool)))
     return made.skeleton, trials
+
+
+def test_a_motion_that_the_forces_do_not_make_accuses_inverse_kinematics_and_nobody_else(short_fit):
+    trial, literature = short_fit.trials[0], short_fit.literature
+    force = trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean()
+    wrong = {**trial.residuals, "literature": trial.residuals["literature"] + 0.3 * force * np.eye(6)[1]}
+    mass = force_mass(short_fit.skeleton, trial.kinematics.trial).mass_kg
+    (said,) = force_warnings(mass, literature, [replace(trial, residuals=wrong)], short_fit.skeleton)
+    assert "inverse kinematics went wrong, not the plates" in said
+    assert force_warnings(mass, literature, [trial], short_fit.skeleton) == []
 
 
 def test_trials_of_one_person_may_differ_a_little():

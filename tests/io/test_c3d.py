@@ -365,3 +365,18 @@ def test_real_file_cut_anywhere(shared_data, tmp_path):
         (tmp_path / "x.c3d").write_bytes(whole[:size])
         with pytest.raises(FileError, match="truncated"):
             read_c3d(tmp_path / "x.c3d")
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 0.001), ("cm", 0.01), ("m", 1.0)])
+def test_an_empty_length_unit_is_inferred_from_the_size_of_a_person(tmp_path, unit, metres):
+    person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (0.6, 0.5, 1.8), (4, 9, 3))
+    file = write_c3d(tmp_path / "x.c3d", person / metres, [f"M{k}" for k in range(9)], unit="")
+    found = read_c3d(file)
+    assert found.length_unit == unit
+    np.testing.assert_allclose(
+        np.ptp(found.markers.positions[..., 1], axis=1), np.ptp(person[..., 2], axis=1), atol=1e-6
+    )
+    assert f"POINT:UNITS is empty; taken as {unit}" in " ".join(found.notes)
+    ant = write_c3d(tmp_path / "y.c3d", 0.1 * person, [f"M{k}" for k in range(9)], unit="")
+    with pytest.raises(FileError, match=r"POINT:UNITS is empty, and its markers, which reach 0\.1"):
+        read_c3d(ant)

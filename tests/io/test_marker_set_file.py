@@ -112,5 +112,5 @@ def test_the_same_key_in_two_tables_is_told_apart(tmp_path):
 
 
 def test_an_unknown_preset_lists_those_that_exist():
-    with pytest.raises(FileError, match=r"no such marker set.*cleveland-clinic, plug-in-gait, rajagopal"):
+    with pytest.raises(FileError, match=r"no such marker set.*cleveland-clinic, plug-in-gait, rajagopal, rajagopal-"):
         read_marker_set("helen-hayes")

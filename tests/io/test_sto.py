@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from kinertia.errors import FileError
-from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.sto import read_sto, read_table, write_sto
 
 HEADER = "walk\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\nendheader\n"
 TABLE = "time\ta\tb\n0\t1\t2\n0.5\t3\t4\n"
@@ -79,9 +79,23 @@ def test_empty_cell_is_nan(write):
     np.testing.assert_array_equal(table.to_numpy(), [[np.nan, 2], [3, 4]])
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ("nRows=2", "nRows=901", "line 3 of its header announces 901 rows, the file has 2"),
+        ("nRows=2", "datarows 1", "line 3 of its header announces 1 rows, the file has 2"),
+        ("nColumns=3", "nColumns=4", "line 4 of its header announces 4 columns, the file has 3"),
+    ],
+)
+def test_a_header_that_miscounts_is_a_note(write, right, wrong, told):
+    table = read_table(write(HEADER.replace(right, wrong) + TABLE))
+    np.testing.assert_array_equal(table.values, [[1, 2], [3, 4]])
+    assert len(table.notes) == 1
+    assert told in table.notes[0]
+    assert read_table(write(HEADER + TABLE)).notes == ()
+
+
 BROKEN = {
-    "rows": (HEADER.replace("nRows=2", "nRows=3") + TABLE, 3, "announces 3 rows but the file has 2"),
-    "columns": (HEADER.replace("nColumns=3", "nColumns=4") + TABLE, 4, "announces 4 columns but the file has 3"),
     "short row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3"), 9, "2 values, expected 3"),
     "long row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3\t4\t5"), 9, "4 values, expected 3"),
     "not a number": (HEADER + TABLE.replace("3", "three"), 9, "'three' in column 2"),

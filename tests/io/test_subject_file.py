@@ -180,7 +180,7 @@ CASES = [
     ("height_m = 1.68", "height_m = 168", 4, "centimetres"),
     ('"static.trc"', '"sttaic.trc"', 7, "did you mean 'static.trc'?"),
     ('"static.trc"', "7", 7, "static = 7: must be a path in quotes"),
-    ('"plug-in-gait"', '"plugin"', 8, "'cleveland-clinic', 'plug-in-gait', 'rajagopal'"),
+    ('"plug-in-gait"', '"plugin"', 8, "'cleveland-clinic', 'plug-in-gait', 'rajagopal', 'rajagopal-run'"),
     ('name = "second"', 'name = "walk1"', 18, "trial 'walk1' is there already"),
     ('name = "second"', 'name = ""', 18, "must be a name that a folder can have"),
     ('name = "second"', 'name = "../second"', 18, "must be a name that a folder can have"),

@@ -133,8 +133,13 @@ def test_missing_markers(write, cells):
     assert bool(notes) == cells.endswith("0.0")
 
 
+def test_a_header_that_miscounts_its_frames_is_a_note(write):
+    recording = read_trc_recording(write(HEADER.replace("\t3\t2\t", "\t4\t2\t") + ROWS))
+    assert len(recording.markers.time) == 3
+    assert "announces 4 frames, the file has 3: all of them were read" in recording.notes[0]
+
+
 BROKEN = {
-    "frame count": (HEADER.replace("\t3\t2\t", "\t4\t2\t") + ROWS, 3, "announces 4 frames but the file has 3"),
     "marker count": (HEADER.replace("\t3\t2\t", "\t3\t3\t") + ROWS, 4, "2 marker labels, expected 3"),
     "odd count": (HEADER.replace("\t3\t2\t", "\t3.5\t2\t") + ROWS, 3, "NumFrames is 3.5"),
     "unit": (HEADER.replace("mm", "inch") + ROWS, 3, "unknown unit 'inch'"),

@@ -83,14 +83,3 @@ def test_what_the_centre_adds_to_a_load_when_it_moves(root, q):
     for k in range(3):
         ahead, behind = (root.about_centre(q + s * h * np.eye(6)[k], load) for s in (1, -1))
         np.testing.assert_allclose(-found[:, :, k], ((ahead - behind) / (2 * h))[:, 3:], atol=1e-7)
-
-
-def test_the_twin_of_an_orientation_is_turned_back(root, q):
-    twin = q.copy()
-    twin[:, 3] -= np.pi
-    twin[:, 4] = np.pi - q[:, 4]
-    twin[:, 5] -= np.pi
-    for there, here in zip(root.turned_back(twin), q, strict=True):
-        np.testing.assert_allclose(place(root, there)[0], place(root, here)[0], atol=1e-12)
-    assert (np.cos(root.turned_back(twin)[:, 4]) > 0).all()
-    np.testing.assert_array_equal(root.turned_back(q), q)

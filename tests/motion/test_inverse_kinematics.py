@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import opensim as osim
 import pytest
@@ -8,12 +10,18 @@ from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import marker_jacobian, sampled
 from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.model.anthropometry import literature_bsp
+from kinertia.model.coordinate_range import Range
 from kinertia.model.gait27 import build_gait27
-from kinertia.motion.inverse_kinematics import _STEP_TOLERANCE, normal_equations, solve_ik
+from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.pose_fit import _STEP_TOLERANCE, normal_equations
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim
+from random_chain import motion_within, random_chain
+
+JUMPER = "laiarnold5_jump/LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +68,59 @@ def test_perfect_markers_give_back_the_coordinates(seed, heading):
     assert ik.marker_rms_m < 1e-7
 
 
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6), clamped=st.booleans())
+@example(seed=28, clamped=True)
+def test_perfect_markers_give_back_any_motion_within_its_ranges_in_one_branch(seed, clamped):
+    rng = np.random.default_rng(seed)
+    skeleton = random_chain(rng, clamped)
+    q = motion_within(rng, skeleton, np.arange(60) / 100.0)
+    ik = solve_ik(skeleton, markers_of(skeleton, q))
+    np.testing.assert_allclose(ik.q, q, atol=1e-6)
+    assert ik.converged.all()
+
+
+def test_a_clamped_range_holds_and_another_one_does_not(skeleton):
+    q = np.zeros((40, len(skeleton.coordinates)))
+    elbow = skeleton.coordinates.index("elbow_flex_r")
+    q[:, elbow] = np.linspace(-0.3, 0.8, 40)
+    markers = markers_of(skeleton, q)
+    for clamped, expected in ((False, q[:, elbow]), (True, np.maximum(q[:, elbow], 0.0))):
+        ranges = {**skeleton.ranges, "elbow_flex_r": Range(0.0, 2.6, clamped)}
+        found = solve_ik(replace(skeleton, ranges=ranges), markers)
+        np.testing.assert_allclose(found.q[:, elbow], expected, atol=1e-6)
+        assert found.converged.all()
+
+
+def test_an_arm_that_swings_through_more_than_half_a_turn_stays_on_its_branch(skeleton):
+    """A throw: each frame by itself fits the markers nearly as well with the elbow bent backwards."""
+    time = np.arange(100) / 100.0
+    q = np.zeros((100, len(skeleton.coordinates)))
+    columns = [skeleton.coordinates.index(name) for name in ("arm_flex_r", "arm_add_r", "elbow_flex_r")]
+    q[:, columns] = np.column_stack(
+        [2.8 * np.sin(5.0 * time) ** 2, -0.5 * np.sin(4.0 * time), 1.2 + 0.9 * np.sin(7.0 * time)]
+    )
+    markers = noisy(markers_of(skeleton, q), 0.005)
+    found = solve_ik(skeleton, markers).q
+    assert np.abs(found - q)[:, columns].max() < 0.15
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["hamner_run/subject02_running.trc hamner_run/subject02_registered.osim", "laiarnold5_jump/DJ1.trc " + JUMPER],
+)
+def test_no_coordinate_of_a_run_or_a_jump_jumps(measured_file, name):
+    """Not by more than half a turn in 0.1 s, as a leg does in a sprint at most; an arm may turn round overhead."""
+    markers, model = (measured_file(f"field/{file}") for file in name.split())
+    skeleton, walk = read_osim(model).skeleton, read_recording(markers).markers
+    ik = solve_ik(skeleton, walk.cut(*walk.time[[0, min(300, len(walk.time) - 1)]]))
+    fastest = np.nanmax(np.abs(np.diff(ik.q[:, skeleton.rotational], axis=0))) * walk.rate_hz
+    assert fastest < 10 * np.pi * (2.0 if "jump" in name else 1.0)
+    elbows = ik.q[:, [skeleton.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
+    assert np.nanmin(elbows) >= 0.0
+    assert np.nanmax(elbows) <= np.radians(150.01)
+
+
 def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
     q = random_coordinates(skeleton, 3)
     measured = without(noisy(markers_of(skeleton, q), 0.02), ["R.Heel", "Top.Head"], slice(1, 2)).positions
@@ -101,6 +162,21 @@ def test_a_missing_marker_changes_little_and_is_not_counted(skeleton):
     ik = solve_ik(skeleton, without(markers, ["R.Knee.Lat"], slice(10, 20)))
     np.testing.assert_allclose(ik.q, motion.q, atol=1e-6)
     assert np.isnan(ik.errors_m[10:20, ik.labels.index("R.Knee.Lat")]).all()
+
+
+@pytest.mark.parametrize("gap", [slice(30, 31), slice(20, 60), slice(0, 15)])
+def test_a_marker_that_is_off_its_place_and_vanishes_leaves_no_jump(skeleton, gap):
+    """Without care the knee of this walk jumps by several degrees at either end of the gap."""
+    _, motion = smooth_motion(skeleton, n=90)
+    places = skeleton.marker_locals.copy()
+    places[skeleton.labels.index("R.Shank.Front")] += 0.03
+    off = markers_of(skeleton.with_places(places), motion.q)
+    whole = solve_ik(skeleton, off).q
+    gapped = solve_ik(skeleton, without(off, ["R.Shank.Front"], gap)).q
+    alone = solve_ik(skeleton, without(off, ["R.Shank.Front"])).q
+    assert np.degrees(np.abs(alone - whole)).max() > 2.0
+    jumps = np.abs(np.diff(gapped - whole, axis=0)).max(axis=0)
+    assert np.degrees(jumps).max() < 0.1
 
 
 def test_coordinates_without_enough_markers_are_nan_and_the_others_exact(skeleton):

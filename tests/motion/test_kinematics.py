@@ -79,7 +79,10 @@ def test_smoothed_coordinates_and_derivatives_are_near_the_truth(skeleton, trial
         truth = getattr(motion, name)[here]
         error = getattr(found.motion, name) - truth
         assert np.sqrt(np.mean(error**2)) < share * np.sqrt(np.mean(truth**2))
-    assert found.notes == ("read from nowhere",)
+    assert found.notes[0] == "read from nowhere"
+    assert "smoothed at 6.0 Hz, where the search" in found.notes[1]
+    assert "beyond the usual range of a joint, by at most: knee_angle_r (20 deg)" in found.notes[2]
+    assert len(found.notes) == 3
     assert found.ik.converged.all()
 
 
@@ -111,7 +114,17 @@ def test_a_long_gap_ends_the_window(skeleton, trial, start, window):
     gapped = hidden(trial, ["shank_r", "foot_r"], start, start + 0.3)
     found = solve_kinematics(skeleton, gapped, 0.0, 10.0)
     assert found.window_s == pytest.approx(window)
-    assert any("only the longest measured stretch" in note for note in found.notes)
+    assert any("only the measured stretch with most motion" in note for note in found.notes)
+
+
+def test_a_walk_is_taken_rather_than_a_longer_stand(skeleton, trial, motion):
+    """Two stretches: 1.3 s of standing, then 0.6 s of motion."""
+    q = np.where((np.arange(201) < 140)[:, None], motion.q[140], motion.q)
+    positions = skeleton.marker_positions(skeleton.pose(q))
+    measured = np.ones(201, dtype=bool)
+    measured[135:145] = False
+    standing_first = replace(trial, markers=replace(trial.markers, positions=positions), measured=measured)
+    assert solve_kinematics(skeleton, standing_first, 0.0, 10.0).window_s == pytest.approx((1.45, 1.95))
 
 
 def test_the_foot_alone_tells_where_the_shank_is(skeleton, trial):

@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (pip install -e '.[test]')")
@@ -44,6 +45,7 @@ class Opened:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
+        self.page.evaluate("document.querySelectorAll('details.seconds').forEach((part) => (part.open = true))")
         playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
 
     def picture(self, locator):
@@ -323,3 +325,30 @@ def test_print_draws_everything_in_the_width_of_the_paper(demo, tmp_path):
     assert demo.page.locator("details:not([open])").count() == 0
     demo.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert len(demo.page.pdf(format="A4")) > 100_000
+
+
+@pytest.mark.parametrize("form", ["svg", "png", "csv"])
+def test_figures_are_saved_by_a_button(demo, fit, form):
+    with demo.page.expect_download() as saving:
+        demo.page.locator(f'.save[data-of="cycle-moments"] button[data-form="{form}"]').click()
+    saved = saving.value
+    assert saved.suggested_filename == f"cycle-moments.{form}"
+    path = Path(saved.path())
+    if form == "png":
+        assert path.read_bytes().startswith(b"\x89PNG")
+    elif form == "svg":
+        assert "Knee moment" in path.read_text(encoding="utf-8")
+    else:
+        assert_same_moments(pd.read_csv(path), fit.cycles())
+
+
+def assert_same_moments(table, cycles):
+    """What is in the figure's CSV is what `fit.cycles` says, in single precision."""
+    for side, word in (("r", "right"), ("l", "left")):
+        own = table[
+            (table.panel == "Knee moment, flexion + (N m/kg)")
+            & table.curve.isin([f"{word}, mean", f"{word}, one stride"])
+        ]
+        rows = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == side)]
+        assert own.x.tolist() == list(range(101))
+        np.testing.assert_allclose(own.y, rows.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)

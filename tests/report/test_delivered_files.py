@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from command_line import fitted
 from kinertia.io.ground_forces import read_forces_with_notes
@@ -80,6 +82,28 @@ def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_p
     assert len(joints) >= 15
     gap = (ours[joints] - theirs[joints]).abs().max() / ours[joints].abs().max()
     assert gap.max() < case.peak, f"{gap.idxmax()}: {gap.max():.4f}"
+
+
+def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tmp_path):
+    """OpenSim's Inverse Dynamics, cut at the heel strikes and divided by body mass, against `cycles.csv`."""
+    folder = folder_of(CASES["gait2354"])
+    theirs = inverse_dynamics_tool(
+        opensim, folder / "model.osim", folder / "kinematics.mot", folder / LOADS_FILE, tmp_path
+    )
+    cycles, strides = pd.read_csv(folder / "cycles.csv"), pd.read_csv(folder / "spatiotemporal.csv")
+    mass_kg = json.loads((folder / "fit.json").read_text())["subject"]["mass_kg"]
+    compared = 0
+    for stride in strides.itertuples():
+        time = np.linspace(stride.start_s, stride.end_s, 101)
+        own = cycles[(cycles.side == stride.side) & (cycles.stride == stride.stride)].set_index("quantity")
+        for joint in ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle", "subtalar_angle"):
+            column = theirs[f"{joint}_{stride.side}_moment"] / mass_kg
+            ours = own.loc[f"{joint}_moment", "value"].to_numpy()
+            gap = ours - make_interp_spline(theirs.index, column, k=3)(time)
+            assert np.nanmax(np.abs(gap)) < PEAK * column.abs().max(), joint
+            assert np.isfinite(gap).mean() > 0.8
+            compared += 1
+    assert compared >= 6
 
 
 @pytest.mark.parametrize("name", CASES)

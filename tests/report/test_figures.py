@@ -44,6 +44,20 @@ def test_plotly_accepts_every_name_and_value_of_every_figure(which, request):
         go.Figure([{**figure["data"][0], "lien": {"width": 2}}])
 
 
+def test_names_of_bodies_are_shown_as_they_are(fit):
+    """plotly would take `<b>` for bold, and `<a href>` for a link."""
+    name = '<b>=cmd|</b><a href="http://x.y">'
+    named = tuple(name if one == "pelvis" else one for one in fit.estimate.segments)
+    bodies = {kind: replace(getattr(fit, kind), segments=named) for kind in ("literature", "estimate")}
+    evil = replace(fit, **bodies)
+    figures = [bsp_figure(evil), information_figure(evil)]
+    for figure in figures:
+        told = figure.to_json()
+        assert "&lt;b&gt;" in told
+        assert "<b>=cmd" not in told
+        assert "<a href" not in told
+
+
 def test_a_figure_is_written_with_its_gaps_and_nothing_else_that_json_does_not_know():
     values = compact(np.array([1.5, np.nan, -0.25]))
     (trace,) = json.loads(Figure([{"y": values, "name": "a"}], {}).to_json())["data"]

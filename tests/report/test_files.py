@@ -15,11 +15,12 @@ from kinertia.settings import Settings
 
 STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {
-    "report.html", "fit.json", "model.osim",
+    "report.html", "fit.json", "fit.npz", "model.osim", "cycles.csv", "cycles_literature.csv", "spatiotemporal.csv",
     "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
     "ground_reactions.mot", "external_loads.xml",
 }  # fmt: skip
-FOR_ALL = {"report.html", "fit.json", "bsp.csv", "model.osim"}
+CYCLES = {"cycles.csv", "cycles_literature.csv", "spatiotemporal.csv"}
+FOR_ALL = {"report.html", "fit.json", "fit.npz", "bsp.csv", "model.osim", *CYCLES}
 PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
 
 
@@ -32,7 +33,7 @@ def saved(short_fit, tmp_path_factory):
 
 def test_files(saved):
     _, folder = saved
-    assert {path.name for path in folder.iterdir()} == RESULTS
+    assert {path.name for path in folder.glob("[!.]*")} == RESULTS
     assert [path.name for path in folder.parent.iterdir()] == ["out"]
 
 
@@ -169,9 +170,9 @@ def test_marker_rms_is_over_visible_markers(short_fit):
 
 def test_several_trials_have_a_folder_each(short_fit, tmp_path):
     folder = save_fit(short_fit, tmp_path / "out")
-    assert {path.name for path in folder.iterdir()} == {*FOR_ALL, "early", "late"}
+    assert {path.name for path in folder.glob("[!.]*")} == {*FOR_ALL, "early", "late"}
     for name in ("early", "late"):
-        assert {path.name for path in (folder / name).iterdir()} == RESULTS - FOR_ALL
+        assert {path.name for path in (folder / name).glob("[!.]*")} == RESULTS - FOR_ALL
     assert [trial["name"] for trial in json.loads((folder / "fit.json").read_text())["trials"]] == ["early", "late"]
 
 

@@ -28,7 +28,7 @@ from report_page import Elements, figures_of
 MOST_BYTES = 2_500_000
 MOST_BYTES_OF_MANY = 4_500_000
 """However many trials there are, and however long."""
-PARTS = ["verdict", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
+PARTS = ["verdict", "cycle", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,8 @@ def test_headline_follows_the_worst_judgement(which, request):
     levels = [verdict.level for verdict in verdicts(fit)]
     assert told.judgements == tuple(verdicts(fit))
     worst = "fail" if "fail" in levels else "caution" if "caution" in levels else "pass"
-    assert told.level == worst
+    assert told.level == ("caution" if worst == "pass" and fit.warnings else worst)
+    assert words(replace(fit, warnings=("a plate is off",))).level != "pass"
     stopped = words(replace(fit, converged=False))
     assert stopped.level == "fail"
     assert f"{levels.count('fail') + fit.converged} of {len(levels)} checks" in stopped.headline
@@ -385,3 +386,10 @@ def test_pictures_are_those_of_the_report(fit, page):
     assert plot.gaps() is None or isinstance(plot.gaps(), go.Figure)
     with pytest.raises(KeyError, match=fit.trials[0].name):
         plot.residuals("nowhere")
+
+
+def test_three_trials_with_strides_stay_below_3_mb(fit):
+    posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 3)
+    made = render(replace(fit, trials=fit.trials * 3, posterior=posterior))
+    assert 'id="cycle"' in made
+    assert len(made.encode()) < 3_000_000

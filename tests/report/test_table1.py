@@ -53,7 +53,8 @@ def test_rows_fit_a_terminal_of_100_columns(table):
 
 def test_four_files_are_written(table, tmp_path):
     folder = save_table1(table, tmp_path / "deep" / "out")
-    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "table1.csv", "table1.json", "table1.png"]
+    names = sorted(path.name for path in folder.glob("[!.]*"))
+    assert names == ["report.html", "table1.csv", "table1.json", "table1.png"]
     assert json.loads((folder / "table1.json").read_text())["seed"] == 3
     assert pd.read_csv(folder / "table1.csv").shape == (10, 2 + 12)
     page = (folder / "report.html").read_text()
@@ -102,5 +103,5 @@ def test_command_prints_and_writes(table, tmp_path, monkeypatch):
 def test_table1_without_matplotlib_has_everything_but_the_picture(table, without, tmp_path):
     without("matplotlib")
     folder = save_table1(table, tmp_path / "out")
-    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "table1.csv", "table1.json"]
+    assert sorted(path.name for path in folder.glob("[!.]*")) == ["report.html", "table1.csv", "table1.json"]
     assert 'id="segments"' not in (folder / "report.html").read_text(encoding="utf-8")

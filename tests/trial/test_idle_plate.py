@@ -62,3 +62,20 @@ def test_a_plate_that_is_never_loaded_is_zero():
     found = without_idle(time, force, moment)
     assert not found.force.any()
     assert not found.moment.any()
+
+
+def test_a_plate_that_was_not_zeroed_is_not_stood_on():
+    """It reads 30 N all day long, and a foot stands on it for a while."""
+    rng = np.random.default_rng(2)
+    vertical = np.concatenate([np.zeros(400), 7.0 * ramp(), np.zeros(400)]) + rng.normal(30.0, 1.0, 1040)
+    found = without_idle(*plate(vertical))
+    assert not found.force[:440].any()
+    assert not found.force[-440:].any()
+    assert found.force[475:565, 1].min() > 600.0
+
+
+def test_a_foot_that_lands_slowly_is_no_idle_level():
+    vertical = np.concatenate([np.linspace(0.0, 800.0, 400), np.linspace(800.0, 0.0, 400)])
+    found = without_idle(*plate(vertical))
+    firm = vertical >= LOAD_THRESHOLD_N
+    assert found.force[firm].all()

@@ -133,8 +133,20 @@ def test_plate_that_carries_both_feet_is_divided():
     assert (loads.force[850:1300, 1, 1] > 0).all()
     np.testing.assert_allclose(loads.force.sum(axis=1), recording.plates.force.sum(axis=1))
     assert notes == (
-        "walk: belt carries both feet in turn from 0.200 to 1.299 s; each sample was given to the nearer foot",
+        "walk: belt carries both feet in turn from 0.200 to 1.299 s; each sample was given to the nearer foot, and "
+        "0.2 s around each change count as not measured: of both feet only the sum is known",
     )
+
+
+def test_double_support_on_one_plate_is_not_measured():
+    """The right foot stands to 0.8 s, the left one from 0.7 s on."""
+    recording = walk(ALL_STEPS)
+    trial = build_trial(merged(recording, range(8)), FEET)
+    both = np.array([(recording.plates.force[:, [a, b], 1] > 0).all(axis=1) for a in range(8) for b in range(a)])
+    double = np.interp(trial.markers.time, recording.plates.time, both.any(axis=0)) > 0.5
+    assert double.any()
+    assert not (trial.measured & double).any()
+    assert trial.measured[~double].mean() > 0.6
 
 
 def test_load_far_from_both_feet_is_noted():

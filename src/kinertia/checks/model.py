@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.checks.verdict import Verdict
-from kinertia.estimation.input_checks import CONTRADICTING_MASS
+from kinertia.estimation.force_mass import CONTRADICTING_MASS
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.anatomy import ModelSegments, model_segments

@@ -11,19 +11,31 @@ import numpy as np
 from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
-from kinertia.estimation.input_checks import CONTRADICTING_MASS
+from kinertia.estimation.force_mass import CONTRADICTING_MASS
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
 from kinertia.model.anatomy import segment_of
+from kinertia.model.body_sides import sides_trouble
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet, check_marker_set, nearest_labels
+from kinertia.model.same_body import body_trouble
+from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.free_moment import mean_turning
 from kinertia.trial.ground_contact import FootMarkers
-from kinertia.trial.marker_quality import Travel, Visibility, axes_trouble, extent_m, travel, visibility
+from kinertia.trial.marker_quality import (
+    Travel,
+    Visibility,
+    axes_trouble,
+    extent_m,
+    spikes_trouble,
+    travel,
+    visibility,
+)
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.trial.telling_movements import TellingMovements
 
 OFF_PLATE_SHARE = 0.05
 """More of the firm load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
@@ -61,6 +73,7 @@ class RecordingCheck:
         marker_set: how its labels fit.
         markers: visibility, over the whole recording, of the set's markers, or of all where no set fits.
         travel: what the person does.
+        telling: how far trunk and pelvis move, or None.
         plates: one entry per plate; empty without forces.
         windows: stretches in which every foot on the ground stands on a plate, longest first.
         mass: by the vertical force, or None.
@@ -79,6 +92,7 @@ class RecordingCheck:
     marker_set: MarkerSetMatch
     markers: tuple[Visibility, ...]
     travel: Travel
+    telling: TellingMovements | None
     plates: tuple[PlateCheck, ...]
     windows: tuple[tuple[float, float], ...]
     mass: ForceMass | None
@@ -101,6 +115,8 @@ class RecordingCheck:
             ("labels", f"{len(markers.labels)}, {len(match.others)} not in the marker set"),
             ("marker set", named if had else "none known"),
         ]
+        if self.telling is not None:
+            told.append(("movement", self.telling.sentence()))
         if missing and had:
             told.append(("missing labels", ", ".join(missing)))
         if plates is None:
@@ -125,6 +141,7 @@ def check_recording(
     marker_set: MarkerSet | None = None,
     mass_kg: float | None = None,
     window_s: tuple[float, float] | None = None,
+    static: Recording | None = None,
 ) -> RecordingCheck:
     """Look at one recording as a fit would, up to the first model.
 
@@ -133,6 +150,7 @@ def check_recording(
         marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
         mass_kg: by the scale; the file's own if None.
         window_s: the stretch that the user vouches for.
+        static: the static trial that goes with it, if there is one.
     """
     match, used = _match(recording.markers.labels, marker_set)
     own = recording.markers
@@ -145,17 +163,30 @@ def check_recording(
         feet, trouble = _feet(recording.markers.labels, used)
         found += trouble
         if used.landmarks:
+            found += _labelled(recording.markers, used, static)
             found += _facing(recording.markers, used, moves)
             found += _static(recording, used) if standing else []
+    found += _failed(spikes_trouble(own))
+    found += [] if recording.plates is None else _failed(loads_trouble(recording.plates))
     plates = check_plates(recording, feet)
     trial, notes, told = _trial(recording, feet, window_s, standing)
     windows = () if trial is None else tuple(trial.windows())
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
-    found += [*_never(seen, used is not None), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
-    found += [] if trial is None or used is None else _turning(trial, used)
-    return RecordingCheck(recording, match, seen, moves, plates, windows, mass, scale, tuple(found), tuple(notes))
+    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
+    if trial is not None and used is not None:
+        found += _turning(trial, used)
+        found += _moving(trial, used)
+    telling = None if used is None else _telling(recording.markers, used)
+    return RecordingCheck(
+        recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)
+    )
+
+
+def _telling(markers: Markers, marker_set: MarkerSet) -> TellingMovements | None:
+    pelvis, torso = (marker_set.segments.get(name, ()) for name in ("pelvis", "torso"))
+    return TellingMovements.of(markers, pelvis, torso)
 
 
 def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
@@ -223,13 +254,12 @@ def _labels(match: MarkerSetMatch) -> list[Verdict]:
     ]
 
 
-def _never(seen: Sequence[Visibility], known: bool) -> list[Verdict]:
-    """Markers of the set that no frame shows; a fit refuses them."""
+def _never(seen: Sequence[Visibility]) -> list[Verdict]:
+    """Markers that no frame shows; a fit leaves them out, and says what it then lacks."""
     never = [one.label for one in seen if one.share == 0.0]
     if not never:
         return []
-    told = f"visible in no frame: {_some(never)}; label them, or remove them from the file if they were not worn"
-    return [Verdict("fail" if known else "caution", told)]
+    return [Verdict("caution", f"visible in no frame, left out: {_some(never)}; label them if they were worn")]
 
 
 def _gaps(markers: Markers) -> list[Verdict]:
@@ -270,6 +300,24 @@ def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | N
     if bare:
         found.append(Verdict("fail", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
     return (feet if all(feet.values()) else None), found
+
+
+def _failed(trouble: str) -> list[Verdict]:
+    return [Verdict("fail", trouble)] if trouble else []
+
+
+def _labelled(markers: Markers, marker_set: MarkerSet, static: Recording | None) -> list[Verdict]:
+    """Whether the labels make a body, and the one of the static trial."""
+    found = _failed(sides_trouble(markers, marker_set))
+    return found if static is None else found + _failed(body_trouble(static.markers, markers, marker_set))
+
+
+def _moving(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
+    """Whether the forces move the body as the markers show it."""
+    pelvis = marker_set.segments.get("pelvis", ())
+    found = _failed(direction_trouble(trial, pelvis))
+    offset = "" if found else offset_trouble(trial, pelvis)
+    return [*found, Verdict("caution", offset)] if offset else found
 
 
 def _facing(markers: Markers, marker_set: MarkerSet, moves: Travel) -> list[Verdict]:

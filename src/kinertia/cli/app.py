@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
+from kinertia.cli.failure import STATUS, show_failure
 from kinertia.cli.terminal import out, show_error
 from kinertia.errors import KinertiaError
+from kinertia.io.output_folder import INTERRUPTIONS
 from kinertia.io.provenance import VERSION
 
 # typer keeps these line ends: at most 78 columns
@@ -26,6 +31,9 @@ kinertia demo --measured      see it work, on a measured walk
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia fit subject.toml     estimate; the results go to the folder out
+kinertia report out           write the report of a fit again
+kinertia compare out1 out2    what differs between fits, and by how much
+kinertia export out --csv     all tables of a fit, for other programs
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
 kinertia instruments A.toml B.toml   plates and clock, from a whole session
@@ -48,6 +56,7 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
      5 % of the largest external force; moment 50 N m RMS, 75 N m peak).
      In check: something that a fit or a simulation cannot rest on.
   2  an error in files or options, reported in one line
+ 70  Kinertia itself failed; the line says where its log file is
 130  interrupted; nothing half-written is left
 
 Results go to standard output, progress and errors to standard error.
@@ -58,6 +67,9 @@ _MODULES = {
     "init": "init",
     "check": "check",
     "fit": "fit",
+    "report": "report",
+    "compare": "compare",
+    "export": "export",
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",
@@ -99,14 +111,39 @@ def application_for(given: Sequence[str]) -> typer.Typer:
 
 
 def run(app: typer.Typer, given: Sequence[str]) -> None:
-    """Run it; a user's error is one line and exit status 2."""
+    """Run it; a user's error is one line and exit status 2, a failure of Kinertia one line and 70."""
     try:
-        app(args=given, prog_name="kinertia")
+        with _ended_in_order():
+            app(args=given, prog_name="kinertia")
     except KinertiaError as error:
         show_error(str(error))
     except OSError as error:
-        show_error(f"{error.filename}: {error.strerror}; check the path, its permissions and the space on the disk")
+        where = "" if error.filename is None else f"{error.filename}: "
+        show_error(f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk")
+    except Exception as error:
+        show_failure(error, given)
+        raise SystemExit(STATUS) from None
     raise SystemExit(2)
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """Requests to end, and the end of the terminal, end the command as Ctrl-C does: nothing half-written is left."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heeded = [number for number in INTERRUPTIONS if signal.getsignal(number) == signal.SIG_DFL]  # nohup: ignored
+    for number in heeded:
+        signal.signal(number, _end)
+    try:
+        yield
+    finally:
+        for number in heeded:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _end(number: int, _: object) -> NoReturn:
+    raise SystemExit(128 + number)
 
 
 def _version(wanted: bool) -> None:

@@ -26,6 +26,8 @@ from kinertia.model.anthropometry import check_subject
 from kinertia.model.marker_set import MarkerSet
 from kinertia.report.check_page import save_check_page
 from kinertia.trial.data import Recording
+from kinertia.trial.marker_quality import travel
+from kinertia.trial.telling_movements import missing_movements
 
 _MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")
 _LISTED = 8
@@ -75,7 +77,9 @@ def check(
     Measured: rates, units, axes; markers and gaps; force plates and which foot
     is on them; the stretch in which all ground contact is measured; the
     vertical force against body mass; the mean vertical
-    moment over whole strides, which should be near zero.
+    moment over whole strides, which should be near zero; swapped labels,
+    mirrored axes, spikes; forces with a wrong axis, sign, unit or zero.
+    With the static trial: whether it is of the same person.
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.
@@ -121,6 +125,9 @@ def _show(
     """Everything on the terminal."""
     for title, recording in recordings:
         _show_recording(title, recording, verbose)
+    lacking = missing_movements(recording.telling for _, recording in recordings if recording.plates)
+    if lacking is not None:
+        out.print(f"\n{lacking}")
     for title, model in models:
         _show_model(title, model)
     if page is not None:
@@ -153,10 +160,18 @@ def _check_recordings(
     told = {recording.mass_kg for _, recording in recordings if recording.mass_kg is not None}
     shared = told.pop() if mass_kg is None and len(told) == 1 else mass_kg  # files of one person
     found = []
+    standing = [recording for _, recording in recordings if travel(recording.markers).kind == "stands still"]
     for one, recording in recordings:
         mass = shared if mass_kg is not None or recording.mass_kg is None else recording.mass_kg
-        found.append((one.title, check_recording(recording, marker_set, mass, one.window_s)))
+        found.append(
+            (one.title, check_recording(recording, marker_set, mass, one.window_s, _static_of(recording, standing)))
+        )
     return found, mistakes
+
+
+def _static_of(recording: Recording, standing: Sequence[Recording]) -> Recording | None:
+    """The static trial of a recording, where it is clear which that is."""
+    return standing[0] if len(standing) == 1 and recording is not standing[0] else None
 
 
 def _wanted(

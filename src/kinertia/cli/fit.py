@@ -15,12 +15,15 @@ from kinertia.errors import FileError
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.provenance import command_line, provenance_of
-from kinertia.io.subject_file import SubjectFile, read_subject, subject_from_options, with_settings
+from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.report.files import save_fit
 
 
 def fit(
-    trial: Annotated[Path, typer.Argument(help="A subject file (.toml), or the markers of one trial (.c3d, .trc).")],
+    trial: Annotated[
+        Path,
+        typer.Argument(help="A subject file (.toml), a folder with one, or the markers of one trial (.c3d, .trc)."),
+    ],
     output: Output = Path("out"),
     static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
     forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
@@ -54,6 +57,8 @@ def fit(
 
     kinertia fit subject.toml -o out
 
+    kinertia fit FOLDER -o out
+
     kinertia fit walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male -o out
 
     kinertia fit walk.trc --forces walk_grf.mot --static static.trc --mass 72.6 --height 1.803 --sex male -o out
@@ -72,7 +77,8 @@ def fit(
         "--calibrate": calibrate or None,
     }
     wanted = _wanted(trial, options, method)
-    results_folder(output, force)
+    names = [one.name for one in wanted.trials]
+    results_folder(output, force, names if len(names) > 1 else ())
     result = _run(wanted)
     folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
     judged = verdicts(result)
@@ -97,6 +103,8 @@ def _command(trial: Path, options: dict[str, Any], method: str | None, output: P
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
     """What to estimate, by the subject file or by options."""
+    if trial.is_dir():
+        trial = subject_file_in(trial)
     if trial.suffix.lower() == ".toml":
         given = [name for name, value in options.items() if value is not None]
         if given:

@@ -28,7 +28,7 @@ def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, sha
         FileError: the folder cannot be written to.
     """
     folder = Path(folder)
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "demo") as work:
         shutil.copytree(FILES, work / "lab", copy_function=shutil.copyfile)
         wanted = read_subject(work / "lab" / "subject.toml")
         fit = fit_subject(wanted, progress)

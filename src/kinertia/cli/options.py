@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated
 
@@ -11,13 +12,13 @@ from kinertia.cli.terminal import be_quiet
 from kinertia.io.output_folder import check_folder, expect_own_folder
 
 
-def results_folder(folder: Path, force: bool) -> None:
-    """Refuse, before any work, a folder that results cannot or may not go to.
+def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ()) -> None:
+    """Refuse, before any work, a folder that results cannot or may not go to; `sub_folders` are names of theirs in it.
 
     Raises:
         FileError: it cannot be written to, or holds somebody else's files and `force` is False.
     """
-    check_folder(folder)
+    check_folder(folder, sub_folders)
     if not force:
         expect_own_folder(folder)
 

@@ -47,7 +47,7 @@ def plan(
             wanted = read_subject(subject)
             found = plan_motions(prepare_subject(wanted, progress), wanted.settings.cutoff_hz)
     _report_plan(found)
-    with complete_folder(output) as work:
+    with complete_folder(output, "plan") as work:
         found.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
         counts = {" + ".join(names): found.counts(names) for names in found.sd}
         told = json.dumps({"kinertia": VERSION, "recordings": counts}, indent=2)
@@ -89,7 +89,7 @@ def crossval(
         bandwidth = Bandwidth.of(ready.kinematics, wanted.settings.cutoff_hz)
         found = cross_validate(ready, bandwidth, progress)
     _report_crossval(found, "literature" if ready.file is None else "model")
-    with complete_folder(output) as work:
+    with complete_folder(output, "crossval") as work:
         told = json.dumps({"kinertia": VERSION, "held_out": [asdict(held) for held in found]}, indent=2)
         (work / "crossval.json").write_text(told + "\n", encoding="utf-8")
     out.print(f"results in {output / 'crossval.json'}")

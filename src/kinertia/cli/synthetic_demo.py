@@ -110,7 +110,7 @@ def run_demo(
         FileError: the folder cannot be written to.
     """
     folder = Path(folder)
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "demo") as work:
         progress("measuring", 0.0)
         truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
         subject = unlike_literature(walking_subject(), truth_rng)

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.forces_used import forces_used
-from kinertia.estimation.input_checks import check_masses, known, mass_by_force_kg
+from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.estimation.warnings import fit_warnings, turning_warnings, two_level_warnings
+from kinertia.estimation.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
+from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
@@ -28,6 +29,7 @@ from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import interpolate
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
+from kinertia.trial.telling_movements import TellingMovements, missing_movements
 
 
 @one_blas_thread
@@ -105,9 +107,8 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
         *outcome.warnings,
-        *fit_warnings(
-            known(ready.subject.mass_kg), ready.literature, outcome.bsp, outcome.trials, ready.uncertainty.source
-        ),
+        *force_warnings(known(ready.subject.mass_kg), ready.literature, outcome.trials, ready.skeleton),
+        *fit_warnings(known(ready.subject.mass_kg), ready.literature, outcome.bsp, ready.uncertainty.source),
     )
     return Fit(
         subject=ready.subject,
@@ -119,7 +120,7 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         converged=outcome.converged,
         posterior=outcome.posterior,
         warnings=tuple(dict.fromkeys(warnings)),
-        notes=(*ready.notes, *_force_notes(outcome.trials, settings)),
+        notes=(*ready.notes, *_force_notes(outcome.trials, settings), *_movement_notes(ready)),
         file=ready.file,
     )
 
@@ -127,6 +128,16 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
 def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
     """Per trial, which ground reactions the joint moments are from."""
     return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
+
+
+def _movement_notes(ready: Prepared) -> list[str]:
+    """What the trials lack that would tell more."""
+    labels: dict[str | None, list[str]] = {}
+    for marker in ready.skeleton.markers:
+        labels.setdefault(segment_of(marker.segment), []).append(marker.label)
+    pelvis, torso = (labels.get(name, []) for name in ("pelvis", "torso"))
+    lacking = missing_movements(TellingMovements.of(k.trial.markers, pelvis, torso) for k in ready.kinematics)
+    return [] if lacking is None else [lacking]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +175,6 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
 
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
-    by_force = {}
-    for k in ready.kinematics:
-        left = residual(ready.skeleton, ready.literature, k.motion, _window(k).wrench)
-        by_force[k.trial.name] = mass_by_force_kg(ready.literature, k.foot_loads, left)
-    check_masses(known(ready.subject.mass_kg), by_force)
     bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
     fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.uncertainty)
     result = fitted.result

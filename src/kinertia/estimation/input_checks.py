@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from typing import TypeVar
 
@@ -10,15 +10,18 @@ import numpy as np
 
 from kinertia.errors import SubjectError, TrialError
 from kinertia.model.anthropometry import check_subject
+from kinertia.model.body_sides import sides_trouble
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.marker_set import MarkerSet
+from kinertia.model.same_body import body_trouble
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording, Trial
+from kinertia.trial.marker_quality import axes_trouble, extent_m, spikes_trouble
 
 T = TypeVar("T")
 
-CONTRADICTING_MASS = 0.10
-"""Scale and vertical force, or two trials, may differ by this share before the simultaneous estimate refuses."""
 _OTHER_PERSON_M, _OTHER_PERSON = 0.04, 0.15
 """Two markers of a segment may differ in distance by this much between trials of one person: length, or share."""
 
@@ -62,19 +65,7 @@ def complete_subject(
 
 
 def check_visible(skeleton: Skeleton, trial: Trial) -> None:
-    """Raise TrialError when a marker is never seen, or a segment other than the arms' has no marker in the trial."""
-    lost = [
-        marker.label
-        for marker in skeleton.markers
-        if marker.label in trial.markers.labels
-        and not np.isfinite(trial.markers.select([marker.label]).positions).any()
-    ]
-    if lost:
-        raise TrialError(
-            trial.name,
-            f"no frame shows the marker{'s' if len(lost) > 1 else ''} {', '.join(lost)}; label them, or remove them "
-            f"from the file if they were not worn",
-        )
+    """Raise TrialError when a segment other than the arms' has no marker in the trial."""
     arms = tuple(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))
     for segment in set(skeleton.segments) - set(arms):
         worn = [m.label for m in skeleton.markers if m.segment == segment]
@@ -84,6 +75,45 @@ def check_visible(skeleton: Skeleton, trial: Trial) -> None:
                 f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are "
                 f"unknown; use a trial that has them",
             )
+
+
+def check_recordings(trials: Sequence[Recording], static: Recording | None, marker_set: MarkerSet | None) -> None:
+    """Raise TrialError for what the recordings show by themselves: wrong axes, swapped labels, spikes, wrong forces.
+
+    Args:
+        trials: that shall be estimated from.
+        static: the static trial; None with an OpenSim model.
+        marker_set: which label is which landmark; None with an OpenSim model.
+    """
+    for recording in ([] if static is None else [static]) + list(trials):
+        markers = recording.markers
+        worn = [label for label in marker_set.labels if label in markers.labels] if marker_set else markers.labels
+        own = markers.select(worn)
+        trouble = axes_trouble(extent_m(own)) or spikes_trouble(own)
+        if marker_set is not None:
+            trouble = trouble or sides_trouble(markers, marker_set)
+            if static is not None and recording is not static:
+                trouble = trouble or body_trouble(static.markers, markers, marker_set)
+        if recording is not static and recording.plates is not None:
+            trouble = trouble or loads_trouble(recording.plates)
+        if trouble:
+            raise TrialError(recording.name, trouble)
+
+
+def check_force_directions(trials: Sequence[Trial], pelvis: Sequence[str]) -> list[str]:
+    """Raise TrialError when forces point against the motion; warnings of what in them moves nobody.
+
+    Args:
+        trials: with the loads sorted by foot.
+        pelvis: labels of the markers on the pelvis.
+    """
+    warnings = []
+    for trial in trials:
+        if trouble := direction_trouble(trial, pelvis):
+            raise TrialError(trial.name, trouble)
+        if trouble := offset_trouble(trial, pelvis):
+            warnings.append(f"{trial.name}: {trouble}")
+    return warnings
 
 
 def check_same_person(skeleton: Skeleton, trials: Sequence[Trial]) -> None:
@@ -134,26 +164,3 @@ def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, 
     """
     force = float(foot_loads[:, :, 1].sum(axis=1).mean())
     return literature.total_mass_kg * force / (force + float(residual[:, 1].mean()))
-
-
-def check_masses(mass_kg: float, by_force_kg: Mapping[str, float]) -> None:
-    """Raise TrialError when trials cannot be of one person, or not of the one on the scale.
-
-    Args:
-        mass_kg: by the scale.
-        by_force_kg: per trial, `mass_by_force_kg`.
-    """
-    heaviest, lightest = max(by_force_kg, key=by_force_kg.__getitem__), min(by_force_kg, key=by_force_kg.__getitem__)
-    if by_force_kg[heaviest] > (1 + CONTRADICTING_MASS) * by_force_kg[lightest]:
-        raise TrialError(
-            heaviest,
-            f"the vertical force corresponds to {by_force_kg[heaviest]:.1f} kg, in '{lightest}' "
-            f"{by_force_kg[lightest]:.1f} kg; pool only trials of one person, with the same plates",
-        )
-    for name, by_force in by_force_kg.items():
-        if abs(by_force - mass_kg) > CONTRADICTING_MASS * mass_kg:
-            raise TrialError(
-                name,
-                f"the vertical force corresponds to {by_force:.1f} kg; stated mass {mass_kg:.1f} kg; correct the mass, "
-                f"or the gain and zero of the plates",
-            )

@@ -8,7 +8,15 @@ from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
-from kinertia.estimation.input_checks import check_same_person, check_visible, complete_subject, known
+from kinertia.estimation.force_mass import check_force_masses
+from kinertia.estimation.input_checks import (
+    check_force_directions,
+    check_recordings,
+    check_same_person,
+    check_visible,
+    complete_subject,
+    known,
+)
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.io.marker_set_file import choose_marker_set
@@ -98,6 +106,7 @@ def calibrate(
     model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
+    check_force_masses(model.skeleton, known(subject.mass_kg), trials)
     check_same_person(model.skeleton, trials)
     poses = first_poses(model.skeleton, trials)
     skeleton, held = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
@@ -143,7 +152,9 @@ def prepare(
 
     progress("calibration", 0.0)
     started = time.perf_counter()
+    check_recordings(recordings, static, marker_set)
     turned = [_turned(item, marker_set) for item in inputs]
+    warnings += check_force_directions([trial for trial, _ in turned], marker_set.segments.get("pelvis", ()))
     model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
     literature = literature_bsp(
         known(subject.mass_kg), known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
@@ -180,7 +191,7 @@ def prepare(
 
 def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
     """The trial with its loads sorted by foot, facing +X, and the angle (deg) it was turned by."""
-    recording = item.recording
+    recording = item.recording.without_empty_markers()
     for side in "rl":
         label = marker_set.landmarks[f"asis_{side}"][0]
         if label not in recording.markers.labels:

@@ -14,7 +14,8 @@ import numpy as np
 
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
-from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.force_mass import check_force_masses
+from kinertia.estimation.input_checks import check_force_directions, check_recordings, complete_subject, known
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
@@ -25,7 +26,7 @@ from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Settings, Subject
-from kinertia.trial.data import Trial
+from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
 
 LIGHT_KG = 0.5
@@ -54,9 +55,15 @@ def prepare_osim(
     feet = _feet(model)
     progress("calibration", 0.0)
     started = time.perf_counter()
+    check_recordings([_of_model(model, item.recording) for item in inputs], None, None)
     trials = [_trial(model, item, feet) for item in inputs]
+    root = model.skeleton.segments[0]
+    warnings += check_force_directions(
+        trials, [marker.label for marker in model.skeleton.markers if marker.segment == root]
+    )
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
+    check_force_masses(skeleton, known(subject.mass_kg), trials)
     poses = first_poses(skeleton, trials)
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
     if calibrate:
@@ -124,9 +131,16 @@ def _feet(model: OsimModel) -> dict[str, list[str]]:
     return feet
 
 
+def _of_model(model: OsimModel, recording: Recording) -> Recording:
+    """The recording with those markers only that the model has."""
+    known_labels = {marker.label for marker in model.skeleton.markers}
+    worn = [label for label in recording.markers.labels if label in known_labels]
+    return replace(recording, markers=recording.markers.select(worn)) if worn else recording
+
+
 def _trial(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> Trial:
     """The trial with its loads sorted by foot."""
-    recording = item.recording
+    recording = item.recording.without_empty_markers()
     labels = {}
     for (side, bodies), name in zip(feet.items(), ("right", "left"), strict=True):
         worn = [marker.label for marker in model.skeleton.markers if marker.segment in bodies]

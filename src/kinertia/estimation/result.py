@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
+from kinertia.motion.gait_cycle import Stride, strides_of
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Settings, Subject
@@ -41,6 +44,9 @@ class FitPictures(Protocol):
 
     def moments(self, trial: str | None = None) -> Figure:
         """Joint moments per body mass, before against estimate."""
+
+    def cycles(self, kind: Kind = "moment") -> Figure | None:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides."""
 
     def markers(self, trial: str | None = None) -> Figure:
         """Distance between every measured and modelled marker."""
@@ -114,6 +120,11 @@ class TrialFit:
     def coordinates(self) -> pd.DataFrame:
         """Coordinates of the estimate (rad, m) over time."""
         return by_coordinate(self.kinematics, self.motion.q)
+
+    @cached_property
+    def strides(self) -> tuple[Stride, ...]:
+        """Strides of the whole trial, by plates where they saw the foot land, else by the motion; none in squats."""
+        return strides_of(self.skeleton, self.kinematics)
 
     @cached_property
     def moments(self) -> Mapping[str, pd.DataFrame]:
@@ -193,6 +204,44 @@ class Fit:
             return columns
         told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
         return {**columns, **told, "evidence": [evidence(value) for value in told["information"]]}
+
+    def cycles(self, stage: Stage = "estimate") -> pd.DataFrame:
+        """Curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.
+
+        Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent,
+        quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle
+        grows), "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward",
+        "..._medial" (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value`
+        is NaN. `sd` is the posterior deviation of moments, and of powers as far as the moment makes it.
+
+        Args:
+            stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.
+
+        Examples:
+            >>> cycles = fit.cycles()
+            >>> knee = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == "r")]
+            >>> mean = knee.groupby("percent")["value"].mean()
+            >>> len(mean)
+            101
+        """
+        import pandas as pd
+
+        return pd.DataFrame(cycle_columns(self.trials, self.mass_kg, stage))
+
+    @property
+    def spatiotemporal(self) -> pd.DataFrame:
+        """One row per stride: its times, speed, cadence, lengths, step width, stance and double support.
+
+        `on_plates` says whether plates saw both heel strikes; see `kinertia.motion.spatiotemporal` for the others.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(spatiotemporal_columns(self.trials))
+
+    @property
+    def mass_kg(self) -> float:
+        """Body mass as stated."""
+        return known(self.subject.mass_kg)
 
     def save(self, folder: str | Path) -> Path:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""

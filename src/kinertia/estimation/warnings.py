@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinertia.estimation.force_mass import force_mass
 from kinertia.estimation.input_checks import mass_by_force_kg
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.two_level import TwoLevelResult
@@ -16,6 +17,8 @@ from kinertia.trial.free_moment import mean_turning
 
 FORCE_MASS_TOLERANCE = 0.02
 """Scale and mean vertical force may differ by this share before a warning."""
+MOTION_TOLERANCE = 0.05
+"""Mass by the forces may differ by this share between the motion found and the markers' centre."""
 ESTIMATE_TOLERANCE = 0.03
 """Scale and estimated total mass may differ by this share before a warning."""
 CONTRADICTING_COM_M = 0.1
@@ -27,25 +30,45 @@ def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> fl
     return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
 
 
-def fit_warnings(
-    mass_kg: float,
-    literature: BodySegmentParameters,
-    estimate: BodySegmentParameters,
-    trials: Sequence[TrialFit],
-    source: str = "the literature",
+def force_warnings(
+    mass_kg: float, literature: BodySegmentParameters, trials: Sequence[TrialFit], skeleton: Skeleton
 ) -> list[str]:
-    """What the user should know before using the numbers, whatever the estimator.
+    """Trials whose vertical force is not that of the person on the scale, or not that of the motion found.
 
-    `source` says where the parameters before the estimate come from.
+    The first is said of the forces and the markers' centre alone (`force_mass`), so that no motion that we found
+    wrongly can accuse the scale or the plates.
     """
     found = []
     for trial in trials:
-        by_force = mass_from_force_kg(literature, trial)
+        by_markers = force_mass(skeleton, trial.kinematics.trial)
+        if by_markers is None:
+            continue
+        by_force, by_motion = by_markers.mass_kg, mass_from_force_kg(literature, trial)
         if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
             found.append(
                 f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {mass_kg:.1f} kg "
                 f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
             )
+        if abs(by_motion - by_force) > MOTION_TOLERANCE * by_force + 2 * by_markers.sd_kg:
+            found.append(
+                f"{trial.name}: before the estimate the motion does not go with the forces (they would move a body of "
+                f"{by_motion:.1f} kg like this, and one of {by_force:.1f} kg like the markers): inverse kinematics "
+                f"went wrong, not the plates; look at the marker errors over time for the frames where it did"
+            )
+    return found
+
+
+def fit_warnings(
+    mass_kg: float,
+    literature: BodySegmentParameters,
+    estimate: BodySegmentParameters,
+    source: str = "the literature",
+) -> list[str]:
+    """What the user should know before using the parameters, whatever the estimator.
+
+    `source` says where the parameters before the estimate come from.
+    """
+    found = []
     total = estimate.total_mass_kg
     if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
         found.append(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import struct
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -18,17 +17,17 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.io.c3d_plates import LabPlates, lab_plates, to_ground_plates
-from kinertia.io.ezc3d_library import expect_ezc3d, open_c3d
+from kinertia.io.c3d_structure import doubts_about
+from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.number_table import expect_file
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
 _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
-_BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}
-"""By processor (Intel, DEC, MIPS): byte order of integers, and the header byte with the sign of POINT:SCALE,
-which is negative where numbers are stored as floats."""
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
+_PERSON_M = (0.3, 2.8)
+"""How far a person's markers reach in one frame."""
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
 
 
@@ -51,8 +50,10 @@ def read_c3d(path: str | Path) -> Recording:
     path = Path(path)
     file, notes = _open(path)
     parameters = file["parameters"]
-    unit_name, unit = _length_unit(path, parameters)
     labels, positions, label_notes = _markers(path, file)
+    unit_name, unit_notes = _length_unit(path, parameters, positions)
+    unit = METRES_PER_UNIT[unit_name]
+    notes += unit_notes
     time = _times(file, "points")
     plates, plate_notes = lab_plates(path, file, unit)
     rotation, up, axis_notes = _to_ground(path, parameters, unit * positions, plates)
@@ -63,51 +64,27 @@ def read_c3d(path: str | Path) -> Recording:
     return Recording(path.stem, markers, ground_plates, mass, height, measurements, tuple(notes), unit_name, up)
 
 
-def _open(path: Path) -> tuple[Any, list[str]]:
-    """The file as ezc3d holds it, with forces where ezc3d can work them out."""
+def _open(path: Path) -> tuple[C3dContent, list[str]]:
+    """What is in the file, with forces where ezc3d can work them out."""
     expect_file(path)
     expect_ezc3d(path)
-    _expect_complete(path)
+    doubt = doubts_about(path)
     notes = []
     try:
-        file = open_c3d(path, extract_forceplat_data=True)
-    except Exception as trouble:  # ezc3d lets OSError, RuntimeError, IndexError and more through
-        try:
-            file = open_c3d(path)
-        except Exception as error:
-            raise FileError(path, f"broken C3D file ({error}); export it again") from None
-        if _values(file["parameters"], "FORCE_PLATFORM", "USED", [0])[0]:
-            types = ", ".join(map(str, _values(file["parameters"], "FORCE_PLATFORM", "TYPE", [])))
-            notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {trouble}")
+        file = read_apart(path) if doubt else read_content(path)
+    except C3dTrouble as error:
+        found = f"{doubt}; {error}" if doubt else str(error)
+        raise FileError(path, f"broken C3D file ({found}); export it again") from None
+    parameters = file["parameters"]
+    if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
+        types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))
+        notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
     if not file["data"]["points"].shape[1]:
         raise FileError(
             path,
             "has no points; expected marker trajectories (a file of rotations or forces alone is not enough)",
         )
     return file, notes
-
-
-def _expect_complete(path: Path) -> None:
-    """Compare the size with what the header announces: ezc3d reads a truncated file as a shorter one, or as noise."""
-    with path.open("rb") as stream:
-        header = stream.read(512)
-        if not header:
-            raise FileError(path, "the file is empty; expected a C3D file, export it again")
-        if len(header) < 2 or header[1] != 0x50:
-            raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
-        stream.seek(512 * (header[0] - 1))
-        parameters = stream.read(4)
-    size, needed = path.stat().st_size, 512
-    if len(header) == 512 and len(parameters) == 4:
-        order, sign_byte = _BYTE_ORDERS.get(parameters[3], ("<", 15))
-        points, analogs, first, last = struct.unpack_from(f"{order}4H", header, 2)
-        data_block = struct.unpack_from(f"{order}H", header, 16)[0]
-        number = 4 if header[sign_byte] & 0x80 else 2
-        frames = last - first + 1 if first <= last < 0xFFFF else 0  # 16 bits do not hold more
-        data = 512 * (data_block - 1) + number * (4 * points + analogs) * frames
-        needed = max(512 * (header[0] - 1 + parameters[2]), data)
-    if size < needed:
-        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
 
 
 def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
@@ -118,12 +95,27 @@ def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
     return default
 
 
-def _length_unit(path: Path, parameters: Any) -> tuple[str, float]:
-    """Its name and how many metres it is."""
+def _length_unit(path: Path, parameters: Any, positions: FloatArray) -> tuple[str, list[str]]:
+    """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
     unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
-    if unit not in METRES_PER_UNIT:
+    if unit in METRES_PER_UNIT:
+        return unit, []
+    if unit:
         raise FileError(path, f"POINT:UNITS is '{unit}'; expected mm, cm or m, correct the parameter")
-    return unit, METRES_PER_UNIT[unit]
+    whole = positions[np.isfinite(positions).all(axis=(1, 2))]
+    size = float(np.median(np.ptp(whole, axis=1).max(axis=1))) if len(whole) else np.nan
+    low, high = _PERSON_M
+    likely = [name for name, metres in METRES_PER_UNIT.items() if low < size * metres < high]
+    if len(likely) != 1:
+        raise FileError(
+            path,
+            f"POINT:UNITS is empty, and its markers, which reach {size:.3g} units, are a person's in none of mm, cm "
+            f"and m; write the unit into the parameter",
+        )
+    return likely[0], [
+        f"{path.name}: POINT:UNITS is empty; taken as {likely[0]}, in which the markers reach "
+        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, write the unit into the parameter"
+    ]
 
 
 def _times(file: Any, kind: str) -> FloatArray:

@@ -61,6 +61,7 @@ def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, li
         name = f"plate {number}"
         places = unit * platform["corners"].T
         trouble = _corner_trouble(places) or _unit_trouble(file, group, number - 1)
+        trouble = trouble or ("" if platform["force"].size else "it has no samples")
         if trouble:
             notes.append(f"{path.name}: {name} was left out, {trouble}")
             continue
@@ -138,7 +139,7 @@ def _unit_trouble(file: Any, group: Any, plate: int) -> str:
     told = units[channel] if channel < len(units) else ""
     said = "".join(letter for letter in str(told).lower() if letter.isalpha())
     length = str(file["parameters"]["POINT"]["UNITS"]["value"][0]).strip().lower()
-    if said in ("nm", "nmm", "ncm") and said != "n" + length:
+    if length and said in ("nm", "nmm", "ncm") and said != "n" + length:
         return f"its moments are in {told} while points are in {length}"
     return ""
 

@@ -3,12 +3,17 @@
 ezc3d has no wheel for Linux on ARM: Kinertia works there without it, on every file but C3D. On Windows its C++ reads
 the letters of a path in the machine's code page, so that it does not find `C:/Users/Müller/walk.c3d`: such a file
 goes through a copy whose path is ASCII.
+
+Its C++ also ends the process, or never ends, on some damaged files: those are read in a process of their own.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
+import pickle
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -24,6 +29,17 @@ except ImportError:
 
 ONLY_ASCII_PATHS = sys.platform == "win32"
 _COPY = "copy.c3d"
+_SECONDS, _SECONDS_PER_BYTE = 6.0, 1e-5
+_BYTES, _BYTES_PER_BYTE = 800_000_000, 20
+"""How long another process may read a file of so many bytes, and how much memory it may take for that."""
+
+C3dContent = dict[str, Any]
+"""What is used of a file, nested as ezc3d has it: `header`, `parameters`, `data` (without analog values), and
+`trouble`: why the force plates could not be read."""
+
+
+class C3dTrouble(Exception):
+    """What ezc3d says of a file that it cannot read."""
 
 
 def expect_ezc3d(path: Path) -> None:
@@ -36,13 +52,83 @@ def expect_ezc3d(path: Path) -> None:
         )
 
 
-def open_c3d(path: Path, **options: Any) -> Any:
-    """What is in a C3D file, as ezc3d holds it; its own errors come through.
+def read_content(path: Path) -> C3dContent:
+    """What is in a C3D file.
 
     Raises:
-        FileError: ezc3d is not installed.
+        C3dTrouble: ezc3d cannot read it.
     """
-    expect_ezc3d(path)
+    trouble = ""
+    try:
+        file = _opened(path, extract_forceplat_data=True)
+    except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
+        trouble = str(error)
+        try:
+            file = _opened(path)
+        except Exception as worse:
+            raise C3dTrouble(str(worse)) from None
+    data, header = file["data"], file["header"]
+    return {
+        "header": {kind: dict(header[kind]) for kind in ("points", "analogs")},
+        "parameters": {group: dict(entries) for group, entries in dict(file["parameters"]).items()},
+        "data": {
+            "points": data["points"],
+            "analogs": data["analogs"][:, :0],
+            "platform": [dict(plate) for plate in data["platform"]] if "platform" in data else [],
+        },
+        "trouble": trouble,
+    }
+
+
+def read_apart(path: Path) -> C3dContent:
+    """`read_content` in a process of its own, with limits of time and memory.
+
+    Raises:
+        C3dTrouble: ezc3d cannot read it, or breaks down over it.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        result = Path(folder) / "content"
+        command = [sys.executable, "-P", "-m", __name__, str(path.absolute()), str(result)]
+        places = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        seconds = _SECONDS + _SECONDS_PER_BYTE * path.stat().st_size
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=seconds, check=False, env=places)
+        except subprocess.TimeoutExpired:
+            raise C3dTrouble(f"reading it took more than {seconds:.0f} s") from None
+        if not result.is_file():
+            raise C3dTrouble(f"the library that reads it broke down, exit status {done.returncode}")
+        content = pickle.loads(result.read_bytes())
+    if isinstance(content, str):
+        raise C3dTrouble(content)
+    return dict(content)
+
+
+def _read_for_another(path: str, result: str) -> None:
+    """`read_content` for the process that waits for `result`, which is written whole or not at all."""
+    if sys.platform != "win32":  # there time has to be limit enough
+        import resource
+
+        limit = _BYTES + _BYTES_PER_BYTE * Path(path).stat().st_size + _virtual_size()
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        content: C3dContent | str = read_content(Path(path))
+    except (C3dTrouble, MemoryError) as trouble:
+        content = str(trouble) or "it needs too much memory"
+    half = Path(result + ".half")
+    half.write_bytes(pickle.dumps(content))
+    half.replace(result)
+
+
+def _virtual_size() -> int:
+    """Bytes of address space that this process has with its libraries, on Linux; elsewhere nothing to speak of."""
+    with contextlib.suppress(OSError, ValueError):
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * 4096
+    return 0
+
+
+def _opened(path: Path, **options: Any) -> Any:
+    """What is in a C3D file, as ezc3d holds it; its own errors come through."""
     if _found_by_ezc3d(path):
         return ezc3d.c3d(str(path), **options)
     with _elsewhere(path) as original:
@@ -80,3 +166,7 @@ def _elsewhere(path: Path) -> Iterator[Path]:
     whole = path.absolute()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         yield whole
+
+
+if __name__ == "__main__":
+    _read_for_another(*sys.argv[1:])

@@ -8,6 +8,8 @@ from pathlib import Path
 
 _DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
+RESULT_FILES = ("fit.json", "report.html", "bsp.csv", "model.osim", "model_changes.csv")
+"""What the results of several trials have beside the folders of the trials."""
 _DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 
 
@@ -27,8 +29,16 @@ def same_folder(one: str, other: str) -> bool:
 
 def path_from(folder: Path, written: str) -> Path:
     """A path as it stands in a file, counted from a folder; backslashes are separators unless a file has them."""
-    path = folder / Path(written).expanduser()
-    return path if path.is_file() else folder / Path(written.replace("\\", "/")).expanduser()
+    path = folder / _at_home(written)
+    return path if path.is_file() else folder / _at_home(written.replace("\\", "/"))
+
+
+def _at_home(written: str) -> Path:
+    """With the user's folder in place of ~; as it is where there is no such user."""
+    try:
+        return Path(written).expanduser()
+    except RuntimeError:
+        return Path(written)
 
 
 def path_trouble(written: str) -> str | None:

@@ -79,7 +79,7 @@ def read_forces_with_notes(
         tuple(group.foot for group in groups),
         noise_n=tuple(plate.noise_n for plate in wrenches),
     )
-    return loads, (*notes, *_remarks(path, loads, groups))
+    return loads, (*notes, *table.notes, *_remarks(path, loads, groups))
 
 
 def _expect_steady_time(path: Path, time: FloatArray) -> None:
@@ -185,6 +185,8 @@ def _external_loads(path: Path) -> ElementTree.Element:
         raise FileError(
             path, f"not XML ({error}); expected an ExternalLoads file, export it again", error.position[0]
         ) from None
+    except (LookupError, ValueError) as error:  # what Python's codecs say of its encoding
+        raise FileError(path, f"not XML ({error}); save it as UTF-8", 1) from None
     if root.find(".//ExternalForce") is None:
         raise FileError(path, "no ExternalForce in it; expected an OpenSim ExternalLoads file")
     return root

@@ -6,32 +6,87 @@ import json
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from uuid import uuid4
 
 from kinertia.errors import FileError
+from kinertia.io.folder_exchange import put_in_place
+from kinertia.io.working_folder import BEFORE, sweep, working_folder
 
 GENERATOR = '<meta name="generator" content="kinertia'
 """In the head of every HTML page that is a result of its own."""
 _TELLING = (".json", ".html")
 """Types of the result files that name Kinertia as what made them."""
-_NEW, _BEFORE = "new", "before"
-"""Parts of the temporary folder: results to be, and the files that they replace."""
+_WRITTEN = ".kinertia.json"
+"""Which files are Kinertia's, in every folder that it wrote to: lists of names by what they are results of."""
+INTERRUPTIONS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
+)
+"""Ctrl-C, the request to end, and the end of the terminal, as far as the system has them."""
+_RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", ".xml", ".toml", ".md", ".png"}
+"""Types of files that results have."""
 
 
-def check_folder(folder: str | Path) -> None:
+def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
     """Raise FileError unless results can be written to `folder`, which need not exist yet.
 
-    Worth calling before a long computation.
+    Worth calling before a long computation. Also removes what runs left beside it that were killed.
+
+    Args:
+        folder: is replaced as a whole when results are complete, with everything else that is in it.
+        sub_folders: names in it that results need as folders.
     """
-    existing = _existing(Path(folder))
-    if not existing.is_dir():
-        raise FileError(existing, "is a file; give a folder for the results")
-    _hidden_folder(existing).rmdir()  # Windows does not tell otherwise whether that is allowed
+    folder = _real(folder)
+    parent = _existing(folder.parent)
+    for place in (parent, folder):
+        if place.exists() and not place.is_dir():
+            raise FileError(place, "is a file; give a folder for the results")
+    sweep(parent)
+    with working_folder(parent):  # Windows does not tell otherwise whether that is allowed
+        pass
+    if not folder.is_dir():
+        return
+    if trouble := _irreplaceable(folder):
+        problem = f"{trouble}, and results replace their folder as a whole; give a folder inside it ({folder / 'out'})"
+        raise FileError(folder, problem)
+    for path in folder.rglob("*"):
+        if path.is_dir() and path.suffix.lower() in _RESULTS and path.name not in sub_folders:
+            raise FileError(path, "is a folder where a file of the results may go; rename it, or give another folder")
+        if path.is_file() and path.parent == folder and path.name in sub_folders:
+            raise FileError(path, "is a file where a folder of the results goes; rename it, or give another folder")
+    if sys.platform == "win32" and (held := _open_elsewhere(folder)):
+        raise FileError(held[0], "is open in another program; close it there, and run the command again")
+
+
+def _real(folder: str | Path) -> Path:
+    """The folder itself where the path is a link to it."""
+    return Path(os.path.realpath(folder))
+
+
+def _irreplaceable(folder: Path) -> str:
+    """Why a folder cannot be replaced by another, if so."""
+    here = Path.cwd().resolve()
+    if folder == here or folder in here.parents:
+        return "is the current folder, or holds it"
+    if os.path.ismount(folder):
+        return "is a drive or mounted folder"
+    return "" if os.access(folder, os.W_OK) else "cannot be written to"
+
+
+def _open_elsewhere(folder: Path) -> list[Path]:
+    """Files that another program has open, as Windows tells."""
+    held = []
+    for path in sorted(folder.rglob("*")):
+        try:
+            if path.is_file():
+                path.open("r+b").close()
+        except OSError:
+            held.append(path)
+    return held
 
 
 def expect_own_folder(folder: str | Path) -> None:
@@ -76,81 +131,105 @@ def _existing(folder: Path) -> Path:
     return existing
 
 
-def _hidden_folder(within: Path) -> Path:
-    """A new folder of a name of its own."""
-    folder = within / f".kinertia.{uuid4().hex[:12]}"
-    try:
-        folder.mkdir()
-    except OSError as error:
-        problem = f"cannot be written to ({error.strerror}); give another folder for the results"
-        raise FileError(within, problem) from error
-    return folder
-
-
 @contextmanager
-def complete_folder(folder: str | Path) -> Iterator[Path]:
-    """A hidden temporary folder; its files are moved into `folder` when the block ends without an error.
+def complete_folder(folder: str | Path, kind: str) -> Iterator[Path]:
+    """A hidden folder for new results, which take the place of those in `folder` when the block ends without an error.
 
-    Files of the same name are replaced, others in `folder` stay. After an error or Ctrl-C nothing of the block is left,
-    and what was there before is as it was; Ctrl-C during the moving takes effect after it.
+    They replace all files of the last results of this kind, not only those of the same names; what else is in `folder`
+    stays. The folder is replaced as a whole and at once: whoever looks, and whatever happens to this process, finds the
+    old results or the new ones. After an error or an interruption everything is as it was; an interruption while
+    folders are being exchanged takes effect after that.
+
+    Args:
+        folder: is made if need be.
+        kind: what they are results of, "fit" for one; results of other kinds stay.
 
     Raises:
-        FileError: the folder cannot be written to, or a file in it not be replaced.
+        FileError: the folder cannot be written to or replaced.
     """
-    folder = Path(folder)
+    folder = _real(folder)
     check_folder(folder)
-    work = _hidden_folder(_existing(folder))
-    try:
-        (work / _NEW).mkdir()
-        yield work / _NEW
+    with working_folder(_existing(folder.parent)) as work:
+        new = work / "new"
+        new.mkdir()
+        yield new
         with _uninterrupted():
-            _move_all(work, folder)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+            _replace(new, folder, kind, work / BEFORE / folder.name)
 
 
-def _move_all(work: Path, folder: Path) -> None:
-    """Move every new file to its place in `folder`, and what it replaces out of the way: all of them or none.
+def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
+    """Complete `new` with the lists of files and with what stays in `folder`, and put it there."""
+    written = _written(new)
+    others = {name for names in written.values() for name in names}
+    written[kind] = sorted(_files(new) - others - {_WRITTEN})
+    listed = _written(folder)
+    old = {name for one in written for name in listed.get(one, ())} | {_WRITTEN}
+    everything = {**{one: names for one, names in listed.items() if one not in written}, **written}
+    (new / _WRITTEN).write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
+    try:
+        staying = _files(folder) - old - _files(new)
+        for name in sorted(staying):
+            _link(folder / name, new / name)
+        if folder.is_dir():
+            shutil.copystat(folder, new)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        before = put_in_place(new, folder, aside)
+    except OSError as error:
+        held = _open_elsewhere(folder) if sys.platform == "win32" else []
+        problem = (
+            f"cannot be replaced ({error.strerror}): nothing was written; close the program that has it or one of its "
+            "files open, and run the command again"
+        )
+        raise FileError(held[0] if held else folder, problem) from error
+    for name in _files(before) - staying - old - _files(folder):  # came in the meantime
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(before / name, folder / name)
 
-    Windows lets nobody replace a file that another program has open.
-    """
-    done: list[tuple[Path, Path]] = []
 
-    def move(source: Path, target: Path) -> None:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(source, target)
-        done.append((source, target))
+def _written(folder: Path) -> dict[str, list[str]]:
+    """Files that Kinertia wrote to this folder, by kind; none where it does not say."""
+    try:
+        told = json.loads((folder / _WRITTEN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(told, dict):
+        return {}
+    return {kind: [str(name) for name in names] for kind, names in told.items() if isinstance(names, list)}
 
-    for path in sorted(path for path in (work / _NEW).rglob("*") if path.is_file()):
-        name = path.relative_to(work / _NEW)
-        try:
-            if (folder / name).is_file():
-                move(folder / name, work / _BEFORE / name)
-            move(path, folder / name)
-        except OSError as error:
-            for source, target in reversed(done):
-                os.replace(target, source)
-            problem = (
-                f"cannot be replaced ({error.strerror}): nothing was written; close the program that has it open, and "
-                "run the command again"
-            )
-            raise FileError(folder / name, problem) from error
+
+def _files(folder: Path) -> set[str]:
+    """Names of all files and links in a folder, from there."""
+    return {
+        (Path(place) / name).relative_to(folder).as_posix()
+        for place, folders, names in os.walk(folder)
+        for name in (*names, *(one for one in folders if (Path(place) / one).is_symlink()))
+    }
+
+
+def _link(source: Path, target: Path) -> None:
+    """The same file in another folder, too; a copy where the file system has no links."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except (OSError, NotImplementedError):
+        shutil.copy2(source, target, follow_symlinks=False)
 
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Holds Ctrl-C back until the block is done; only the main thread can, and only it is interrupted."""
+    """Holds interruptions back until the block is done; only the main thread can, and only it is interrupted."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     caught: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: caught.append(number))
+    before = {number: signal.signal(number, lambda n, _: caught.append(n)) for number in INTERRUPTIONS}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if caught:
-        raise KeyboardInterrupt
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    for number in caught:
+        signal.raise_signal(number)
 
 
 def write_then_rename(path: Path, text: str) -> None:

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from kinertia.errors import FileError, TrialError
 from kinertia.io.ground_forces import read_forces_with_notes
 from kinertia.io.number_table import expect_file
 from kinertia.io.trc import read_trc_recording
 from kinertia.trial.data import Recording
+
+_FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
+"""Farther and stronger than anything in a laboratory."""
 
 
 def read_recording(
@@ -43,6 +48,7 @@ def read_recording(
             notes = (f"{markers_path.name}: its own force plates were not used, the force file was", *notes)
         recording = replace(recording, plates=plates, notes=(*recording.notes, *notes))
     _expect_overlap(recording)
+    _expect_laboratory(markers_path, recording)
     return recording
 
 
@@ -57,6 +63,30 @@ def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
     if path.suffix.lower() not in suffixes:
         raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}")
     expect_file(path)
+
+
+def _expect_laboratory(path: Path, recording: Recording) -> None:
+    """Raise a FileError that names a place or load that no laboratory has: a broken number spoils all that follows."""
+    markers, plates = recording.markers, recording.plates
+    far = np.argwhere(np.abs(markers.positions) > _FARTHEST_M)
+    if far.size:
+        frame, marker, axis = far[0]
+        raise FileError(
+            path,
+            f"marker {markers.labels[marker]} is {markers.positions[frame, marker, axis]:.3g} m away at "
+            f"{markers.time[frame]:g} s; expected at most {_FARTHEST_M:g} m: repair the number, or the unit of lengths",
+        )
+    if plates is None:
+        return
+    loads = np.concatenate((plates.force, plates.moment / _FARTHEST_M), axis=2)
+    strong = np.argwhere(~(np.abs(loads) < _STRONGEST_N))
+    if strong.size:
+        frame, plate, axis = strong[0]
+        raise TrialError(
+            recording.name,
+            f"{plates.names[plate]} has a {'force' if axis < 3 else 'moment'} that no plate measures at "
+            f"{plates.time[frame]:g} s; repair the number, or the unit of forces",
+        )
 
 
 def _expect_overlap(recording: Recording) -> None:

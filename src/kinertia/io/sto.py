@@ -31,12 +31,14 @@ class TimeTable:
         labels: of the k columns.
         values: (n, k).
         in_degrees: whether its angles are in degrees; None where the file does not say.
+        notes: what was assumed while reading, one sentence each.
     """
 
     time: FloatArray
     labels: tuple[str, ...]
     values: FloatArray
     in_degrees: bool | None
+    notes: tuple[str, ...] = ()
 
     def columns(self, labels: Sequence[str]) -> FloatArray:
         """(n, c) the columns of these labels."""
@@ -70,13 +72,15 @@ def read_table(path: str | Path) -> TimeTable:
         raise FileError(path, "ends after 'endheader'; expected column labels and rows, export the file again", end)
     labels = _labels(path, lines[label_line - 1], label_line)
     values, line_numbers = read_rows(path, lines, label_line + 1, len(labels))
-    _check_counts(path, header, len(values), len(labels))
+    if not len(values):
+        raise FileError(path, "no rows after the column labels; export the file again")
+    notes = _wrong_counts(path, header, len(values), len(labels))
     time = values[:, 0]
     if np.isnan(time).any():
         raise FileError(path, "the row has no time", line_numbers[int(np.argmax(np.isnan(time)))])
     told = header.get("indegrees")
     in_degrees = None if told is None else told[0].lower() == "yes"
-    return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees)
+    return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees, notes)
 
 
 def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str, remark: str = "") -> None:
@@ -139,17 +143,14 @@ def _labels(path: Path, line: str, number: int) -> list[str]:
     return labels
 
 
-def _check_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> None:
+def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> tuple[str, ...]:
+    """What the header says that the file has not: a note, since the rows say what is there (OpenSim reads it, too)."""
+    notes = []
     for keys, found, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns")):
-        for key in keys:
-            if key not in header:
-                continue
-            told, line = header[key]
+        for told, line in (header[key] for key in keys if key in header):
             if not told.isdigit() or int(told) != found:
-                raise FileError(
-                    path,
-                    f"the header announces {told} {what} but the file has {found}; export the file again or correct it",
-                    line,
+                notes.append(
+                    f"{path.name}: line {line} of its header announces {told} {what}, the file has {found}: all of "
+                    f"them were read"
                 )
-    if not rows:
-        raise FileError(path, "no rows after the column labels; export the file again")
+    return tuple(notes)

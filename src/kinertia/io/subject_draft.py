@@ -33,6 +33,9 @@ def init_subject(folder: str | Path) -> str:
     if not folder.is_dir():
         raise FileError(folder, "no such folder; give the one that holds the recordings")
     files = sorted(folder.iterdir())
+    for file in files:
+        if not _is_utf8(file.name):
+            raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
     c3d = [file for file in files if file.suffix.lower() == ".c3d"]
     trc = [file for file in files if file.suffix.lower() == ".trc"]
     captures = c3d + [file for file in trc if file.stem not in [twin.stem for twin in c3d]]
@@ -93,6 +96,14 @@ def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path
     # of equals `max` takes the first, so that unrelated names all go to the first static trial
     owners = [max(statics, key=lambda s: _common_start(s.stem, file.stem)) for file in dynamic]
     return owners[0], [file for file, owner in zip(dynamic, owners, strict=True) if owner == owners[0]]
+
+
+def _is_utf8(name: str) -> bool:
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _common_start(a: str, b: str) -> int:

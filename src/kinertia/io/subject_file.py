@@ -44,7 +44,7 @@ from pydantic import (
 )
 
 from kinertia.errors import FileError, SettingsError, SubjectError
-from kinertia.io.file_names import fits_everywhere, path_from, path_trouble, same_folder
+from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, path_trouble, same_folder
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
@@ -150,6 +150,22 @@ class SubjectFile(Table):
     instruments: InstrumentsFiles = InstrumentsFiles()
 
 
+def subject_file_in(folder: Path) -> Path:
+    """The subject file of a folder: `subject.toml`, or the only .toml file there.
+
+    Raises:
+        FileError: there is none, or several of which none is called subject.toml.
+    """
+    found = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml")
+    named = [path for path in found if path.name.lower() == "subject.toml"] or found
+    if len(named) == 1:
+        return named[0]
+    if not named:
+        raise FileError(folder, f"holds no subject file; draft one with: kinertia init {folder}")
+    listed = ", ".join(path.name for path in named)
+    raise FileError(folder, f"holds several .toml files ({listed}) and none is subject.toml; name the one you mean")
+
+
 def read_subject(path: str | Path) -> SubjectFile:
     """Read and check a subject file.
 
@@ -193,6 +209,8 @@ def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
                 "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...); "
                 'give the trial a name = "..." of its own'
             )
+        if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
+            return index, f'the results have a file {taken}, not a folder; give this trial a name = "..." of its own'
         for before in names[:index]:
             if same_folder(before, name):
                 same = "" if before == name else "; Windows and macOS take both for one folder"

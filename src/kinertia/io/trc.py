@@ -40,20 +40,17 @@ def read_trc_recording(path: str | Path) -> Recording:
     labels = _labels(path, lines, _count(path, header, "NumMarkers"))
     values, line_numbers = read_rows(path, lines, _first_row(lines), 2 + 3 * len(labels), may_be_short=True)
     frames = _count(path, header, "NumFrames")
-    if len(values) != frames or not frames:
-        raise FileError(
-            path,
-            f"the header announces {frames} frames but the file has {len(values)}; export the file again or "
-            "correct NumFrames",
-            3,
-        )
+    if not len(values):
+        raise FileError(path, f"the header announces {frames} frames but the file has 0; export the file again", 3)
+    counted = f"{path.name}: its header announces {frames} frames, the file has {len(values)}: all of them were read"
+    count_notes = () if len(values) == frames else (counted,)
     time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
     positions, position_notes = _positions(path, values[:, 2:], labels, line_numbers)
     unit = header["Units"].lower()
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
     markers = Markers(time, labels, positions * METRES_PER_UNIT[unit])
-    return Recording(path.stem, markers, notes=(*time_notes, *position_notes), length_unit=unit)
+    return Recording(path.stem, markers, notes=(*count_notes, *time_notes, *position_notes), length_unit=unit)
 
 
 def write_trc(path: str | Path, markers: Markers) -> None:

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.errors import MarkerSetError
 from kinertia.model import joint_centres as jc
 from kinertia.model.anthropometry import BodyGeometry
+from kinertia.model.coordinate_range import Range
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial.data import Recording
@@ -33,6 +34,23 @@ ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", 
 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
 """Held still where no marker shows them, as with a lower-body marker set; all others a trial must show."""
+
+_USUAL_DEG = {
+    "hip_flexion": (-40.0, 130.0),
+    "hip_adduction": (-60.0, 45.0),
+    "hip_rotation": (-60.0, 60.0),
+    "knee_angle": (-15.0, 150.0),
+    "ankle_angle": (-60.0, 45.0),
+    "subtalar_angle": (-45.0, 45.0),
+    "lumbar_extension": (-90.0, 60.0),
+    "lumbar_bending": (-60.0, 60.0),
+    "lumbar_rotation": (-60.0, 60.0),
+    "arm_flex": (-90.0, 150.0),
+    "arm_add": (-120.0, 60.0),
+    "elbow_flex": (-15.0, 155.0),
+}
+"""How far people move, and somewhat more. These ranges only tell equal poses apart: a joint goes beyond where its
+markers do."""
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -100,8 +118,18 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
                 f"the static trial gives no frame for the {joint.child}: landmarks of it or of the {joint.parent} "
                 f"coincide or lie in line; check the static trial and the marker set '{marks.marker_set.name}'"
             )
-    skeleton = Skeleton("gait27", tuple(joints), _markers(marks, frames), locked)
+    skeleton = Skeleton("gait27", tuple(joints), _markers(marks, frames), locked, ranges=_usual_ranges(joints))
     return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
+
+
+def _usual_ranges(joints: list[Joint]) -> dict[str, Range]:
+    names = {axis.coordinate for joint in joints for axis in joint.axes}
+    known = [(name, _USUAL_DEG.get(name.removesuffix("_r").removesuffix("_l"))) for name in sorted(names)]
+    return {
+        name: Range(float(np.radians(ends[0])), float(np.radians(ends[1])), clamped=False)
+        for name, ends in known
+        if ends is not None
+    }
 
 
 def _root() -> Joint:

@@ -70,13 +70,3 @@ class Root:
             angles = Rotation.from_matrix(turned).as_davenport(self.turns.T, "intrinsic")
         slides = np.linalg.solve(self._slides, (centre - self.translation).T).T
         return np.hstack([slides, angles])
-
-    @staticmethod
-    def turned_back(q: np.ndarray) -> np.ndarray:
-        """The same orientations with the second angle within a right angle of zero; the others are its twin."""
-        twin = np.cos(q[:, 4]) < 0
-        q = q.copy()
-        q[twin, 3] += np.pi
-        q[twin, 4] = np.arcsin(np.sin(q[twin, 4]))
-        q[twin, 5] += np.pi
-        return q

@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_map import CoordinateMap
+from kinertia.model.coordinate_range import Bounds, Range
 from kinertia.model.kinematic_tree import KinematicTree, poses
 from kinertia.model.moved_parameters import moved_parameters
 from kinertia.model.root_joint import Root
@@ -102,6 +103,7 @@ class Skeleton:
         feet: the segments that the ground acts on, right and left.
         start: coordinates from which inverse kinematics starts elsewhere than from zero (rad or m).
         carried: parameters of segments that are given once and for all; `bodies` adds others to them.
+        ranges: between which values coordinates move (rad or m), where that is known.
 
     Examples:
         >>> skeleton = kinertia.walking_subject().skeleton
@@ -117,6 +119,7 @@ class Skeleton:
     feet: tuple[str, str] = ("foot_r", "foot_l")
     start: Mapping[str, float] = field(default_factory=dict)
     carried: BodySegmentParameters | None = None
+    ranges: Mapping[str, Range] = field(default_factory=dict)
 
     @cached_property
     def segments(self) -> tuple[str, ...]:
@@ -140,6 +143,11 @@ class Skeleton:
         shaped = {axis.coordinate for axis in self._axes if axis.kind == "translation" or axis.function is not None}
         result: np.ndarray = self.rotational & np.array([name not in shaped for name in self.coordinates])
         return result
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """The ranges of the coordinates as arrays."""
+        return Bounds.of(self.coordinates, self.ranges)
 
     @property
     def _axes(self) -> list[Axis]:

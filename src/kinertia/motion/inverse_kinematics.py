@@ -1,35 +1,43 @@
 """Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
-once, by Gauss-Newton steps with an analytic Jacobian (`kinertia.motion.marker_sums`). Frames are independent problems.
-A coarse pass over a frame every tenth of a second gives the warm start of all the others.
+once (`pose_fit`). Several poses may fit a frame nearly as well, and several sets of angles mean the same pose: an arm
+turned by half a turn with the elbow bent backwards, a foot upside down. So frames a tenth of a second apart are solved
+first; of equally good poses each takes the one that goes on from its neighbour, outwards from the frame that fits best,
+and of equal angles those that do not jump (`equal_angles`). All other frames start from there.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion import marker_sums
+from kinertia.motion.equal_angles import EqualAngles
 from kinertia.motion.frames_at_once import pieces
-from kinertia.motion.marker_sums import damped_steps
+from kinertia.motion.held_errors import HeldErrors
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.pose_fit import BEYOND_M2, PoseFit, Stop, fit_poses
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 
 _WARM_START_EVERY_S = 0.1
-_FAR = 1.0
-"""Rad or m between frames so far apart: more than a person moves."""
+_FAR_RAD_S, _FAR_RAD = 10.0, 0.2
+"""Rad or m between frames: faster than this, beyond a start, hardly anybody moves: the frame starts from its neighbour
+as well."""
+_AS_GOOD, _AS_GOOD_M2 = 1.05, 1e-7
+"""A pose is as good as another if its squared distances are at most so many times the other's, and this much more."""
 MOST_STEPS = 60
-_STEP_TOLERANCE = 1e-5
-"""Rad or m; the step below it is still taken and leaves an error several times smaller."""
-_WOUND_RAD, _ANEW_RAD = 2.6, 1.0
-"""Frames that did not converge, or have a joint turned farther than the first (a foot upside down fits its markers
-nearly as well), start anew with no joint farther than the second from neutral."""
+_ROUNDS = 6
+"""How often frames with gaps are solved again: each round leaves about half of what the pose was off."""
+_DOUBTED_RAD, _ANEW_RAD = 0.5, 1.0
+_DOUBTED, _DOUBTED_M = 2.0, 0.005
+"""Frames that did not converge, are farther beyond a range than the first, or miss their markers by more than the third
+times what is usual in the trial and by more than the fourth (RMS), start anew with no joint farther than the second
+from its neutral angle."""
 _UNINFORMED_RAD_PER_M = 60.0
 """A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
 
@@ -58,14 +66,6 @@ class InverseKinematics:
     def marker_rms_m(self) -> float:
         """Root mean square of the marker distances over all visible markers and frames."""
         return rms(self.errors_m)
-
-
-@dataclass(frozen=True)
-class _Stop:
-    """When to stop: as `solve_ik` takes it."""
-
-    gain_tolerance_m2: float
-    most_steps: int
 
 
 @one_blas_thread
@@ -102,24 +102,40 @@ def solve_ik(
             name,
             "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
         )
-    fine, stop = np.flatnonzero(placed), _Stop(gain_tolerance_m2, most_steps)
-    if consecutive and len(fine) > 1:
-        every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz))
-        coarse = np.unique(np.append(fine[::every], fine[-1]))
-        q_coarse, _, _ = _best_fit(model, measured[coarse], q[coarse], stop)
-        _carry_on(model, measured[coarse], q_coarse, stop)
-        q_coarse[:, model.periodic] = np.unwrap(q_coarse[:, model.periodic], axis=0)
-        q[fine] = PchipInterpolator(coarse, q_coarse)(fine)
-    converged, errors = np.zeros(len(q), dtype=bool), np.full(measured.shape[:2], np.nan)
-    for some in (fine[piece] for piece in pieces(len(fine))):
-        fitted, converged[some], normal = _best_fit(model, measured[some], q[some], stop)
-        errors[some] = _misses(model, measured[some], fitted)
-        q[some] = np.where(_uninformed(normal), np.nan, fitted)
-    q[~placed] = np.nan
-    q[:, :6] = model.root.turned_back(q[:, :6])
+    fine, equal = np.flatnonzero(placed), EqualAngles.of(model)
+    stop = Stop(gain_tolerance_m2, most_steps)
+    choosing = replace(stop, beyond_m2=BEYOND_M2)
     if consecutive:
-        _unwrap(q, model)
+        every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz)) if len(fine) > 1 else 1
+        coarse = np.unique(np.append(fine[::every], fine[-1]))
+        found = _best_fit(model, measured[coarse], q[coarse], choosing)
+        _carry_on(model, measured[coarse], markers.time[coarse], found, equal, choosing)
+        if len(coarse) > 1:
+            q[fine] = PchipInterpolator(coarse, equal.continuous(found.q))(fine)
+    converged, informed = np.zeros(len(q), dtype=bool), np.zeros(q.shape, dtype=bool)
+    for some in (fine[piece] for piece in pieces(len(fine))):
+        if not consecutive:
+            q[some] = _best_fit(model, measured[some], q[some], choosing).q
+        found = fit_poses(model, measured[some], q[some], stop)
+        if consecutive:
+            _carry_on(model, measured[some], markers.time[some], found, equal, stop)
+        q[some], converged[some], informed[some] = found.q, found.converged, ~_uninformed(found.normal)
+    if consecutive:
+        _hold_in_gaps(model, measured, placed, q, stop)
+    errors = np.full(measured.shape[:2], np.nan)
+    for some in (fine[piece] for piece in pieces(len(fine))):
+        errors[some] = _misses(model, measured[some], q[some])
+    q[~informed] = np.nan
+    q = equal.continuous(q) if consecutive else equal.nearest(q, np.broadcast_to(equal.neutral, q.shape))
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
+
+
+def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: np.ndarray, stop: Stop) -> None:
+    """Solve frames that lack markers again, with these as far off the model as before and after (`held_errors`)."""
+    gaps = HeldErrors(measured, placed)
+    for _ in range(_ROUNDS):
+        for some in (gaps.frames[piece] for piece in pieces(len(gaps.frames))):
+            q[some] = fit_poses(model, gaps.filled(model, q, some), q[some], stop).q
 
 
 def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -128,48 +144,72 @@ def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
     return result
 
 
-def _best_fit(
-    model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`_gauss_newton`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
-    q, converged, normal = _gauss_newton(model, measured, q, stop)
-    joints = np.abs(q[:, 6:][:, model.rotational[6:]])
-    doubtful = np.flatnonzero(~converged | (joints.max(axis=1, initial=0.0) > _WOUND_RAD))
+def _best_fit(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) -> PoseFit:
+    """`fit_poses`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
+    found = fit_poses(model, measured, q, stop)
+    doubtful = np.flatnonzero(_doubtful(model, measured, found))
     if doubtful.size:
-        anew = q[doubtful]
-        anew[:, 6:] = np.clip(anew[:, 6:], -_ANEW_RAD, _ANEW_RAD)
-        anew, settled, shown = _gauss_newton(model, measured[doubtful], anew, stop)
-        old, new = (
-            np.nansum(np.square(_misses(model, measured[doubtful], one)), axis=1) for one in (q[doubtful], anew)
-        )
-        better = new <= old * (1.0 + 1e-6) + 1e-12
-        kept = doubtful[better]
-        q[kept], converged[kept], normal[kept] = anew[better], settled[better], shown[better]
-    return q, converged, normal
+        anew, neutral = found.q[doubtful], q[doubtful]
+        anew[:, 6:] = np.clip(anew[:, 6:], neutral[:, 6:] - _ANEW_RAD, neutral[:, 6:] + _ANEW_RAD)
+        other = fit_poses(model, measured[doubtful], anew, stop)
+        found.put(doubtful, other, _as_good(other.cost_m2, found.cost_m2[doubtful]))
+    return found
 
 
-def _carry_on(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop) -> None:
-    """Start frames that lie far from their neighbour again from there; they keep what fits better.
+def _doubtful(model: Skeleton, measured: np.ndarray, found: PoseFit) -> np.ndarray:
+    seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
+    miss = np.sqrt(found.cost_m2 / seen)
+    beyond = np.abs(model.bounds.beyond(found.q)).max(axis=1) > _DOUBTED_RAD
+    result: np.ndarray = ~found.converged | beyond | (miss > np.maximum(_DOUBTED * np.median(miss), _DOUBTED_M))
+    return result
 
-    An arm turned by half a turn with the elbow bent backwards fits its markers nearly as well.
+
+def _as_good(cost: np.ndarray, other: np.ndarray) -> np.ndarray:
+    result: np.ndarray = cost <= _AS_GOOD * other + _AS_GOOD_M2
+    return result
+
+
+def _carry_on(
+    model: Skeleton, measured: np.ndarray, time: np.ndarray, found: PoseFit, equal: EqualAngles, stop: Stop
+) -> None:
+    """Start frames that lie far from their neighbours again from there, outwards from the best one and back.
+
+    On the way out they keep what is as good, so that all frames are on the branch of the best; on the way back, what is
+    clearly better.
     """
-    count = len(q)
-    for order, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
-        for k in order:
-            change = q[k] - q[k + step]
-            change[model.periodic] = (change[model.periodic] + np.pi) % (2 * np.pi) - np.pi
-            if np.abs(change).max() < _FAR:
+    far = _far(equal, time, found.q)
+    if not far.any():
+        return
+    count, best = len(time), int(np.argmin(_strangeness(measured, found, equal)))
+    outwards = [(k, k - 1) for k in range(best + 1, count)] + [(k, k + 1) for k in range(best - 1, -1, -1)]
+    back = [(k, k + 1) for k in range(count - 2, -1, -1)] + [(k, k - 1) for k in range(1, count)]
+    for pairs, returning in ((outwards, False), (back, True)):
+        for k, beside in pairs:
+            if not far[min(k, beside)]:
                 continue
-            again, _, _ = _gauss_newton(model, measured[[k]], q[[k + step]], stop)
-            old, new = (np.nansum(np.square(_misses(model, measured[[k]], at))) for at in (q[[k]], again))
-            if new < old:
-                q[k] = again[0]
+            again = fit_poses(model, measured[[k]], found.q[[beside]], stop)
+            cost = found.cost_m2[[k]]
+            better = ~_as_good(cost, again.cost_m2) if returning else _as_good(again.cost_m2, cost)
+            found.put(np.array([k]), again, better)
+            near = slice(max(k - 1, 0), k + 2)
+            far[near.start : near.start + len(time[near]) - 1] = _far(equal, time[near], found.q[near])
 
 
-def _unwrap(q: np.ndarray, model: Skeleton) -> None:
-    for c in np.flatnonzero(model.periodic):
-        seen = np.isfinite(q[:, c])
-        q[seen, c] = np.unwrap(q[seen, c])
+def _far(equal: EqualAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """(n - 1,) True where a person hardly moves from one of the poses q (n, c) to the next."""
+    change = np.abs(equal.nearest(q[1:], q[:-1]) - q[:-1]).max(axis=1)
+    result: np.ndarray = change > _FAR_RAD + _FAR_RAD_S * np.diff(time)
+    return result
+
+
+def _strangeness(measured: np.ndarray, found: PoseFit, equal: EqualAngles) -> np.ndarray:
+    """(n,) m2, mean squared marker distances, and one square centimetre per square rad away from neutral."""
+    seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
+    away = np.square(
+        equal.nearest(found.q, np.broadcast_to(equal.neutral, found.q.shape))[:, 6:] - equal.neutral[6:]
+    ).mean(axis=1)
+    result: np.ndarray = found.cost_m2 / seen + 1e-4 * away
+    return result
 
 
 def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -192,54 +232,6 @@ def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.nd
     flip[:, 2] = np.sign(np.linalg.det(u @ vt))
     rotation = (u * flip[:, None, :]) @ vt
     return model.root.coordinates(rotation, mean_there - (rotation @ mean_here[..., None])[..., 0]), placed
-
-
-def _gauss_newton(
-    model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: _Stop
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Minimise the squared marker distances frame by frame; returns q (n, c), (n,) converged, J^T J (n, c, c).
-
-    Steps are damped (Levenberg) per frame: a step that makes the fit worse is taken back and the damping raised.
-    """
-    q = q.copy()
-    n = len(q)
-    damping = np.full(n, 1e-6)
-    best = np.full(n, np.inf)
-    accepted = q.copy()
-    step = np.zeros_like(q)
-    converged = np.zeros(n, dtype=bool)
-    active = np.arange(n)
-    normal = np.zeros((n, q.shape[1], q.shape[1]))
-    gradient = np.zeros_like(q)
-    for _ in range(stop.most_steps):
-        h, g, cost = normal_equations(model, measured[active], q[active])
-        better = cost <= best[active] * (1 + 1e-12)
-        up = active[better]
-        best[up], accepted[up] = cost[better], q[up]
-        normal[up], gradient[up] = h[better], g[better]
-        damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
-        damping[active[~better]] *= 100.0
-        step[active] = damped_steps(normal[active], gradient[active], damping[active])
-        gain = np.einsum("nc,nc->n", step[active], gradient[active])
-        small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | (gain < stop.gain_tolerance_m2)
-        done = active[small]
-        converged[done] = True
-        accepted[done] += step[done]
-        active = active[~small]
-        if not active.size:
-            break
-        q[active] = accepted[active] + step[active]
-    return accepted, converged, normal
-
-
-def normal_equations(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers (n, m, 3); r = measured - model."""
-    tree, axes = model.tree, model.map
-    carrier, local = model.carried_markers
-    at, slopes = axes.places_and_slopes(q)
-    return marker_sums.normal_equations(
-        tree, axes.owner, slopes, at, carrier, local, np.ascontiguousarray(measured), axes.count
-    )
 
 
 def _uninformed(normal: np.ndarray) -> np.ndarray:

@@ -139,7 +139,12 @@ class SmoothedSpline:
         return result / self._spacing**derivative
 
 
-def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]) -> SmoothedSpline:
+def smooth(
+    time: ArrayLike,
+    values: ArrayLike,
+    smoothing: float | Literal["gcv"],
+    within_hz: tuple[float, float] | None = None,
+) -> SmoothedSpline:
     """Fit natural quintic smoothing splines to sampled columns.
 
     Args:
@@ -148,8 +153,9 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
             to its visible samples alone.
         smoothing: cutoff frequency in Hz for all columns (see the module's text for the convention; with
             unequal or missing samples it refers to the mean spacing of `time`), or "gcv" to choose one for
-            each column by generalised cross-validation, between a tenth of a cycle in the whole record and
-            the sampling rate.
+            each column by generalised cross-validation.
+        within_hz: lowest and highest cutoff that cross-validation may choose; if left out, a tenth of a cycle in the
+            whole record and the sampling rate, which is no smoothing.
 
     Returns:
         The splines; `SmoothedSpline(t, derivative)` evaluates them.
@@ -164,10 +170,11 @@ def smooth(time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
     system = _System.of((time - time[0]) / spacing)
     fitted = np.empty_like(columns)
     cutoff, sigma = np.empty(columns.shape[1]), np.empty(columns.shape[1])
+    ends = np.clip((0.0, np.inf) if within_hz is None else np.multiply(within_hz, spacing), 0.1 / len(time), 1.0)
     for visible, group in columns_alike(~np.isnan(columns)):
         y = _filled(columns[:, group], visible)
         if smoothing == "gcv":
-            chosen = _gcv_cutoffs(system, y, visible)
+            chosen = _gcv_cutoffs(system, y, visible, ends)
         else:
             chosen = np.full(len(group), float(smoothing) * spacing)
         for f in np.unique(chosen):
@@ -233,15 +240,16 @@ def _filled(columns: Array, visible: NDArray[np.bool_]) -> Array:
     return np.stack([np.interp(index, index[visible], y[visible]) for y in columns.T], axis=1)
 
 
-def _gcv_cutoffs(system: _System, y: Array, visible: NDArray[np.bool_]) -> Array:
-    """Cutoff (c,), in cycles per mean spacing, that minimises GCV for each column of y (n, c).
+def _gcv_cutoffs(system: _System, y: Array, visible: NDArray[np.bool_], ends: Array) -> Array:
+    """Cutoff (c,), in cycles per mean spacing, that minimises GCV for each column of y (n, c) between two ends.
 
     GCV is tabulated for all columns at once on the lattice f = 2^(k/8): first on half octaves, then on
     eighths around each column's least, where a cubic interpolant of its logarithm gives the minimum.
     """
     n_visible = int(visible.sum())
     rounding = n_visible * (np.finfo(float).eps * np.abs(y).max(axis=0)) ** 2 + np.finfo(float).tiny
-    lattice = np.arange(-4 * round(2 * np.log2(10 * len(y))), 1)
+    low, high = 8 * np.log2(ends)
+    lattice = np.arange(-4 * int(np.ceil(-low / 4) + 1), 4 * int(np.ceil(high / 4)) + 1)
     table = np.full((len(lattice), y.shape[1]), np.nan)
 
     def tabulate(rows: NDArray[np.int_]) -> None:
@@ -256,10 +264,11 @@ def _gcv_cutoffs(system: _System, y: Array, visible: NDArray[np.bool_]) -> Array
         near = np.arange(max(least - 4, 0), min(least + 5, len(lattice)))
         tabulate(near)
         curve = CubicSpline(lattice[near], table[near, column])
-        best = near[np.argmin(table[near, column])]
-        bounds = lattice[max(best - 1, near[0])], lattice[min(best + 1, near[-1])]
+        tried = np.clip(lattice[near], low, high)
+        best = tried[np.argmin(curve(tried))]
+        bounds = np.clip((best - 1, best + 1), max(low, lattice[near[0]]), min(high, lattice[near[-1]]))
         polished = minimize_scalar(curve, bounds=bounds, method="bounded")
-        cutoffs[column] = 2.0 ** ((polished.x if polished.fun < table[best, column] else lattice[best]) / 8)
+        cutoffs[column] = 2.0 ** ((polished.x if polished.fun < curve(best) else best) / 8)
     return cutoffs
 
 

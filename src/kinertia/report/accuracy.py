@@ -90,7 +90,7 @@ def save_accuracy(found: Mapping[str, ScenarioAccuracy], seed: int, folder: str 
         "seed": seed,
         "scenarios": {key: asdict(scenario) for key, scenario in found.items()},
     }
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "accuracy") as work:
         (work / "accuracy.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         (work / "accuracy.md").write_text(accuracy_markdown(found) + "\n", encoding="utf-8")
     return Path(folder)

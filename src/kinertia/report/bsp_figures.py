@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
-from kinertia.report.panels import Panel, base_layout, small_multiples
+from kinertia.report.panels import Panel, base_layout, plain, small_multiples
 from kinertia.report.wording import decimals, fixed, read_in, start_of
 
 DEPARTURE_SD = 2.0
@@ -99,8 +99,8 @@ def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict
     away, half = (after - before) / scale, _INTERVAL_SD * sd / scale
     place = np.arange(len(shown))
     told = [
-        f"{segment_name(fit.estimate.segments[i])}: {start.word} {_interval(k, b, p)}, estimate {_interval(k, a, s)} "
-        f"{read_in(k)[0]}"
+        f"{plain(segment_name(fit.estimate.segments[i]))}: {start.word} {_interval(k, b, p)}, "
+        f"estimate {_interval(k, a, s)} {read_in(k)[0]}"
         for i, b, p, a, s in zip(shown, before, prior_sd, after, sd, strict=True)
     ]
     prior = {
@@ -192,7 +192,7 @@ def information_figure(fit: Fit) -> Figure | None:
         "textangle": 0,
         "constraintext": "none",
         "textfont": {"size": 11},
-        "customdata": [f"{NAMES[k]} of {segments[i]}" for i, k in zip(rows, columns, strict=True)],
+        "customdata": [f"{NAMES[k]} of {plain(segments[i])}" for i, k in zip(rows, columns, strict=True)],
         "hovertemplate": "%{customdata}: %{text} %<extra></extra>",
     }
     layout = base_layout(alt)
@@ -208,4 +208,4 @@ def information_figure(fit: Fit) -> Figure | None:
 
 def _named(words: Sequence[str]) -> dict[str, Any]:
     """An axis with words at 0, 1, 2, ..."""
-    return {"tickvals": list(range(len(words))), "ticktext": list(words)}
+    return {"tickvals": list(range(len(words))), "ticktext": [plain(word) for word in words]}

@@ -28,6 +28,6 @@ def save_check_page(
         FileError: the folder cannot be written to.
     """
     page = rendered("check.html.j2", recordings=recordings, models=models, mistakes=mistakes)
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "check") as work:
         (work / "check.html").write_text(page, encoding="utf-8")
     return Path(folder) / "check.html"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
+from kinertia.model.sides import by_side
 from kinertia.model.skeleton import Skeleton
 
 _GAIT27 = {
@@ -32,8 +32,9 @@ _GAIT27 = {
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One panel: its title, and per side ("r", "l", or "" where there is none) the column in q."""
+    """One panel: its name without side, its title, and per side ("r", "l", "" where there is none) the column in q."""
 
+    name: str
     title: str
     columns: dict[str, int]
     rotational: bool
@@ -41,14 +42,12 @@ class Coordinate:
 
 def panels_of(skeleton: Skeleton) -> list[Coordinate]:
     """The coordinates of a skeleton in their order, left and right together."""
-    names = skeleton.coordinates
-    found: dict[str, dict[str, int]] = {}
-    for column, name in enumerate(names):
-        base, side = _split(name, names)
-        found.setdefault(base, {})[side] = column
+    found = by_side(skeleton.coordinates)
     known = _GAIT27 if skeleton.name == "gait27" else {}
     return [
-        Coordinate(known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())]))
+        Coordinate(
+            base, known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())])
+        )
         for base, columns in found.items()
     ]
 
@@ -63,9 +62,9 @@ def title_of(skeleton: Skeleton, column: int) -> str:
     raise IndexError(column)
 
 
-def _split(name: str, names: Sequence[str]) -> tuple[str, str]:
-    """Name without its side, and the side, where the other side is there too."""
-    base, _, side = name.rpartition("_")
-    if side in ("r", "l") and {f"{base}_r", f"{base}_l"} <= set(names):
-        return base, side
-    return name, ""
+def load_title(one: Coordinate, what: str) -> str:
+    """Moment or power of a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +"."""
+    if not one.title.endswith(" +"):
+        return f"{one.title} {what}"
+    joint, _, direction = one.title.partition(" ")
+    return f"{joint} {what}, {direction.replace(',', '')}"

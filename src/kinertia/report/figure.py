@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,12 @@ class Figure:
         return json.dumps(plain, default=_typed_array, allow_nan=False, separators=(",", ":"))
 
 
+def written(figure: Figure) -> dict[str, Any]:
+    """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
+    text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
+    return {"alt": figure.alt, "json": Markup(text), "height": figure.layout["height"]}
+
+
 def compact(values: np.ndarray) -> np.ndarray:
     """Single precision, in which `Figure.to_json` writes arrays: half of what doubles take, and more than eyes see."""
     return np.asarray(values, dtype=np.float32)
@@ -52,6 +59,8 @@ def compact(values: np.ndarray) -> np.ndarray:
 
 def _typed_array(values: object) -> dict[str, str]:
     """plotly.js' form of a binary array: little-endian, in base64. Here NaN, a gap in a curve, needs no word."""
-    if not (isinstance(values, np.ndarray) and values.dtype == np.float32 and values.ndim == 1):
-        raise TypeError(f"a figure holds lists and one-dimensional arrays of float32, not {values!r}")
-    return {"dtype": "f4", "bdata": base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")}
+    known = {np.dtype(np.float32): "f4", np.dtype(np.uint8): "u1"}
+    if not (isinstance(values, np.ndarray) and values.dtype in known and values.ndim == 1):
+        raise TypeError(f"a figure holds lists and one-dimensional arrays of float32 or uint8, not {values!r}")
+    name = known[values.dtype]
+    return {"dtype": name, "bdata": base64.b64encode(values.astype(f"<{name}").tobytes()).decode("ascii")}

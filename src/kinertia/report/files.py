@@ -1,4 +1,4 @@
-"""Writes a `Fit` to a folder: `report.html`, `fit.json`, `bsp.csv`, and motion and loads in files that OpenSim opens.
+"""Writes a `Fit` to a folder: the report, the result to open again, tables, and files that OpenSim opens.
 
 Everything is written to a hidden folder first and moved when complete, so a run never leaves half a result.
 """
@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from kinertia.checks.uses import uses
 from kinertia.checks.verdict import verdicts
+from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
@@ -23,9 +25,12 @@ from kinertia.estimation.warnings import mass_from_force_kg
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
+from kinertia.io.spreadsheet import inert
 from kinertia.io.sto import TimeTable, write_table
+from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
+from kinertia.report.saved_fit import FIT_FILE, write_fit
 from kinertia.trial.rms import rms, rms_length
 
 _PARTS = (slice(0, 3), slice(3, 6))
@@ -42,10 +47,12 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     Raises:
         FileError: the folder cannot be written to.
     """
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
+        write_fit(fit, provenance, work / FIT_FILE)
         (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
-        _write_bsp(fit, work / "bsp.csv")
+        write_columns(work / "bsp.csv", fit.bsp_columns())
+        _write_cycles(fit, work)
         _write_model(fit, work)
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
@@ -54,14 +61,23 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     return Path(folder)
 
 
-def _write_bsp(fit: Fit, path: Path) -> None:
-    """The table of `Fit.bsp`, as pandas would write it: a cell without a number is empty."""
-    columns = fit.bsp_columns()
+def _write_cycles(fit: Fit, folder: Path) -> None:
+    """The tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
+    if not any(trial.strides for trial in fit.trials):
+        return
+    write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials))
+    names: dict[Stage, str] = {"estimate": "cycles.csv", "literature": "cycles_literature.csv"}
+    for stage, name in names.items():
+        write_columns(folder / name, cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES))
+
+
+def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
+    """A table as pandas would write it: a cell without a number is empty."""
     cells = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([None if cell != cell else cell for cell in row] for row in zip(*cells, strict=True))
+        writer.writerows([None if cell != cell else inert(cell) for cell in row] for row in zip(*cells, strict=True))
 
 
 def _write_model(fit: Fit, folder: Path) -> None:
@@ -75,7 +91,7 @@ def _write_model(fit: Fit, folder: Path) -> None:
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
     changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
-    changes.to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
+    changes.map(inert).to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
 
 
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
@@ -133,6 +149,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         "converged": fit.converged,
         **_posterior_summary(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
+        "uses": [{"output": use.output, "use": use.word, "reason": use.reason} for use in uses(fit)],
         "verdicts": [verdict._asdict() for verdict in verdicts(fit)],
         "warnings": list(fit.warnings),
         "notes": list(fit.notes),

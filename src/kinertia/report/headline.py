@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.checks.verdict import Level, Verdict, verdicts
+from kinertia.checks.uses import Use, uses
+from kinertia.checks.verdict import Level, Verdict, verdicts, worst_level
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
@@ -32,8 +33,9 @@ class Words:
     """A fit in sentences.
 
     Attributes:
-        level: the worst of the judgements.
+        level: the worst of the judgements; a warning is worth a caution.
         headline: what it means for using the numbers.
+        uses: `kinertia.checks.uses.uses`.
         judgements: `kinertia.checks.verdict.verdicts`.
         motion: how far the motion was changed.
         knowledge: what the data could and could not tell about the body segment parameters.
@@ -42,6 +44,7 @@ class Words:
 
     level: Level
     headline: str
+    uses: tuple[Use, ...]
     judgements: tuple[Verdict, ...]
     motion: tuple[str, ...]
     knowledge: tuple[str, ...]
@@ -51,18 +54,25 @@ class Words:
 def words(fit: Fit) -> Words:
     """The verdict on a fit."""
     judgements = tuple(verdicts(fit))
-    levels = [judgement.level for judgement in judgements]
-    level: Level = next(one for one in ("fail", "caution", "pass") if one in levels)
-    failed = levels.count("fail")
+    level = worst_level(judgements)
+    if level == "pass" and fit.warnings:
+        level = "caution"
+    counts = [sum(one.level == wanted for one in judgements) for wanted in ("fail", "caution")]
+    warned = f"{len(fit.warnings)} warning{'s' if len(fit.warnings) > 1 else ''}" if fit.warnings else ""
+    calls = (
+        ""
+        if not counts[1]
+        else f"{counts[1]} of {len(judgements)} checks call{'s' if counts[1] == 1 else ''} for caution"
+    )
     headline = {
-        "pass": "All checks passed: forces, motion and model agree. What this says about the body is below.",
-        "caution": "Usable with care: all checks passed, some only marginally.",
-        "fail": f"Do not use these numbers as they are: {failed} of {len(levels)} checks failed.",
+        "pass": "All checks passed: forces, motion and model agree.",
+        "caution": f"Usable with care: {'; '.join(filter(None, (calls, warned)))}.",
+        "fail": f"Do not use these numbers as they are: {counts[0]} of {len(judgements)} checks failed.",
     }[level]
-    if fit.warnings:
-        headline += f" Read the warning{'s' if len(fit.warnings) > 1 else ''}."
+    if level == "fail" and warned:
+        headline += f" Read the {warned}."
     motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
-    return Words(level, headline, judgements, motion, _knowledge(fit), _departures(fit))
+    return Words(level, headline, tuple(uses(fit)), judgements, motion, _knowledge(fit), _departures(fit))
 
 
 def _motion(fit: Fit, trial: TrialFit) -> list[str]:

@@ -19,7 +19,9 @@ from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
-from kinertia.report.figure import Figure
+from kinertia.report.cycle_figures import MOST_STRIDES, cycle_figures
+from kinertia.report.cycle_table import stride_rows
+from kinertia.report.figure import written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
@@ -38,12 +40,15 @@ from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
-_VIEW_FRAMES = 800
+_VIEW_FRAMES = 400
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
-def render(fit: Fit, provenance: Provenance | None = None) -> str:
-    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command."""
+def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[str, str] | None = None) -> str:
+    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command.
+
+    `computed_by` are the versions that the fit is from, where they are not the present ones.
+    """
     shown = fit.trials[:MOST_TRIALS]
     information = information_figure(fit)
     return rendered(
@@ -55,6 +60,7 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
+        cycle=_cycle(fit),
         bsp={"figure": written(bsp_figure(fit)), "rows": bsp_rows(fit)},
         information=None if information is None else written(information),
         residuals=residual_rows(fit.trials),
@@ -62,23 +68,31 @@ def render(fit: Fit, provenance: Provenance | None = None) -> str:
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
         provenance=provenance,
-        versions=versions(),
+        versions=computed_by or versions(),
         shown_unit=SHOWN_UNIT,
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
 
 
-def written(figure: Figure) -> dict[str, Any]:
-    """A figure as the templates take it: its text for those who cannot see it, and JSON that no markup can leave."""
-    text = figure.to_json().replace("<", "\\u003c").replace(">", "\\u003e")
-    return {"alt": figure.alt, "json": Markup(text), "height": figure.layout["height"]}
+def _cycle(fit: Fit) -> dict[str, Any] | None:
+    """Everything that the templates show of the gait cycle; None where there are no strides."""
+    figures = cycle_figures(fit)
+    if not figures:
+        return None
+    strides = [stride for trial in fit.trials for stride in trial.strides]
+    return {
+        "rows": stride_rows(fit),
+        "most": MOST_STRIDES,
+        "strides": len(strides),
+        "on_plates": sum(stride.on_plates for stride in strides),
+        **{kind: written(figure) for kind, figure in figures.items()},
+    }
 
 
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
     """Everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
-    mass_kg = fit.literature.total_mass_kg
     noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
     gaps = gap_figure(trial)
     return {
@@ -90,7 +104,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "all_frames": len(trial.kinematics.trial.markers.time),
         "residuals": written(residual_figure(trial, frames, start_of(fit))),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
-        "moments": written(moment_figure(trial, fit.skeleton, mass_kg, frames, start_of(fit))),
+        "moments": written(moment_figure(trial, fit.skeleton, fit.mass_kg, frames, start_of(fit))),
         "bands": trial.joint_load_sd is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),

@@ -75,7 +75,7 @@ def small_multiples(
             refs = {ref: f"{ref[0]}{suffix}{' domain' if shape.get(ref) else ''}" for ref in ("xref", "yref")}
             shapes.append({**shape, **refs})
         place = {"xref": f"x{suffix} domain", "yref": f"y{suffix} domain", "x": 0, "y": 1}
-        anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 13}}
+        anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 12}}
         titles.append({"text": f"<b>{plain(panel.title)}</b>", **place, **anchors})
     ways: dict[str, Any] = {
         str(c): _arrangement(len(panels), c, row_px, left_px, len(shown)) for c in range(1, MOST_COLUMNS + 1)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kinertia.estimation.cycles import Kind
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import bsp_figure, information_figure
+from kinertia.report.cycle_figures import cycle_figure
 from kinertia.report.extras import expect_plotly
 from kinertia.report.figure import Figure
 from kinertia.report.marker_figures import gap_figure, marker_figure
@@ -50,8 +52,13 @@ class FitPlots:
 
     def moments(self, trial: str | None = None) -> go.Figure:
         """Joint moments per body mass, before against estimate."""
-        mass_kg = self.fit.literature.total_mass_kg
-        return as_plotly(moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start_of(self.fit)))
+        mass_kg, start = self.fit.mass_kg, start_of(self.fit)
+        return as_plotly(moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start))
+
+    def cycles(self, kind: Kind = "moment") -> go.Figure | None:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides."""
+        figure = cycle_figure(self.fit, kind)
+        return None if figure is None else as_plotly(figure)
 
     def markers(self, trial: str | None = None) -> go.Figure:
         """Distance between every measured and modelled marker."""

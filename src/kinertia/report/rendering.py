@@ -18,8 +18,9 @@ from kinertia.report.wording import fixed
 
 
 def rendered(template: str, **content: Any) -> str:
-    """A page from a template."""
-    return _environment().get_template(template).render(version=VERSION, **content)
+    """A page from a template; what UTF-8 cannot say, as in file names of old systems, is a question mark."""
+    page = _environment().get_template(template).render(version=VERSION, **content)
+    return page.encode("utf-8", errors="replace").decode("utf-8")
 
 
 class _CompiledTemplates(jinja2.FileSystemBytecodeCache):

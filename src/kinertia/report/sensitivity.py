@@ -131,7 +131,7 @@ def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
             key: dict(zip(found.parameters, values.tolist(), strict=True)) for key, values in found.errors.items()
         },
     }
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "sensitivity") as work:
         (work / "sensitivity.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         (work / "sensitivity.md").write_text(sensitivity_markdown(found), encoding="utf-8")
         sensitivity_frame(found).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")

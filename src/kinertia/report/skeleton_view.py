@@ -18,7 +18,7 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
 from kinertia.report.bsp_figures import segment_name
 from kinertia.report.figure import Figure, compact
-from kinertia.report.panels import base_layout
+from kinertia.report.panels import base_layout, plain
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
 
@@ -193,7 +193,13 @@ def _traces(shown: Scene, k: int) -> list[dict[str, Any]]:
         _trace(arrows, "ground reaction", mode="lines", line={"color": style.GREEN, "width": 6}),
         _trace(shown.modelled[k], "markers, model", mode="markers", marker={"size": 3, "color": style.SKY}),
         _trace(shown.measured[k], "markers, measured", mode="markers", marker={"size": 3, "color": style.BLACK}),
-        _trace(shown.com[k], "centres of mass", mode="markers", marker=balls, text=list(shown.com_names)),
+        _trace(
+            shown.com[k],
+            "centres of mass",
+            mode="markers",
+            marker=balls,
+            text=[plain(name) for name in shown.com_names],
+        ),
     ]
 
 

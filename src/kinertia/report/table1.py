@@ -117,7 +117,7 @@ def save_table1(table: Table1, folder: str | Path) -> Path:
         rows=table1_rows(table),
         picture=Markup(picture[max(picture.find("<svg"), 0) :]),
     )
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "table1") as work:
         (work / "table1.json").write_text(
             json.dumps({"kinertia": VERSION, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
         )

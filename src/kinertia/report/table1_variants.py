@@ -99,7 +99,7 @@ def variants_figure(results: Sequence[VariantResult]) -> Figure:
 def save_variants(results: Sequence[VariantResult], folder: str | Path) -> Path:
     """Write `variants.csv`, `variants.md` and, with matplotlib, `variants.png` into a folder; returns it."""
     table = [list(HEADINGS), ["---"] * len(HEADINGS), *variants_rows(results)]
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "variants") as work:
         variants_frame(results).to_csv(work / "variants.csv", index=False, lineterminator="\n")
         (work / "variants.md").write_text("".join(f"| {' | '.join(row)} |\n" for row in table), encoding="utf-8")
         if has_matplotlib():

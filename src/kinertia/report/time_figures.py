@@ -22,7 +22,7 @@ from kinertia.report.wording import LITERATURE, Start
 from kinertia.trial.gait_events import GaitEvent, gait_events
 from kinertia.trial.rms import rms, rms_length
 
-MOST_FRAMES = 1600
+MOST_FRAMES = 1200
 """Drawn per curve."""
 MOST_EVENTS = 40
 """Gait events in the frames shown up to which they are drawn; more would hide the curves."""

@@ -134,7 +134,7 @@ def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc"
     "trc": `static.trc`, `walk.trc`, `walk_grf.mot`. "c3d": `static.c3d`, `walk.c3d`, with Z up and mm.
     """
     files = [("static", recordings.static), ("walk", recordings.walk)]
-    with complete_folder(folder) as work:
+    with complete_folder(folder, "lab") as work:
         for name, recording in files:
             if kind == "c3d":
                 write_c3d(work / f"{name}.c3d", recording)

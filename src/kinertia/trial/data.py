@@ -180,6 +180,16 @@ class Recording:
     length_unit: str = "m"
     vertical: str = "+Y"
 
+    def without_empty_markers(self) -> Recording:
+        """The same without markers that no frame shows, and a note that names them."""
+        seen = self.markers.seen
+        labels = [label for column, label in enumerate(self.markers.labels) if seen[:, column].any()]
+        if len(labels) == len(self.markers.labels):
+            return self
+        empty = [label for label in self.markers.labels if label not in labels]
+        note = f"{self.name}: visible in no frame, left out: {', '.join(empty)}"
+        return replace(self, markers=self.markers.select(labels), notes=(*self.notes, note))
+
     def _repr_html_(self) -> str:
         """What a notebook shows: frames, markers and their gaps, force plates, notes."""
         return display.html(self)
@@ -197,6 +207,8 @@ class FootLoads:
         on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
             where each foot has a plate of its own.
         noise_n: deviation of the vertical force of the noisiest plate while nobody stands on it, N.
+        together: (k,) True where both feet stand on one plate, whose load goes to one of them; left out where they
+            never do.
 
     Examples:
         >>> loads = fit.trials[0].kinematics.trial.loads  # right foot, left foot
@@ -210,6 +222,7 @@ class FootLoads:
     plates: tuple[str, ...] = ("right foot", "left foot")
     on_plate: npt.NDArray[np.int_] | None = None
     noise_n: float = 0.0
+    together: BoolArray | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), 2, 3)

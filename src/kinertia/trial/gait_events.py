@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Trial, runs
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial, runs
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import BRIDGED_GAP_S, SHORTEST_CONTACT_S
 
@@ -21,8 +21,14 @@ class GaitEvent(NamedTuple):
 
 def gait_events(trial: Trial) -> list[GaitEvent]:
     """All events between measured frames, in order: elsewhere a load also begins and ends with the plate."""
-    loads, found = trial.loads, []
-    frames = trial.markers.time
+    frames, found = trial.markers.time, load_edges(trial.loads)
+    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S for event in found]
+    return [event for event, around in zip(found, near, strict=True) if around.any() and trial.measured[around].all()]
+
+
+def load_edges(loads: FootLoads) -> list[GaitEvent]:
+    """When the load under each foot begins and ends, in order: with the contact, or with the plate's edge."""
+    found = []
     for foot, side in enumerate(FEET):
         loaded = bridged(loads.time, loads.force[:, foot, 1] > LOAD_THRESHOLD_N)
         for first, last in runs(loaded):
@@ -32,7 +38,4 @@ def gait_events(trial: Trial) -> list[GaitEvent]:
                 found.append(GaitEvent(float(loads.time[first]), side, "heel strike"))
             if last < len(loads.time) - 1:
                 found.append(GaitEvent(float(loads.time[last]), side, "toe off"))
-    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S for event in found]
-    return sorted(
-        event for event, around in zip(found, near, strict=True) if around.any() and trial.measured[around].all()
-    )
+    return sorted(found)

@@ -31,6 +31,8 @@ _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
 _SPEED_SPAN_S = 0.01
 _FILLED_GAP_S = 0.2
+_FEWEST_TO_JUDGE, _FAR_BEYOND = 3, 3.0
+"""Of so many landings, one that is so many times as fast as usual is none."""
 
 FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
@@ -62,15 +64,17 @@ class GroundContact:
         loaded: (n, 2) True where the right, left foot stands on a loaded plate.
         ground: (n, 2) True where the foot is on the ground, loaded or not.
         inside: (n,) True within the forces' time.
+        together: (n,) True where one plate carries both feet, so that only the sum of their loads is known.
     """
 
     loaded: BoolArray
     ground: BoolArray
     inside: BoolArray
+    together: BoolArray
 
     def measured(self, time: FloatArray) -> BoolArray:
         """(n,) True where all ground contact is known, by the rules of `measured_frames`."""
-        measured = self.inside & np.asarray(self.loaded | ~self.ground).all(axis=1)
+        measured = self.inside & ~self.together & np.asarray(self.loaded | ~self.ground).all(axis=1)
         flight = measured & ~self.ground.any(axis=1)
         for first, last in runs(flight):
             between = first > 0 and last < len(time) - 1 and measured[first - 1] and measured[last + 1]
@@ -95,7 +99,8 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Gro
         for foot, move in enumerate(moves):
             planted = _planted(move, clearance, landing, leaving)
             ground[:, foot] |= _off_plates(planted, loaded[:, foot], markers.time)
-    return GroundContact(loaded, ground, inside)
+    together = np.zeros(len(inside), dtype=bool) if loads.together is None else loads.together[nearest] & inside
+    return GroundContact(loaded, ground, inside, together)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +195,8 @@ def _learned(moves: Sequence[_FootMotion], loaded: BoolArray) -> tuple[float, fl
             if last < len(speed) - 1:
                 leaving.append(_halfway(speed[last + 1], speed[last]))
     usual = _largest(np.concatenate(loaded_speed))
-    land = max(_LEAST_SPEED_M_S, _largest(np.array(landing)) or usual)
-    return clearance, land, max(land, _largest(np.array(leaving)) or usual)
+    land = max(_LEAST_SPEED_M_S, _usual(landing) or usual)
+    return clearance, land, max(land, _usual(leaving) or usual)
 
 
 def _halfway(unloaded: float, loaded: float) -> float:
@@ -202,6 +207,15 @@ def _halfway(unloaded: float, loaded: float) -> float:
 def _largest(values: FloatArray) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else 0.0
+
+
+def _usual(speeds: Sequence[float]) -> float:
+    """The largest of speeds that is not far beyond the others: what was no landing must not teach how feet land."""
+    values = np.array(speeds)
+    finite = values[np.isfinite(values)]
+    if finite.size >= _FEWEST_TO_JUDGE:
+        finite = finite[finite <= _FAR_BEYOND * np.median(finite)]
+    return _largest(finite)
 
 
 def _planted(move: _FootMotion, clearance: float, landing: float, leaving: float) -> BoolArray:

@@ -19,6 +19,8 @@ LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
 _ABOVE_NOISE, _LEAST_TAIL_N = 4.0, 1.0
 _FEWEST_IDLE = 20
+_IDLE_MOST_N, _STEADY_N = 3 * LOAD_THRESHOLD_N, 5.0
+"""An idle level is below the first, and varies by less than the second: a foot that lands or leaves does not."""
 _GAUSSIAN = 1.4826
 """Deviation of Gaussian noise over its median absolute deviation."""
 
@@ -40,7 +42,7 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
         force, moment: (k, 3) N and N m about the ground origin, on the person; where the force is below
             LOAD_THRESHOLD_N the moment is not looked at and may be anything.
     """
-    loaded = force[:, 1] >= LOAD_THRESHOLD_N
+    loaded = force[:, 1] >= load_threshold_n(force[:, 1])
     offset_n, noise_n = _idle(force[~loaded, 1])
     if not loaded.any():
         return PlateLoad(np.zeros_like(force), np.zeros_like(force), noise_n)
@@ -52,6 +54,17 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     point = centre_of_pressure(np.concatenate([force, moment], axis=1)[nearest])
     moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))
     return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n)
+
+
+def load_threshold_n(vertical: FloatArray) -> float:
+    """From which vertical force (k,) on a plate is loaded: above what it reads when nobody stands on it.
+
+    A plate that was not zeroed reads 20 to 40 N all day long: small forces that hardly change are its idle level.
+    """
+    offset_n, noise_n = _idle(vertical[vertical < _IDLE_MOST_N])
+    if noise_n > _STEADY_N:
+        return LOAD_THRESHOLD_N
+    return max(LOAD_THRESHOLD_N, offset_n + max(_ABOVE_NOISE * noise_n, LOAD_THRESHOLD_N / 2))
 
 
 def _joining(loaded: BoolArray, candidates: BoolArray) -> BoolArray:

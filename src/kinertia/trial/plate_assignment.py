@@ -47,6 +47,9 @@ FAR_FROM_FEET_M = 0.3
 SHARED_FRACTION = 0.15
 """A contact that spends at least this part of its time nearer to the other foot carries both feet in turn."""
 
+DOUBLE_SUPPORT_S = 0.2
+"""So long, in a slow walk, both feet are down when the load of one plate goes from one to the other."""
+
 _FOOT_NAMES = ("right", "left")
 
 
@@ -87,8 +90,8 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     A contact is a run of loaded samples on one plate, with gaps below `BRIDGED_GAP_S` bridged; contacts
     shorter than `SHORTEST_CONTACT_S` are noise. It goes to the foot whose markers' mean is nearest to its
     centre of pressure (horizontally, load-weighted). A contact that carries the feet in turn is divided,
-    sample by sample; while both feet stand on one plate the whole load counts for the nearer one, since only
-    the sum is known.
+    sample by sample; while both feet stand on one plate, as in double support on a treadmill with one belt, the
+    whole load counts for the nearer one, since only the sum is known: these samples are `together`.
 
     Returns:
         the loads by foot, on the plates' time base, and a note for each assumption.
@@ -105,6 +108,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     force = np.zeros((len(plates.time), 2, 3))
     moment = np.zeros_like(force)
     most, on_plate = np.zeros((len(plates.time), 2)), np.full((len(plates.time), 2), -1)
+    together = np.zeros(len(plates.time), dtype=bool)
     notes: list[str] = []
     for p, name in enumerate(plates.names):
         where = f"{recording.name}: {name}"
@@ -121,8 +125,10 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 [centre[piece] for centre in centres],
                 covered[piece],
                 plates.declared_feet[p],
+                0.0 if plates.corners is None else float(plates.corners[p, :, 1].mean()),
             )
             notes += told
+            together[piece] |= _changing(plates.time[piece], nearer)
             for foot in range(2):
                 force[piece, foot] += np.where((nearer == foot)[:, None], plates.force[piece, p], 0.0)
                 moment[piece, foot] += np.where((nearer == foot)[:, None], plates.moment[piece, p], 0.0)
@@ -130,7 +136,18 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 on_plate[piece, foot] = np.where(vertical > most[piece, foot], p, on_plate[piece, foot])
                 most[piece, foot] = np.maximum(most[piece, foot], vertical)
     noise_n = max(plates.noise_n or (0.0,))
-    return FootLoads(plates.time, force, moment, plates.names, _held(plates.time, on_plate), noise_n), tuple(notes)
+    held = _held(plates.time, on_plate)
+    both = together if together.any() else None
+    return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both), tuple(notes)
+
+
+def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:
+    """(k,) True around the samples at which the load of one contact goes from foot to foot (k,): both are down."""
+    changes = (time[1:] + time[:-1])[np.diff(nearer) != 0] / 2
+    if not changes.size:
+        return np.zeros(len(time), dtype=bool)
+    result: BoolArray = np.abs(time - changes[nearest_samples(changes, time)]) <= DOUBLE_SUPPORT_S / 2
+    return result
 
 
 def _held(time: FloatArray, on_plate: npt.NDArray[np.int_]) -> npt.NDArray[np.int_]:
@@ -173,13 +190,15 @@ def _nearer_foot(
     centres: Sequence[FloatArray],
     covered: BoolArray,
     declared: str | None,
+    height_m: float,
 ) -> tuple[npt.NDArray[np.int_], list[str]]:
     """Index of the foot (k,) that each sample of one contact belongs to, and notes."""
     weight = np.where(covered, force[:, 1], 0.0)
     if not weight.any():
         return np.full(len(time), -1), []
     load = np.where(force[:, 1] > 0, force[:, 1], np.inf)
-    pressure = np.column_stack((moment[:, 2] / load, -moment[:, 0] / load))
+    at_height = np.column_stack((moment[:, 2] + height_m * force[:, 0], height_m * force[:, 2] - moment[:, 0]))
+    pressure = at_height / load[:, None]
     distance = np.stack([np.linalg.norm(pressure - centre, axis=1) for centre in centres], axis=1)
     distance = np.where(np.isfinite(distance), distance, 1e3)
     foot = int(np.argmin(weight @ distance))
@@ -193,7 +212,10 @@ def _nearer_foot(
     nearer = np.argmin(distance, axis=1)
     active = weight > 0
     if (nearer[active] != foot).mean() >= SHARED_FRACTION:
-        notes.append(f"{where} carries both feet in turn {span}; each sample was given to the nearer foot")
+        notes.append(
+            f"{where} carries both feet in turn {span}; each sample was given to the nearer foot, and "
+            f"{DOUBLE_SUPPORT_S:g} s around each change count as not measured: of both feet only the sum is known"
+        )
         return nearer, notes
     if declared is not None and declared != FEET[foot]:
         notes.append(

@@ -6,9 +6,9 @@ cannot be represented is an error that names it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from xml.parsers.expat import ExpatError
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from kinertia.errors import OsimError
 from kinertia.io.number_table import expect_file
 from kinertia.io.osim.joints import Frames, JointElement, coupled, read_joint, read_joint_in_body
 from kinertia.io.osim.properties import Values
-from kinertia.io.osim.xml import Element, parse
+from kinertia.io.osim.xml import Element, XmlError, parse
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.coordinate_range import Range
 from kinertia.model.imported import Coupling, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
@@ -28,6 +29,8 @@ _START = 0.2
 
 An elbow that starts straight may bend either way: turned by half a turn, the arm fits its markers nearly as well.
 """
+_FULL_TURN_SLACK_RAD = 0.02
+"""Files have pi with few digits."""
 _FORMAT_3, _FORMAT_4 = range(30000, 30501), range(40000, NEWEST_VERSION + 1)
 
 
@@ -70,13 +73,13 @@ def read_osim(path: str | Path) -> OsimModel:
 def _model(path: Path, content: bytes) -> tuple[Element, int]:
     try:
         document = parse(content)
-    except ExpatError as error:
-        raise OsimError(path, f"not XML ({error}); expected an OpenSim model, export it again", error.lineno) from None
+    except XmlError as error:
+        raise OsimError(path, f"not XML ({error}); expected an OpenSim model, export it again", error.line) from None
     model = document.child("Model")
     if document.tag != "OpenSimDocument" or model is None:
         raise OsimError(path, f"no Model in it (outermost element <{document.tag}>); expected an OpenSim model")
     told = document.attributes.get("Version", "")
-    version = int(told) if told.isdigit() else 0
+    version = int(told) if re.fullmatch("[0-9]{1,9}", told) else 0
     if version > NEWEST_VERSION:
         raise OsimError(
             path,
@@ -239,7 +242,21 @@ def _skeleton(
             for c in j.coordinates
             if c.angle
         },
+        ranges=_ranges(joints[1:], {*locked, *following}),
     )
+
+
+def _ranges(joints: Sequence[JointElement], fixed: set[str]) -> dict[str, Range]:
+    """The ranges of all coordinates of these joints that move by themselves.
+
+    One that ends before it begins, or of a full turn, says nothing.
+    """
+    free = [c for joint in joints for c in joint.coordinates if c.name not in fixed]
+    return {
+        c.name: Range(*c.range, c.clamped)
+        for c in free
+        if c.range[0] < c.range[1] and not (c.angle and c.range[1] - c.range[0] >= 2 * np.pi - _FULL_TURN_SLACK_RAD)
+    }
 
 
 def _kept(joint: JointElement) -> OsimJoint:

@@ -11,7 +11,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+_DEEPEST = 200
+"""Elements within elements; OpenSim's files have some twenty."""
 _START_TAG = re.compile(rb"""<[^\s/>]+(?:[^>"']|"[^"]*"|'[^']*')*>""")
+
+
+class XmlError(ValueError):
+    """A text that is not XML as it is used here; `line` is one-based."""
+
+    def __init__(self, problem: str, line: int) -> None:
+        self.line = line
+        super().__init__(problem)
 
 
 @dataclass(eq=False)
@@ -56,13 +66,15 @@ def parse(content: bytes) -> Element:
     """The outermost element.
 
     Raises:
-        xml.parsers.expat.ExpatError: the text is not XML; `lineno` says where.
+        XmlError: the text is not XML, is in an encoding that is not known here, or nests elements without end.
     """
     parser = expat.ParserCreate()
     top = Element("", {}, 0, (0, 0), None)
     stack = [top]
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(stack) > _DEEPEST:
+            raise XmlError(f"more than {_DEEPEST} elements inside one another", parser.CurrentLineNumber)
         at = parser.CurrentByteIndex
         found = _START_TAG.match(content, at)
         end = found.end() if found else at
@@ -84,7 +96,14 @@ def parse(content: bytes) -> Element:
     parser.StartElementHandler, parser.EndElementHandler = start, finish
     parser.CharacterDataHandler = characters
     parser.buffer_text = True
-    parser.Parse(content, True)
+    try:
+        parser.Parse(content, True)
+    except XmlError:
+        raise
+    except expat.ExpatError as error:
+        raise XmlError(str(error), error.lineno) from None
+    except (LookupError, ValueError) as error:  # what Python's codecs say
+        raise XmlError(f"{error}; save it as UTF-8", 1) from None
     return top.children[0]
 
 

@@ -40,21 +40,28 @@
     }
   }
 
+  const closed = (plot) => plot.element.closest("details:not([open])");
   const room = (plot) => Math.floor(plot.element.getBoundingClientRect().width);
   const soon = window.requestIdleCallback || ((work) => setTimeout(work, 1));
   let next = 0;
   function drawNext() {
     if (next >= plots.length) return;
-    draw(plots[next], room(plots[next]));
+    if (!closed(plots[next])) draw(plots[next], room(plots[next])); // the others when they are opened
     next += 1;
     soon(drawNext, { timeout: 200 });
   }
   drawNext();
 
+  document.querySelectorAll("details").forEach((part) =>
+    part.addEventListener("toggle", () => {
+      if (part.open && !printing) plots.filter((plot) => part.contains(plot.element)).forEach((plot) => draw(plot, room(plot)));
+    }),
+  );
+
   let waiting = 0;
   window.addEventListener("resize", () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => printing || plots.filter((plot) => plot.spec).forEach((plot) => draw(plot, room(plot))), 150);
+    waiting = setTimeout(() => printing || plots.filter((plot) => plot.spec && !closed(plot)).forEach((plot) => draw(plot, room(plot))), 150);
   });
   window.addEventListener("beforeprint", () => {
     printing = true;

@@ -1,0 +1,180 @@
+"""What `kinertia fit` says of trials from laboratories that nothing was built with: regenerates docs/field-trials.md.
+
+python benchmarks/field_trials.py
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from kinertia.cli.app import main as kinertia
+from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
+from measured_trials import farthest, table
+from walks import data_folder
+
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
+_LAI_ARNOLD = "LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One command: files relative to the data, other options as they are typed."""
+
+    title: str
+    folder: str
+    markers: str
+    files: dict[str, str]
+    options: str
+
+    def arguments(self, data: Path) -> list[str]:
+        """Of `kinertia fit`."""
+        lab = data / self.folder
+        named = [word for option, file in self.files.items() for word in (f"--{option}", str(lab / file))]
+        return ["fit", str(lab / self.markers), *named, *self.options.split()]
+
+
+def _subject4(name: str, title: str) -> Case:
+    files = {
+        "forces": f"{name}_grf.mot",
+        "loads": f"{name}_external_forces.xml",
+        "model": "addbiomechanics_scaled.osim",
+    }
+    return Case(f"subject4: {title}, model of AddBiomechanics", "subject4", f"{name}.trc", files, "--mass 60")
+
+
+_HAMNER = {"forces": "subject02_running_grf.mot", "loads": "External_Loads.xml"}
+CASES = (
+    Case(
+        "Hamner: run at 4 m/s on a treadmill, registered model",
+        "field/hamner_run",
+        "subject02_running.trc",
+        {**_HAMNER, "model": "subject02_registered.osim"},
+        "--mass 65.9",
+    ),
+    Case(
+        "Hamner: the same, built-in model",
+        "field/hamner_run",
+        "subject02_running.trc",
+        {**_HAMNER, "static": "subject02_static.trc"},
+        "--mass 65.9 --height 1.83 --sex male",
+    ),
+    Case(
+        "Hamner: run at 2 m/s on a treadmill, model of AddBiomechanics",
+        "field/hamner_treadmill_run",
+        "run200.trc",
+        {"forces": "run200_grf.mot", "model": "final.osim"},
+        "--mass 72.84",
+    ),
+    Case(
+        "OpenCap, person 5: drop jump, LaiArnold model",
+        "field/laiarnold5_jump",
+        "DJ1.trc",
+        {"forces": "DJ1_forces.mot", "model": _LAI_ARNOLD},
+        "--mass 79.4",
+    ),
+    Case(
+        "OpenCap, person 6: walk, LaiArnold model",
+        "field/laiarnold6_walk",
+        "walking1.trc",
+        {"forces": "walking1_forces.mot", "model": _LAI_ARNOLD},
+        "--mass 59",
+    ),
+    Case(
+        "Rajagopal: run over plates, built-in model",
+        "field/rajagopal_run",
+        "motion_capture_run.trc",
+        {"forces": "grf_run.mot", "loads": "grf_run.xml", "static": "static_run.trc"},
+        "--mass 75.3 --height 1.75 --sex male",
+    ),
+    _subject4("walking1", "walk"),
+    _subject4("walking2", "second walk"),
+    _subject4("squats1", "squats"),
+)
+
+
+def run(case: Case, folder: Path) -> dict[str, Any]:
+    """Exit status, seconds, last words and, where there is an estimate, fit.json with the BSP table under "bsp"."""
+    said, status, started = io.StringIO(), 0, time.perf_counter()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            kinertia([*case.arguments(data_folder()), "-o", str(folder), "--quiet"])
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+    found = {"status": status, "seconds": time.perf_counter() - started, "said": said.getvalue().strip()}
+    if (folder / "fit.json").exists():
+        found |= {"fit": json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
+    return found
+
+
+def document(runs: dict[str, dict[str, Any]]) -> str:
+    """The text of docs/field-trials.md."""
+    rows, warnings = [], []
+    for title, found in runs.items():
+        begin = [title, str(found["status"])]
+        if "fit" not in found:
+            rows.append([*begin, *["-"] * 7, f"{found['seconds']:.0f}"])
+            warnings.append(f"- {title}: {' '.join(found['said'].split())}")
+            continue
+        fit, (trial,) = found["fit"], found["fit"]["trials"]
+        bsp = found["bsp"].query("prior_sd > 0")
+        beyond = int(((bsp["estimate"] - bsp["literature"]).abs() > CONTRADICTION_SD * bsp["prior_sd"]).sum())
+        residuals = [
+            f"{trial[key][stage]:.1f}"
+            for key in ("residual_force_rms_N", "residual_moment_rms_Nm")
+            for stage in ("literature", "estimate")
+        ]
+        markers = " / ".join(f"{trial['marker_rms_m'][stage] * 1e3:.1f}" for stage in ("ik", "final"))
+        rows.append(
+            [
+                *begin,
+                f"{trial['cutoff_hz']:.0f}",
+                *residuals,
+                markers,
+                f"{'yes' if fit['converged'] else 'no'}, {beyond} ({farthest(bsp)})",
+                f"{found['seconds']:.0f}",
+            ]
+        )
+        warnings += [f"- {title}: {warning}." for warning in fit["warnings"]]
+    heads = ["trial", "exit status", "cutoff before (Hz)"]
+    heads += [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("before", "after")]
+    heads += ["markers, before / after (mm)", "converged, parameters beyond 3 sd (farthest)", "s"]
+    return TEXT.format(results=table(heads, rows), warnings="\n".join(warnings))
+
+
+TEXT = """# Field trials
+
+What `kinertia fit` says of recordings that nothing here was built with: runs, a drop jump, a walk and squats from other
+laboratories, with their own models or static trials, files as they were published. This page is written by
+`python benchmarks/field_trials.py`; do not edit it by hand.
+
+Exit status 0: every check passed; 1: there is an estimate, and a check of it failed; 2: refused. *Before*: the model's
+or the literature's body segment parameters on the measured motion, both smoothed at the cutoff in the table, as a
+colleague would compute them. *After*: motion, parameters and calibration together. RMS over the frames used. Seconds
+are this machine's.
+
+{results}
+
+## Warnings given
+
+{warnings}
+"""
+
+
+def main() -> None:
+    """Write the page."""
+    with tempfile.TemporaryDirectory() as folder:
+        runs = {case.title: run(case, Path(folder) / str(k)) for k, case in enumerate(CASES)}
+    DOCUMENT.write_text(document(runs), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+"""`kinertia compare`: several finished fits side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.options import Force, Quiet, results_folder
+from kinertia.cli.terminal import out
+from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import names_from_common_folder
+from kinertia.report.comparison import MOST_FITS, comparison_columns, differences, remarks, render_comparison
+from kinertia.report.files import write_columns
+from kinertia.report.saved_fit import load_fit
+
+
+def compare(
+    results: Annotated[list[Path], typer.Argument(help="Folders that kinertia fit has written, two or more.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for page and table.")] = Path("comparison"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """What differs between fits beyond their error bars: sessions of one person, methods, models.
+
+    The first is what the others are compared with. Writes compare.html and
+    compare.csv.
+
+    [bold]Example[/]
+
+    kinertia compare before/out after/out -o comparison
+    """
+    if not 2 <= len(results) <= MOST_FITS:
+        raise typer.BadParameter(f"give 2 to {MOST_FITS} folders of results; these are {len(results)}")
+    paths = [path.resolve() for path in results]
+    if len(set(paths)) < len(paths):
+        raise typer.BadParameter("one folder is named twice")
+    results_folder(output, force)
+    fits = {name: load_fit(path) for name, path in zip(names_from_common_folder(paths), paths, strict=True)}
+    with complete_folder(output, "compare") as work:
+        (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")
+        write_columns(work / "compare.csv", comparison_columns(fits))
+    (first_name, first), *others = fits.items()
+    for sentence in remarks(fits):
+        out.print(f"note: {sentence}")
+    for name, other in others:
+        found = differences(first, other)
+        changed = [f"{one.parameter} of {one.segment}" for one in found if one.changed]
+        told = f"{name} against {first_name}: {len(changed)} of {len(found)} parameters changed beyond their error bars"
+        out.print(told + (f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})" if changed else ""))
+    out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)

@@ -1,0 +1,49 @@
+"""`kinertia export`: all tables of a fit for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.options import Force, Quiet, results_folder
+from kinertia.cli.terminal import out
+from kinertia.io.output_folder import complete_folder
+from kinertia.report.saved_fit import load_fit
+from kinertia.report.tables import write_csv, write_json, write_mat
+
+
+def export(
+    results: Annotated[Path, typer.Argument(help="Folder that kinertia fit has written.")],
+    csv: Annotated[bool, typer.Option("--csv", help="A file per table, for Excel, R and others.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="One file, tables.json, for scripts.")] = False,
+    mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for the tables; export in the results if left out.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write all tables of a fit: segments, calibration, strides, curves over the gait cycle and over time.
+
+    [bold]Examples[/]
+
+    kinertia export out --csv
+
+    kinertia export out --mat -o matlab
+    """
+    if not (csv or json or mat):
+        raise typer.BadParameter("say in which form: --csv, --json or --mat (several at once are fine)")
+    fit = load_fit(results)
+    folder = results / "export" if output is None else output
+    if output is not None:
+        results_folder(output, force)
+    with complete_folder(folder, "export") as work:
+        if csv:
+            write_csv(fit, work)
+        if json:
+            write_json(fit, work / "tables.json")
+        if mat:
+            write_mat(fit, work / "tables.mat")
+    out.print(f"tables in {folder}", soft_wrap=True)

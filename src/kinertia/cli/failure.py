@@ -1,0 +1,53 @@
+"""What is left when Kinertia itself fails: one line, and a log file that its developers can use."""
+
+from __future__ import annotations
+
+import platform
+import tempfile
+import traceback
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from kinertia.cli.terminal import show_error
+from kinertia.io.provenance import VERSION, command_line
+
+STATUS = 70
+"""EX_SOFTWARE of sysexits.h: the fault is the program's."""
+_PACKAGES = ("numpy", "scipy", "numba", "pandas", "ezc3d", "pydantic", "typer", "rich")
+
+
+def show_failure(error: Exception, given: Sequence[str]) -> None:
+    """Say that this is Kinertia's fault, and where the log is that tells what happened."""
+    told = traceback.format_exception_only(error)[-1].strip() or type(error).__name__
+    where = _logged(error, given)
+    sent = f"please send {where} to its developers" if where else "its log file could not be written"
+    show_error(f"Kinertia failed, which it should not on any input ({told}); no results were written; {sent}")
+
+
+def _logged(error: Exception, given: Sequence[str]) -> Path | None:
+    """The log file: command, versions and traceback; None where no file can be written."""
+    text = "\n".join(
+        [
+            command_line(["kinertia", *given]),
+            f"kinertia {VERSION}, Python {platform.python_version()}, {platform.platform()}",
+            ", ".join(f"{name} {_version(name)}" for name in _PACKAGES),
+            "",
+            "".join(traceback.format_exception(error)),
+        ]
+    )
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="kinertia-failure-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as file:
+            file.write(text)
+    except OSError:
+        return None
+    return Path(file.name)
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "missing"

@@ -1,0 +1,228 @@
+"""Joint angles, moments, powers and ground reactions over 0 to 100 % of the gait cycle, stride by stride.
+
+A curve belongs to the side whose heel strikes begin and end its stride. Where a trial was not measured it has a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import partial
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from kinertia.model.sides import by_side
+from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
+from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
+from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.smoothing import interpolate
+from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
+from kinertia.trial.data import FEET, nearest_samples
+
+Stage = Literal["estimate", "literature"]
+"""As estimated; or as usual: inverse kinematics, smoothed, and inverse dynamics with the parameters before."""
+Kind = Literal["angle", "moment", "power", "force"]
+UNITS: Mapping[Kind, str] = {"angle": "deg", "moment": "N m/kg", "power": "W/kg", "force": "% body weight"}
+FORCES = ("ground_force_forward", "ground_force_upward", "ground_force_medial")
+_ROOT_COORDINATES = 6
+_ROUNDING_S = 1e-9
+
+
+class Estimated(Protocol):
+    """What is needed of a fitted trial; its attributes are those of `TrialFit`."""
+
+    @property
+    def name(self) -> str:
+        """The trial's."""
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Before the estimate."""
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The model."""
+
+    @property
+    def motion(self) -> Motion:
+        """At the frames of the window."""
+
+    @property
+    def reactions(self) -> GroundReactions:
+        """That go with the estimate."""
+
+    @property
+    def joint_loads(self) -> Mapping[str, np.ndarray]:
+        """Per stage (w, c), N m."""
+
+    @property
+    def joint_load_sd(self) -> np.ndarray | None:
+        """(w, c), if there is any."""
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        """Of the whole trial."""
+
+
+@dataclass(frozen=True, eq=False)
+class CycleCurve:
+    """One quantity over one stride.
+
+    Attributes:
+        trial: its name.
+        stride: its side, number and times.
+        kind: "angle" (deg), "moment" (N m/kg, internal), "power" (W/kg) or "force" (ground reaction, % body weight).
+        quantity: "hip_flexion_angle", "knee_angle_moment", ..., "ground_force_upward".
+        value: (101,) at 0, 1, ..., 100 %; NaN where nothing was measured.
+        sd: (101,) standard deviation of the estimate; None where there is none. That of a power is the moment's times
+            the speed of the joint.
+    """
+
+    trial: str
+    stride: Stride
+    kind: Kind
+    quantity: str
+    value: np.ndarray
+    sd: np.ndarray | None
+
+
+def cycle_curves(
+    trial: Estimated, mass_kg: float, stage: Stage = "estimate", strides: Sequence[Stride] | None = None
+) -> Iterator[CycleCurve]:
+    """All curves of a trial, stride by stride; those that are nothing but a gap are left out.
+
+    Args:
+        trial: fitted.
+        mass_kg: of the body; moments, powers and forces are divided by it.
+        stage: which.
+        strides: of the trial; all if None.
+    """
+    chosen = trial.strides if strides is None else strides
+    if not chosen:
+        return
+    source, skeleton = _Source(trial, stage), trial.skeleton
+    sides = by_side(skeleton.coordinates)
+    paths = travelled(feet_under_pelvis(skeleton, trial.kinematics), chosen)
+    for stride, path in zip(chosen, paths, strict=True):
+        time, curve = stride.time, partial(CycleCurve, trial.name, stride)
+        angle, speed, moment, spread = source.angle(time), source.speed(time), source.moment(time), source.sd(time)
+        moment, spread = moment / mass_kg, None if spread is None else spread / mass_kg
+        found = []
+        for base, columns in sides.items():
+            column = columns.get(stride.side, columns.get(""))
+            if column is None or not skeleton.rotational[column]:
+                continue
+            found.append(curve("angle", f"{base}_angle", np.degrees(angle[:, column]), None))
+            if column >= _ROOT_COORDINATES:
+                sd = None if spread is None else spread[:, column]
+                power_sd = None if sd is None else sd * np.abs(speed[:, column])
+                found.append(curve("moment", f"{base}_moment", moment[:, column], sd))
+                found.append(curve("power", f"{base}_power", moment[:, column] * speed[:, column], power_sd))
+        ground = source.force(time)[:, FEET.index(stride.side)] @ _directions(path, stride.side).T
+        share = 100.0 * ground / (mass_kg * GRAVITY_M_S2)
+        found += [curve("force", name, values, None) for name, values in zip(FORCES, share.T, strict=True)]
+        yield from (one for one in found if np.isfinite(one.value).any())
+
+
+def _directions(path: np.ndarray, side: str) -> np.ndarray:
+    """(3, 3) unit vectors in rows: along the stride, upward, towards the other foot."""
+    forward = path / max(float(np.linalg.norm(path)), 1e-9)
+    medial = np.array([forward[2], 0.0, -forward[0]]) * (1.0 if side == "r" else -1.0)
+    return np.array([forward, [0.0, 1.0, 0.0], medial])
+
+
+class _Source:
+    """A trial's quantities at any time, NaN where they were not measured."""
+
+    def __init__(self, trial: Estimated, stage: Stage) -> None:
+        self.kinematics, self.stage, own = trial.kinematics, stage, trial.kinematics.time
+        self.spline = interpolate(own, trial.motion.q) if stage == "estimate" else trial.kinematics.spline
+        self.reactions = trial.reactions if stage == "estimate" else measured_reactions(trial.kinematics)
+        self.loads = make_interp_spline(own, trial.joint_loads[stage], k=3)
+        spread = trial.joint_load_sd if stage == "estimate" else None
+        self.spread = None if spread is None else make_interp_spline(own, spread, k=1)
+
+    def angle(self, time: np.ndarray) -> np.ndarray:
+        """(n, c) coordinates; those of the usual pipeline wherever inverse kinematics knew them."""
+        return self._kept(time, self.spline)
+
+    def speed(self, time: np.ndarray) -> np.ndarray:
+        """(n, c) derivatives of the coordinates."""
+        return self._kept(time, partial(self.spline, derivative=1))
+
+    def moment(self, time: np.ndarray) -> np.ndarray:
+        """(n, c) joint loads."""
+        return self._measured(time, self.loads)
+
+    def sd(self, time: np.ndarray) -> np.ndarray | None:
+        """(n, c) their standard deviations."""
+        return None if self.spread is None else self._measured(time, self.spread)
+
+    def force(self, time: np.ndarray) -> np.ndarray:
+        """(n, 2, 3) N on right and left foot."""
+        return self._measured(time, lambda at: self.reactions.at(at)[..., :3])
+
+    def _kept(self, time: np.ndarray, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        if self.stage == "estimate":
+            return self._measured(time, function)
+        ik = self.kinematics.ik
+        within = (time >= self.spline.time[0]) & (time <= self.spline.time[-1])
+        known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
+        return np.where(known, function(np.clip(time, self.spline.time[0], self.spline.time[-1])), np.nan)
+
+    def _measured(self, time: np.ndarray, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        first, last = self.kinematics.window_s
+        within = (time >= first - _ROUNDING_S) & (time <= last + _ROUNDING_S)
+        values = function(np.clip(time, first, last))
+        return np.where(within.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
+
+
+def cycle_columns(
+    trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate", most_strides: int | None = None
+) -> dict[str, Any]:
+    """The columns of `Fit.cycles`, by name; of at most so many strides per trial and side, evenly spread."""
+    found = [
+        one
+        for trial in trials
+        for one in cycle_curves(trial, mass_kg, stage, spread_evenly(trial.strides, most_strides))
+    ]
+    samples = len(PERCENT)
+    unknown = np.full(samples, np.nan)
+    return {
+        "trial": [one.trial for one in found for _ in range(samples)],
+        "side": [one.stride.side for one in found for _ in range(samples)],
+        "stride": np.repeat([one.stride.number for one in found], samples).astype(int),
+        "percent": np.tile(PERCENT, len(found)).astype(int),
+        "quantity": [one.quantity for one in found for _ in range(samples)],
+        "value": np.concatenate([one.value for one in found]) if found else np.zeros(0),
+        "sd": np.concatenate([unknown if one.sd is None else one.sd for one in found]) if found else np.zeros(0),
+    }
+
+
+def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
+    """The columns of `Fit.spatiotemporal`, by name."""
+    rows: list[dict[str, Any]] = []
+    for trial in trials:
+        measures = spatiotemporal(feet_under_pelvis(trial.skeleton, trial.kinematics), trial.strides)
+        for stride, one in zip(trial.strides, measures, strict=True):
+            place = {"trial": trial.name, "side": stride.side, "stride": stride.number}
+            times = {"start_s": stride.start_s, "end_s": stride.end_s, "toe_off_s": stride.toe_off_s}
+            rows.append({**place, **times, **asdict(one), "on_plates": stride.on_plates})
+    measured = [field.name for field in fields(Spatiotemporal)]
+    names = ["trial", "side", "stride", "start_s", "end_s", "toe_off_s", *measured, "on_plates"]
+    return {name: [row[name] for row in rows] for name in names}
+
+
+def spread_evenly(strides: Sequence[Stride], most: int | None) -> list[Stride]:
+    """At most so many strides of each side, evenly spread over the trial."""
+    kept = []
+    for side in FEET:
+        own = [stride for stride in strides if stride.side == side]
+        if most is not None and len(own) > most:
+            own = [own[k] for k in np.linspace(0, len(own) - 1, most).round().astype(int)]
+        kept += own
+    return kept

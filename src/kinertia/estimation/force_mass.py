@@ -1,0 +1,163 @@
+"""Do the ground reactions carry the person on the scale? Asked before inverse kinematics, of forces and markers alone.
+
+Over a window the mean vertical force is m (g + dv / T), where dv is how much faster upwards the body's centre moves at
+its end than at its beginning. The centre's velocity is that of the markers' centre, each segment at its usual share of
+the body's mass: no model is fitted, so that nothing of ours can be wrong but a decimetre a second.
+
+Where the forces do not fit, how they vary in time tells what is likely: nothing is known of a mass or a gain that is
+not the same all the time, and a support that is not measured carries at most a part of the weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.errors import TrialError
+from kinertia.model.anatomy import segment_of
+from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.smoothing import MIN_SAMPLES, smooth
+from kinertia.trial.data import FloatArray, Markers, Trial, runs
+
+CONTRADICTING_MASS = 0.10
+"""Scale and vertical force, or two trials, may differ by this share, and by twice the deviation of the mass by force,
+before an estimate refuses."""
+VELOCITY_SD_M_S = 0.1
+"""Deviation of the vertical velocity of the markers' centre from that of the body's, at either end of the window: half
+of it is what arms and trunk do beside their markers, half what skin does."""
+_SHARES = {"pelvis": 14.2, "torso": 40.0, "thigh": 12.3, "shank": 4.8, "foot": 1.2, "upper_arm": 2.4, "forearm": 2.3}
+"""Per cent of the body's mass, head with torso, hand with forearm (Dumas 2007, men)."""
+_SEEN = 0.8
+_FAST_HZ, _SLOW_HZ = 8.0, 4.0
+_AROUND_S = 0.25
+"""Frames this near the window help to know velocities at its ends."""
+_FEWEST_FRAMES = 2 * MIN_SAMPLES
+_CARRIED, _MISSING = 0.15, 0.25
+"""Share of body weight within which all of it is carried, and from which on some of it is not."""
+_SHORTEST_S = 0.1
+_MOSTLY = 0.25
+"""Share of the window in which all must be carried for the rest to be called an unmeasured contact."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceMass:
+    """Body mass by the vertical force of one trial.
+
+    Attributes:
+        trial: its name.
+        mass_kg, sd_kg: the mass that the forces move like the markers' centre, and its deviation.
+        time: (n,) s, the frames of the window.
+        carried: (n,) force over what a body of one kilogram would need for the same movement, kg.
+    """
+
+    trial: str
+    mass_kg: float
+    sd_kg: float
+    time: FloatArray
+    carried: FloatArray
+
+    def contradicts(self, mass_kg: float) -> bool:
+        """Whether a person of this mass can hardly have been on the plates."""
+        return abs(self.mass_kg - mass_kg) > CONTRADICTING_MASS * mass_kg + 2 * self.sd_kg
+
+    def sentence(self, mass_kg: float) -> str:
+        """What was found beside this stated mass, what may be the cause, and what to do."""
+        told = (
+            f"from {self.time[0]:.3f} to {self.time[-1]:.3f} s the vertical force corresponds to {self.mass_kg:.1f} "
+            f"kg; stated mass {mass_kg:.1f} kg"
+        )
+        share = self.carried / mass_kg - 1.0
+        if self.mass_kg > mass_kg:
+            return (
+                f"{told}; correct the mass, the gain, the zero or the units of the plates, or see who else is on them"
+            )
+        whole = np.abs(share) < _CARRIED
+        spans = [(a, b) for a, b in runs(share < -_MISSING) if self.time[b] - self.time[a] >= _SHORTEST_S]
+        if whole.mean() >= _MOSTLY and spans:
+            first, last = max(spans, key=lambda span: span[1] - span[0])
+            lost = -100.0 * float(share[first : last + 1].mean())
+            return (
+                f"{told}; in {100 * whole.mean():.0f} % of this time the plates carry all of it, but from "
+                f"{self.time[first]:.3f} to {self.time[last]:.3f} s {lost:.0f} % are missing: something that is not "
+                f"measured was stood or leant on; give the other part of the trial as window_s"
+            )
+        return (
+            f"{told}, and something is missing nearly all the time: correct the mass, or the gain and zero of the "
+            f"plates, if nothing else can have carried a part of the weight (a chair, a handrail, a harness, a foot "
+            f"beside the plates)"
+        )
+
+
+def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
+    """Body mass by the forces in the longest measured window.
+
+    Args:
+        skeleton: which marker is on which segment; nothing else is used of it.
+        trial: with measured frames.
+
+    Returns:
+        None where too few frames, or no markers, show how the body moves.
+    """
+    start, end = trial.windows()[0]
+    around, time = trial.markers.cut(start - _AROUND_S, end + _AROUND_S), trial.markers.cut(start, end).time
+    height = _centre_height(skeleton, around) if len(time) >= _FEWEST_FRAMES else None
+    if height is None:
+        return None
+    loads = trial.loads
+    inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
+    force = loads.force[:, :, 1].sum(axis=1)
+    velocity = smooth(around.time, height, _FAST_HZ)(time[[0, -1]], 1)
+    gained = float(velocity[1] - velocity[0]) / (time[-1] - time[0])
+    specific = GRAVITY_M_S2 + gained
+    if inside.sum() < MIN_SAMPLES or specific < 0.2 * GRAVITY_M_S2:
+        return None
+    mass = float(force[inside].mean()) / specific
+    sd = mass * np.sqrt(2) * VELOCITY_SD_M_S / ((time[-1] - time[0]) * specific)
+    slow = smooth(loads.time[inside], force[inside], _SLOW_HZ)(time)
+    needed = GRAVITY_M_S2 + smooth(around.time, height, _SLOW_HZ)(time, 2)
+    carried = np.where(needed > 0.3 * GRAVITY_M_S2, slow / np.maximum(needed, 0.3 * GRAVITY_M_S2), np.nan)
+    return ForceMass(trial.name, mass, float(sd), time, carried)
+
+
+def check_masses(mass_kg: float, by_force: Sequence[ForceMass]) -> None:
+    """Raise TrialError when trials cannot be of one person, or not of the one on the scale."""
+    for one in by_force:
+        if one.contradicts(mass_kg):
+            raise TrialError(one.trial, one.sentence(mass_kg))
+    if by_force:
+        heaviest, lightest = (pick(by_force, key=lambda one: one.mass_kg) for pick in (max, min))
+        allowed = CONTRADICTING_MASS * lightest.mass_kg + 2 * np.hypot(heaviest.sd_kg, lightest.sd_kg)
+        if heaviest.mass_kg - lightest.mass_kg > allowed:
+            raise TrialError(
+                heaviest.trial,
+                f"the vertical force corresponds to {heaviest.mass_kg:.1f} kg, in '{lightest.trial}' "
+                f"{lightest.mass_kg:.1f} kg; pool only trials of one person, with the same plates",
+            )
+
+
+def check_force_masses(skeleton: Skeleton, mass_kg: float, trials: Sequence[Trial]) -> None:
+    """`check_masses` of the trials whose forces tell a mass."""
+    check_masses(mass_kg, [found for trial in trials if (found := force_mass(skeleton, trial)) is not None])
+
+
+def _centre_height(skeleton: Skeleton, markers: Markers) -> FloatArray | None:
+    """(n,) m, height of the markers' centre, each segment at its share of the body's mass; None without a pelvis."""
+    seen = markers.seen
+    owners = {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
+    heights: dict[str, list[FloatArray]] = {}
+    for column, label in enumerate(markers.labels):
+        if owners.get(label) and seen[:, column].mean() >= _SEEN:
+            known = seen[:, column]
+            own = np.interp(markers.time, markers.time[known], markers.positions[known, column, 1])
+            heights.setdefault(owners[label], []).append(own)
+    if not heights.keys() & {"pelvis", "torso"}:
+        return None
+    shares = _shares(heights)
+    total: FloatArray = sum((shares[name] * np.mean(own, axis=0) for name, own in heights.items()), np.zeros(len(seen)))
+    return total / sum(shares.values())
+
+
+def _shares(segments: Mapping[str, object]) -> dict[str, float]:
+    return {name: _SHARES[name.removesuffix("_r").removesuffix("_l")] for name in segments}

@@ -1,0 +1,271 @@
+"""The structure of a C3D file, looked at before ezc3d reads it: ezc3d believes every count and offset that it finds.
+
+One wrong byte in them ends its process, or never ends, or fills the memory. What cannot be read is an error here; what
+only contradicts itself is for a process that may end (`ezc3d_library`).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from kinertia.errors import FileError
+
+_BLOCK = 512
+_BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}
+"""By processor (Intel, DEC, MIPS): byte order of integers, and the header byte with the sign of POINT:SCALE,
+which is negative where numbers are stored as floats."""
+_KINDS = {-1: "c", 1: "b", 2: "h", 4: "f"}
+_CHANNELS = {1: (6,), 2: (6,), 3: (8,), 4: (6,)}
+"""By type of plate."""
+_MOST_EVENTS = 18
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What the first block says."""
+
+    points: int
+    analogs: int
+    first: int
+    last: int
+    scale: float
+    data_block: int
+    samples: int
+    rate_hz: float
+    events: int
+
+    @property
+    def frames(self) -> int:
+        """0 where 16 bits do not hold it."""
+        return self.last - self.first + 1 if self.first <= self.last < 0xFFFF else 0
+
+
+@dataclass(frozen=True)
+class _Parameter:
+    """One entry of the parameter section: its shape, and its bytes."""
+
+    kind: str
+    shape: tuple[int, ...]
+    content: bytes
+    order: str
+
+    @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """Its values; none of text."""
+        if self.kind == "c":
+            return ()
+        return struct.unpack(f"{self.order}{math.prod(self.shape)}{self.kind}", self.content)
+
+    @property
+    def size(self) -> int:
+        """How many values it has; of text how many lines."""
+        return math.prod(self.shape[1:] if self.kind == "c" else self.shape)
+
+
+_Parameters = dict[tuple[str, str], _Parameter]
+
+
+def doubts_about(path: Path) -> str:
+    """What in a C3D file contradicts itself, as ezc3d may not survive it; empty where nothing does.
+
+    Raises:
+        FileError: it is empty, no C3D file, shorter than what it announces, or its parameters cannot be told apart.
+    """
+    with path.open("rb") as stream:
+        block = stream.read(_BLOCK)
+        if not block:
+            raise FileError(path, "the file is empty; expected a C3D file, export it again")
+        if len(block) < 2 or block[1] != 0x50:
+            raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
+        start = _BLOCK * (block[0] - 1)
+        if start < _BLOCK:
+            raise FileError(path, f"its parameters begin in block {block[0]}; expected 2 or later, export it again")
+        stream.seek(start)
+        section = stream.read(4)
+        if len(section) == 4:
+            section += stream.read(_BLOCK * section[2] - 4) if section[2] else b""
+    size = path.stat().st_size
+    if len(block) < _BLOCK or len(section) < 4:
+        needed = _BLOCK if len(block) < _BLOCK else start + _BLOCK
+        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
+    order, sign_byte = _BYTE_ORDERS.get(section[3], ("<", 15))
+    header = _header(block, order)
+    number = 4 if block[sign_byte] & 0x80 else 2
+    data = _BLOCK * (header.data_block - 1) + number * (4 * header.points + header.analogs) * header.frames
+    needed = max(start + _BLOCK * section[2], data)
+    if size < needed:
+        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
+    if section[3] not in _BYTE_ORDERS:
+        return f"its processor is {section[3]}"
+    if section[3] == 85:
+        return "its numbers are DEC's"
+    parameters, doubt = _parameters(path, section, order)
+    return doubt or _header_doubt(header, start + _BLOCK * section[2]) or _doubt(header, parameters)
+
+
+def _header(block: bytes, order: str) -> _Header:
+    points, analogs, first, last = struct.unpack_from(f"{order}4H", block, 2)
+    (scale,) = struct.unpack_from(f"{order}f", block, 12)
+    data_block, samples = struct.unpack_from(f"{order}2H", block, 16)
+    (rate_hz,) = struct.unpack_from(f"{order}f", block, 20)
+    (events,) = struct.unpack_from(f"{order}H", block, 300)
+    return _Header(points, analogs, first, last, scale, data_block, samples, rate_hz, events)
+
+
+def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, str]:
+    """All parameters by group and name, and what is odd about how they are stored."""
+    groups: dict[int, str] = {}
+    found: dict[tuple[int, str], _Parameter] = {}
+    at, odd = 4, ""
+
+    def broken(what: str) -> FileError:
+        return FileError(path, f"broken C3D file: {what} at byte {at} of its parameters; export it again")
+
+    while at + 2 <= len(section) and section[at]:
+        length, group = struct.unpack_from("bb", section, at)
+        length = abs(length)
+        link = at + 2 + length
+        if not group or link + 3 + (group > 0) > len(section):
+            raise broken("an entry without a group or end")
+        name = section[at + 2 : link].decode("latin-1").upper()
+        called = f"'{name}'" if name.isprintable() else "an entry"
+        (offset,) = struct.unpack_from(f"{order}h", section, link)
+        body = link + 2
+        if group > 0:
+            kind, dimensions = struct.unpack_from("bB", section, body)
+            shape = tuple(section[body + 2 : body + 2 + dimensions])
+            body += 2 + dimensions
+            bytes_needed = abs(kind) * math.prod(shape)
+            if kind not in _KINDS or len(shape) < dimensions or body + bytes_needed >= len(section):
+                raise broken(f"{called} is longer than the parameters are, or of an unknown type")
+            found[group, name] = _Parameter(_KINDS[kind], shape, section[body : body + bytes_needed], order)
+            body += bytes_needed
+        elif -group in groups or name in groups.values():
+            odd = odd or f"it has the group {called} twice"
+            groups[-group] = name
+        else:
+            groups[-group] = name
+        end = body + 1 + section[body]
+        if end > len(section):
+            raise broken(f"the description of {called} has no end")
+        if not offset:
+            break
+        if link + offset != end:
+            if not end <= link + offset <= len(section):
+                raise broken(f"{called} says that the next entry begins inside it or outside the parameters")
+            odd = odd or f"there is a gap after {called}"
+        at = link + offset
+    if any(group not in groups for group, _ in found):
+        odd = odd or "an entry belongs to no group"
+    return {(groups.get(group, ""), name): value for (group, name), value in found.items()}, odd
+
+
+def _header_doubt(header: _Header, end: int) -> str:
+    """What in the header cannot be."""
+    if not (math.isfinite(header.rate_hz) and 0.01 < header.rate_hz < 1e6):
+        return f"its frame rate is {header.rate_hz:g} Hz"
+    if not math.isfinite(header.scale) or header.scale == 0:
+        return f"its scale is {header.scale:g}"
+    if _BLOCK * (header.data_block - 1) < end:
+        return "its data begin inside its parameters"
+    if header.events > _MOST_EVENTS:
+        return f"its header has {header.events} events"
+    return "" if header.frames else "its header has no number of frames"
+
+
+def _doubt(header: _Header, parameters: _Parameters) -> str:
+    """What in the parameters contradicts the header or one another."""
+
+    def value(group: str, name: str, default: float) -> float:
+        entry = parameters.get((group, name))
+        return entry.numbers[0] if entry is not None and entry.numbers else default
+
+    def unsigned(group: str, name: str, default: float) -> float:
+        number = value(group, name, default)
+        return number + 65536 if number < 0 else number
+
+    channels, samples = unsigned("ANALOG", "USED", 0), max(header.samples, 1)
+    pairs = {
+        "POINT:USED": (unsigned("POINT", "USED", -1), header.points),
+        "ANALOG:USED": (channels * samples, header.analogs),
+        "POINT:FRAMES": (unsigned("POINT", "FRAMES", header.frames), header.frames),
+        "POINT:DATA_START": (unsigned("POINT", "DATA_START", header.data_block), header.data_block),
+    }
+    for name, (told, expected) in pairs.items():
+        if told != expected:
+            return f"{name} contradicts its header"
+    rate_hz = value("POINT", "RATE", header.rate_hz)
+    if not abs(rate_hz - header.rate_hz) <= 0.01 * header.rate_hz:
+        return "POINT:RATE contradicts its header"
+    if channels and not abs(value("ANALOG", "RATE", rate_hz * samples) - rate_hz * samples) <= 0.01 * rate_hz * samples:
+        return "ANALOG:RATE contradicts its header"
+    if value("POINT", "SCALE", header.scale) * header.scale < 0:
+        return "POINT:SCALE contradicts its header"
+    return (
+        _trial_doubt(header, parameters) or _list_doubt(parameters, int(channels)) or _plate_doubt(parameters, channels)
+    )
+
+
+def _trial_doubt(header: _Header, parameters: _Parameters) -> str:
+    """TRIAL:ACTUAL_START_FIELD and ..._END_FIELD, two words of 16 bits each, against the header."""
+    for name, expected in (("ACTUAL_START_FIELD", header.first), ("ACTUAL_END_FIELD", header.last)):
+        entry = parameters.get(("TRIAL", name))
+        if entry is not None:
+            words = [int(number) & 0xFFFF for number in entry.numbers] if entry.kind in "bh" else []
+            if len(words) != 2 or words[0] + 65536 * words[1] != expected:
+                return f"TRIAL:{name} contradicts its header"
+    return ""
+
+
+def _list_doubt(parameters: _Parameters, channels: int) -> str:
+    """Lists per channel that are shorter than there are channels, or not of numbers."""
+    if ("ROTATION", "USED") in parameters:
+        return "it has rotations"
+    for name in ("SCALE", "OFFSET"):
+        entry = parameters.get(("ANALOG", name))
+        if channels and (entry is None or len(entry.numbers) < channels):
+            return f"ANALOG:{name} has too few entries"
+    for (group, name), entry in parameters.items():
+        expected = "c" if name in ("LABELS", "UNITS", "DESCRIPTIONS") and group in ("POINT", "ANALOG") else ""
+        if expected and entry.kind != expected:
+            return f"{group}:{name} is no text"
+        if name in ("USED", "RATE", "SCALE", "OFFSET", "FRAMES") and entry.kind == "c":
+            return f"{group}:{name} is text"
+        if not all(map(math.isfinite, entry.numbers)) and (group, name) != ("ANALOG", "OFFSET"):
+            return f"{group}:{name} is not a number"
+    return ""
+
+
+def _plate_doubt(parameters: _Parameters, channels: float) -> str:
+    """Force plates whose lists do not fit their number and type."""
+
+    def entry(name: str) -> _Parameter:
+        return parameters.get(("FORCE_PLATFORM", name)) or _Parameter("h", (0,), b"", "<")
+
+    if not any(group == "FORCE_PLATFORM" for group, _ in parameters):
+        return ""
+    count = int(entry("USED").numbers[0]) if entry("USED").numbers else -1
+    if count == 0:
+        return ""
+    types = entry("TYPE").numbers
+    if count < 0 or len(types) < count:
+        return "FORCE_PLATFORM:TYPE has too few entries"
+    rows = len(entry("CHANNEL").numbers) / max(entry("CHANNEL").shape[-1] if entry("CHANNEL").shape else 1, 1)
+    for plate, kind in enumerate(types[:count]):
+        if kind not in _CHANNELS or rows < max(_CHANNELS[int(kind)]):
+            return f"force plate {plate + 1} is of type {kind:g}, with {rows:g} channels"
+    for name, shape in (("CORNERS", (3, 4)), ("ORIGIN", (3,)), ("CHANNEL", ())):
+        told = entry(name).shape
+        if not entry(name).numbers or told[: len(shape)] != shape or (told[-1] < count and len(told) > len(shape)):
+            return f"FORCE_PLATFORM:{name} does not fit {count} plates"
+        if len(entry(name).numbers) < math.prod(shape) * count:
+            return f"FORCE_PLATFORM:{name} does not fit {count} plates"
+    if 4 in types[:count] and len(entry("CAL_MATRIX").numbers) < 36 * count:
+        return f"FORCE_PLATFORM:CAL_MATRIX does not fit {count} plates"
+    if not all(1 <= number <= channels for number in entry("CHANNEL").numbers[: int(rows) * count]):
+        return "FORCE_PLATFORM:CHANNEL names channels that are not there"
+    return ""

@@ -1,0 +1,88 @@
+"""A hidden folder beside results in the making: locked as long as its process lives, swept by the next one otherwise.
+
+A killed process cleans up nothing, but the system takes its lock back: what nobody holds is what nobody needs.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+from uuid import uuid4
+
+from kinertia.errors import FileError
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+_PREFIX, _LOCK = ".kinertia.", "lock"
+BEFORE = "before"
+"""What a folder was, under its own name, while its successor takes its place in two steps."""
+
+
+@contextmanager
+def working_folder(within: Path) -> Iterator[Path]:
+    """A new hidden folder, removed at the end of the block.
+
+    Raises:
+        FileError: none can be made in `within`.
+    """
+    folder, lock = _new(within)
+    try:
+        yield folder
+    finally:
+        _remove(folder, lock)
+
+
+def sweep(within: Path) -> None:
+    """Remove what processes left that were killed, and put back what one of them had moved out of the way."""
+    for folder in within.glob(f"{_PREFIX}*"):
+        lock = _locked(folder) if folder.is_dir() else None
+        if lock is None:
+            continue
+        for kept in (folder / BEFORE).glob("*"):
+            if not (within / kept.name).exists():
+                os.rename(kept, within / kept.name)
+        _remove(folder, lock)
+
+
+def _new(within: Path) -> tuple[Path, BinaryIO]:
+    while True:
+        folder = within / f"{_PREFIX}{uuid4().hex[:12]}"
+        try:
+            folder.mkdir()
+        except OSError as error:
+            problem = f"cannot be written to ({error.strerror}); give another folder for the results"
+            raise FileError(within, problem) from error
+        lock = _locked(folder)
+        if lock is not None and (folder / _LOCK).is_file():  # else another process swept it just now
+            return folder, lock
+
+
+def _locked(folder: Path) -> BinaryIO | None:
+    """The folder's lock, held until it is closed; None where another process has it, or the folder is gone."""
+    try:
+        file = (folder / _LOCK).open("ab")
+    except OSError:
+        return None
+    try:
+        if sys.platform == "win32":
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # also where a network drive knows no locks: what is there stays
+        file.close()
+        return None
+    return file
+
+
+def _remove(folder: Path, lock: BinaryIO) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    lock.close()
+    shutil.rmtree(folder, ignore_errors=True)  # Windows removes no file that is open

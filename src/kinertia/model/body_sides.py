@@ -1,0 +1,148 @@
+"""Do the labels make a body? Left and right, front and back, outside and inside of a person, from the markers alone.
+
+Which way somebody faces is told by the feet and the pelvis, without any side; then every pair of landmarks says whether
+its right one is on the right, and every joint whether its outer landmark is outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import FloatArray, Markers
+
+_UP = np.array([0.0, 1.0, 0.0])
+_CLEAR = 0.5
+"""Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
+_PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
+_OUTER = (("knee_lateral", "knee_medial"), ("ankle_lateral", "ankle_medial"))
+_WORDS = {"r": "right", "l": "left"}
+
+
+def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
+    """What the labels have the wrong way round, what shows it, and what to do; empty where nothing is.
+
+    Directions are medians over the frames, so that a few bad frames do not count. Elbows are not looked at: an arm may
+    turn its outer side anywhere.
+
+    Args:
+        markers: of a person upright, standing or walking; Y up.
+        marker_set: which label is which landmark.
+    """
+    places = _landmarks(markers, marker_set)
+    fronts = _fronts(places)
+    if len(fronts) < 2:
+        return ""
+    turned = _odd_one_out(fronts)
+    if turned:
+        return _front_trouble(turned, marker_set)
+    forward = _level(np.nanmean([_unit(front) for front in fronts.values()], axis=0))
+    right = np.cross(forward, _UP)
+    across = {pair: _cosine(places[f"{pair}_r"] - places[f"{pair}_l"], right) for pair in _both(places)}
+    wrong = [pair for pair, cosine in across.items() if cosine < -_CLEAR]
+    if wrong and len(wrong) == sum(abs(cosine) > _CLEAR for cosine in across.values()) and len(wrong) > 1:
+        return (
+            f"all {len(wrong)} pairs of landmarks have left and right the wrong way round, as toes and pelvis face; "
+            f"either all left and right labels are swapped, or an axis of the laboratory is mirrored: correct the "
+            f"labels, or export in right-handed axes"
+        )
+    if wrong:
+        pairs = ", ".join(_names(marker_set, f"{pair}_r", f"{pair}_l") for pair in wrong)
+        return (
+            f"left and right look swapped in the labels {pairs}: toes and pelvis face the other way than they say; "
+            f"correct the labels"
+        )
+    return _outside_trouble(places, right, marker_set)
+
+
+def _landmarks(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:
+    """(n, 3) m of the landmarks whose labels are all there."""
+    return {
+        name: markers.select(labels).positions.mean(axis=1)
+        for name, labels in marker_set.landmarks.items()
+        if labels and set(labels) <= set(markers.labels)
+    }
+
+
+def _fronts(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """(n, 3): where the right foot, the left foot and the pelvis point, each from its own back to its front."""
+    found = {}
+    for side in "rl":
+        toe = next((f"{name}_{side}" for name in ("metatarsal", "toe") if f"{name}_{side}" in places), "")
+        if toe and f"heel_{side}" in places:
+            found[f"foot_{side}"] = _level(places[toe] - places[f"heel_{side}"])
+    back = [places[name] for name in ("psis_r", "psis_l", "sacrum") if name in places]
+    if back and {"asis_r", "asis_l"} <= set(places):
+        found["pelvis"] = _level((places["asis_r"] + places["asis_l"]) / 2 - np.mean(back, axis=0))
+    return {name: front for name, front in found.items() if np.isfinite(front).all(axis=1).any()}
+
+
+def _odd_one_out(fronts: Mapping[str, FloatArray]) -> str:
+    """The part that points backwards by the other two; of two parts nobody knows which is wrong."""
+    if len(fronts) < 3:
+        return ""
+    agreed = {(one, other): _cosine(fronts[one], fronts[other]) for one in fronts for other in fronts if one < other}
+    for part in fronts:
+        with_it = [cosine for pair, cosine in agreed.items() if part in pair]
+        without = [cosine for pair, cosine in agreed.items() if part not in pair]
+        if max(with_it) < -_CLEAR and min(without) > _CLEAR:
+            return part
+    return ""
+
+
+def _front_trouble(part: str, marker_set: MarkerSet) -> str:
+    if part == "pelvis":
+        labels = _names(marker_set, *(f"{name}_{side}" for name in ("asis", "psis") for side in "rl"), "sacrum")
+        return f"the pelvis points backwards by both feet: front and back look swapped in {labels}; correct the labels"
+    side = part[-1]
+    labels = _names(marker_set, f"heel_{side}", f"metatarsal_{side}", f"toe_{side}")
+    return (
+        f"the {_WORDS[side]} foot points backwards by the other foot and the pelvis: heel and toe look swapped in the "
+        f"labels {labels}; correct them"
+    )
+
+
+def _outside_trouble(places: Mapping[str, FloatArray], right: FloatArray, marker_set: MarkerSet) -> str:
+    for outer, inner in _OUTER:
+        for side, sign in (("r", 1.0), ("l", -1.0)):
+            names = (f"{outer}_{side}", f"{inner}_{side}")
+            if not set(names) <= set(places):
+                continue
+            outwards = _cosine(places[names[0]] - places[names[1]], sign * right)
+            if outwards < -_CLEAR:
+                joint = outer.partition("_")[0]
+                return (
+                    f"the outer marker of the {_WORDS[side]} {joint} is on its inner side: the labels "
+                    f"{_names(marker_set, *names)} look swapped; correct them"
+                )
+    return ""
+
+
+def _both(places: Mapping[str, FloatArray]) -> list[str]:
+    return [pair for pair in _PAIRS if {f"{pair}_r", f"{pair}_l"} <= set(places)]
+
+
+def _names(marker_set: MarkerSet, *landmarks: str) -> str:
+    labels: Sequence[str] = [label for name in landmarks for label in marker_set.landmarks.get(name, ())]
+    return " and ".join(dict.fromkeys(labels))
+
+
+def _level(vectors: FloatArray) -> FloatArray:
+    """The horizontal part."""
+    result: FloatArray = vectors * np.array([1.0, 0.0, 1.0])
+    return result
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    result: FloatArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return result
+
+
+def _cosine(vectors: FloatArray, others: FloatArray) -> float:
+    """Median over the frames of the cosine between the horizontal parts; 0 where nothing is seen."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosines = (_unit(_level(vectors)) * _unit(_level(others))).sum(axis=-1)
+    seen = cosines[np.isfinite(cosines)]
+    return float(np.median(seen)) if seen.size else 0.0

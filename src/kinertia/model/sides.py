@@ -1,0 +1,21 @@
+"""Which coordinates are one and the same on the right and on the left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
+    """Name without its side -> side -> index in `names`; the side is "" where the other one is not there too.
+
+    Examples:
+        >>> from kinertia.model.sides import by_side
+        >>> by_side(["pelvis_tilt", "knee_angle_r", "knee_angle_l"])
+        {'pelvis_tilt': {'': 0}, 'knee_angle': {'r': 1, 'l': 2}}
+    """
+    found: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        base, _, side = name.rpartition("_")
+        paired = side in ("r", "l") and {f"{base}_r", f"{base}_l"} <= set(names)
+        found.setdefault(base if paired else name, {})[side if paired else ""] = column
+    return found

@@ -1,0 +1,215 @@
+"""Strides of a trial, from heel strike to the next heel strike of the same foot.
+
+Plates see few of the contacts that a stride needs. So heel strikes and toe offs are first read off the motion: a foot
+lands about when its heel is farthest in front of the pelvis, and leaves about when its toes are farthest behind it
+(Zeni et al. 2008, Gait Posture 27:710). By how much that is early or late on average is learnt from the contacts that
+plates saw in the same trial; and where a load begins or ends at such a time, its time is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.kinematics import Kinematics
+from kinertia.trial.data import FEET
+from kinertia.trial.gait_events import GaitEvent, gait_events, load_edges
+from kinertia.trial.ground_contact import CONTACT_SLACK_S
+
+PERCENT = np.arange(101.0)
+"""Of the gait cycle, at which curves are given."""
+_LEAST_SWING_M = 0.1
+"""A foot moves back and forth under the pelvis by at least this much; else nobody walks."""
+_SAME_EVENT_S = 0.1
+"""Plates and motion may differ by this much over one event."""
+_STRIDE_S = (0.4, 3.0)
+_PHASE = (0.15, 0.85)
+"""Of a stride, where the other foot lands: not so in squats and jumps, where both feet move together."""
+_HEADING_S = 0.25
+
+
+@dataclass(frozen=True)
+class Stride:
+    """One stride of one foot; times in s.
+
+    Attributes:
+        side: "r" or "l".
+        number: counted from 1, per trial and side.
+        start_s, end_s: heel strikes.
+        toe_off_s: between them; NaN where it was not found.
+        opposite_toe_off_s, opposite_strike_s: of the other foot, between them; the first may be NaN.
+        on_plates: whether plates saw both heel strikes; else the motion told at least one.
+
+    Examples:
+        >>> stride = fit.strides[0]
+        >>> bool(stride.start_s < stride.toe_off_s < stride.end_s)
+        True
+    """
+
+    side: str
+    number: int
+    start_s: float
+    end_s: float
+    toe_off_s: float
+    opposite_toe_off_s: float
+    opposite_strike_s: float
+    on_plates: bool
+
+    @property
+    def time(self) -> np.ndarray:
+        """(101,) s at 0, 1, ..., 100 % of the cycle."""
+        return self.start_s + PERCENT / 100.0 * (self.end_s - self.start_s)
+
+    def percent(self, time_s: float) -> float:
+        """What share of the stride is over at this time, %."""
+        return 100.0 * (time_s - self.start_s) / (self.end_s - self.start_s)
+
+
+@dataclass(frozen=True, eq=False)
+class FeetUnderPelvis:
+    """Where heels, toes and pelvis are, by inverse kinematics.
+
+    Attributes:
+        time: (n,) s.
+        heading: (n, 3) unit, horizontal: where the pelvis faces, averaged over about a step.
+        pelvis: (n, 3) m.
+        heel, toe: per side (n, 3) m, the rearmost and the foremost marker of the foot.
+    """
+
+    time: np.ndarray
+    heading: np.ndarray
+    pelvis: np.ndarray
+    heel: Mapping[str, np.ndarray]
+    toe: Mapping[str, np.ndarray]
+
+    def ahead(self, points: np.ndarray) -> np.ndarray:
+        """(n,) m by which points (n, 3) are in front of the pelvis."""
+        return np.asarray(((points - self.pelvis) * self.heading).sum(axis=1))
+
+
+def feet_under_pelvis(skeleton: Skeleton, kinematics: Kinematics) -> FeetUnderPelvis:
+    """Heels, toes and pelvis in all frames between the first and the last that inverse kinematics solved."""
+    time = kinematics.spline.time
+    places = {side: _heel_and_toe(skeleton, segment) for side, segment in zip(FEET, skeleton.feet, strict=True)}
+    rows = {side: skeleton.segments.index(segment) for side, segment in zip(FEET, skeleton.feet, strict=True)}
+    parts: list[list[np.ndarray]] = []
+    for some in pieces(len(time)):
+        pose = skeleton.pose(kinematics.spline(time[some]))
+        feet = [
+            pose.rotation[:, rows[side]] @ place + pose.translation[:, rows[side]]
+            for side in FEET
+            for place in places[side]
+        ]
+        parts.append([pose.rotation[:, 0, :, 0], pose.translation[:, 0], *feet])
+    facing, pelvis, *points = (np.concatenate(column) for column in zip(*parts, strict=True))
+    facing = gaussian_filter1d(facing, _HEADING_S * len(time) / max(np.ptp(time), 1e-9), axis=0, mode="nearest")
+    facing = facing * [1.0, 0.0, 1.0]
+    heading = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
+    return FeetUnderPelvis(
+        time, heading, pelvis, dict(zip(FEET, points[0::2], strict=True)), dict(zip(FEET, points[1::2], strict=True))
+    )
+
+
+def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) m each in the foot's frame; its origin where it bears no marker."""
+    positions = [marker.position for marker in skeleton.markers if marker.segment == segment] or [np.zeros(3)]
+    along = [position[0] for position in positions]
+    return positions[int(np.argmin(along))], positions[int(np.argmax(along))]
+
+
+def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]:
+    """All strides of a trial, right foot first; none where nobody walks or runs."""
+    feet = feet_under_pelvis(skeleton, kinematics)
+    events = _with_plates(_from_motion(feet), kinematics)
+    strikes = {side: [e for e in events if e.event.side == side and e.event.kind == "heel strike"] for side in FEET}
+    offs = {side: [e.event.time_s for e in events if e.event[1:] == (side, "toe off")] for side in FEET}
+    found = []
+    for side, other in zip(FEET, reversed(FEET), strict=True):
+        number = 0
+        for first, second in zip(strikes[side], strikes[side][1:], strict=False):
+            start, end = first.event.time_s, second.event.time_s
+            across = _between([e.event.time_s for e in strikes[other]], start, end)
+            usual = _STRIDE_S[0] <= end - start <= _STRIDE_S[1] and len(across) == 1
+            if not usual or not _PHASE[0] <= (across[0] - start) / (end - start) <= _PHASE[1]:
+                continue
+            number += 1
+            off = _only(_between(offs[side], start, end))
+            other_off = _only(_between(offs[other], start, across[0]))
+            found.append(Stride(side, number, start, end, off, other_off, across[0], first.seen and second.seen))
+    return tuple(found)
+
+
+def _between(times: Sequence[float], start: float, end: float) -> list[float]:
+    return [time for time in times if start < time < end]
+
+
+def _only(times: Sequence[float]) -> float:
+    """The one time; NaN where there is none, or several."""
+    return times[0] if len(times) == 1 else float("nan")
+
+
+@dataclass(frozen=True)
+class _Event:
+    """An event, and whether a plate saw it."""
+
+    event: GaitEvent
+    seen: bool
+
+
+def _from_motion(feet: FeetUnderPelvis) -> list[GaitEvent]:
+    found = []
+    for side in FEET:
+        for frame in turning_points(feet.ahead(feet.heel[side]), _LEAST_SWING_M):
+            found.append(GaitEvent(float(feet.time[frame]), side, "heel strike"))
+        for frame in turning_points(-feet.ahead(feet.toe[side]), _LEAST_SWING_M):
+            found.append(GaitEvent(float(feet.time[frame]), side, "toe off"))
+    return sorted(found)
+
+
+def turning_points(values: np.ndarray, least: float) -> list[int]:
+    """Indices of the maxima of values (n,) that rise above what is before and after them by at least so much."""
+    found: list[int] = []
+    high = low = 0
+    rising = False
+    for k, value in enumerate(values):
+        if rising:
+            if value > values[high]:
+                high = k
+            elif values[high] - value >= least:
+                found.append(high)
+                rising, low = False, k
+        elif value < values[low]:
+            low = k
+        elif value - values[low] >= least:
+            rising, high = True, k
+    return found
+
+
+def _with_plates(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[_Event]:
+    """The events at the plates' times where these saw them, else moved by what the motion is early on average."""
+    certain, edges = gait_events(kinematics.trial), load_edges(kinematics.trial.loads)
+    early = {}
+    for kind in ("heel strike", "toe off"):
+        gaps = [
+            seen.time_s - event.time_s
+            for event in events
+            if event.kind == kind and (seen := _nearest(certain, event, _SAME_EVENT_S)) is not None
+        ]
+        early[kind] = float(np.median(gaps)) if gaps else 0.0
+    placed = []
+    for event in events:
+        moved = event._replace(time_s=event.time_s + early[event.kind])
+        seen = _nearest(edges, moved, CONTACT_SLACK_S)
+        placed.append(_Event(moved if seen is None else seen, seen is not None))
+    return sorted(placed, key=lambda one: one.event)
+
+
+def _nearest(events: Sequence[GaitEvent], to: GaitEvent, within_s: float) -> GaitEvent | None:
+    """The event of the same kind and foot that is nearest in time, if it is near."""
+    alike = [event for event in events if event[1:] == to[1:] and abs(event.time_s - to.time_s) <= within_s]
+    return min(alike, key=lambda event: abs(event.time_s - to.time_s), default=None)

@@ -1,0 +1,200 @@
+"""Several results side by side: what differs by more than the error bars say.
+
+Sessions of one person, two methods or two models on one recording: rows are body segment parameters and strides,
+the first result is what the others are compared with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinertia.checks.verdict import verdicts, worst_level
+from kinertia.estimation.result import Fit
+from kinertia.model.bsp import PARAMETERS, UNITS
+from kinertia.report import style
+from kinertia.report.bsp_figures import NAMES, segment_name
+from kinertia.report.coordinate_titles import load_title, panels_of
+from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
+from kinertia.report.cycle_table import stride_rows
+from kinertia.report.figure import Figure, written
+from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.rendering import rendered
+from kinertia.report.wording import decimals, fixed, read_in
+from kinertia.trial.data import FEET
+
+CHANGED_SD = 1.96
+"""A difference of more than this many of its own deviations is a change."""
+_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
+MOST_FITS = len(_COLOURS)
+_MOMENTS = ("hip_flexion", "hip_adduction", "knee_angle", "ankle_angle")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One parameter of one segment in two results.
+
+    Attributes:
+        segment, parameter, unit: which; SI units.
+        first, other: their values.
+        sd: of the difference, from both error bars as if they were independent. They are not: both lean on the same
+            prior, which makes the true one smaller. NaN where a result has no error bars.
+    """
+
+    segment: str
+    parameter: str
+    unit: str
+    first: float
+    other: float
+    sd: float
+
+    @property
+    def change(self) -> float:
+        """Other minus first."""
+        return self.other - self.first
+
+    @property
+    def changed(self) -> bool:
+        """Whether they differ beyond the error bars."""
+        return bool(self.sd > 0 and abs(self.change) > CHANGED_SD * self.sd)
+
+
+def differences(first: Fit, other: Fit) -> list[Difference]:
+    """Of all parameters of the segments that both have, segment by segment."""
+    found = []
+    for segment in first.estimate.segments:
+        if segment not in other.estimate.segments:
+            continue
+        rows = [fit.estimate.segments.index(segment) for fit in (first, other)]
+        values = [fit.estimate.table()[row] for fit, row in zip((first, other), rows, strict=True)]
+        sds = [_sd(fit)[row] for fit, row in zip((first, other), rows, strict=True)]
+        for k, parameter in enumerate(PARAMETERS):
+            sd = float(np.hypot(sds[0][k], sds[1][k]))
+            found.append(Difference(segment, parameter, UNITS[k], float(values[0][k]), float(values[1][k]), sd))
+    return found
+
+
+def _sd(fit: Fit) -> np.ndarray:
+    return np.full(fit.estimate.table().shape, np.nan) if fit.posterior is None else fit.posterior.sd
+
+
+def remarks(fits: Mapping[str, Fit]) -> list[str]:
+    """What makes a comparison say less than it seems to."""
+    (name, first), *others = fits.items()
+    said = []
+    for other_name, other in others:
+        if abs(first.mass_kg - other.mass_kg) > 0.1 * first.mass_kg:
+            said.append(f"{name} is of {first.mass_kg:.1f} kg, {other_name} of {other.mass_kg:.1f} kg: one person?")
+        lacking = sorted(set(first.estimate.segments) ^ set(other.estimate.segments))
+        if lacking:
+            said.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
+        if first.skeleton.name != other.skeleton.name:
+            said.append(f"{name} and {other_name} are of different models: their joint axes and segments differ")
+    without = [one for one, fit in fits.items() if fit.posterior is None]
+    if without:
+        said.append(f"no error bars, so nothing is marked as changed: {', '.join(without)} (two-level)")
+    return said
+
+
+def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
+    """The table of `compare.csv`: a row per other result, segment and parameter."""
+    (name, first), *others = fits.items()
+    rows = [(name, other_name, one) for other_name, other in others for one in differences(first, other)]
+    return {
+        "first": [row[0] for row in rows],
+        "other": [row[1] for row in rows],
+        **{key: [getattr(one, key) for *_, one in rows] for key in ("segment", "parameter", "unit")},
+        "first_value": [one.first for *_, one in rows],
+        "other_value": [one.other for *_, one in rows],
+        **{key: [getattr(one, key) for *_, one in rows] for key in ("change", "sd", "changed")},
+    }
+
+
+def render_comparison(fits: Mapping[str, Fit]) -> str:
+    """The page of `kinertia compare`; results by the names that it calls them."""
+    (name, first), *others = fits.items()
+    figure = moments_figure(fits)
+    pairs = [(other_name, differences(first, other)) for other_name, other in others]
+    return rendered(
+        "compare.html.j2",
+        title="Comparison: " + ", ".join(fits),
+        first=name,
+        results=[_head(one, fit) for one, fit in fits.items()],
+        remarks=remarks(fits),
+        pairs=[
+            {
+                "name": other,
+                "count": len(found),
+                "changed": sum(one.changed for one in found),
+                "judged": any(np.isfinite(one.sd) for one in found),
+                "rows": [_row(one) for one in found],
+            }
+            for other, found in pairs
+        ],
+        strides={one: stride_rows(fit) for one, fit in fits.items() if _strides(fit)},
+        measures=[row.measure for row in next((stride_rows(fit) for fit in fits.values() if _strides(fit)), [])],
+        figure=None if figure is None else written(figure),
+        sd=CHANGED_SD,
+    )
+
+
+def _strides(fit: Fit) -> bool:
+    return any(trial.strides for trial in fit.trials)
+
+
+def _head(name: str, fit: Fit) -> dict[str, Any]:
+    return {
+        "name": name,
+        "subject": fit.subject.name,
+        "mass": fit.mass_kg,
+        "method": fit.settings.method,
+        "model": fit.skeleton.name,
+        "trials": ", ".join(trial.name for trial in fit.trials),
+        "level": worst_level(verdicts(fit)),
+    }
+
+
+def _row(one: Difference) -> dict[str, Any]:
+    k = PARAMETERS.index(one.parameter)
+    unit, factor = read_in(k)
+    digits = decimals(k, one.sd if one.sd > 0 else 0.1 * max(abs(one.first), abs(one.other)))
+    numbers = {"first": one.first, "other": one.other, "change": one.change, "sd": one.sd}
+    cells = {
+        key: {"value": value * factor, "text": fixed(value * factor, digits, sign=key == "change")}
+        for key, value in numbers.items()
+        if np.isfinite(value)
+    }
+    return {
+        "segment": segment_name(one.segment),
+        "parameter": f"{NAMES[k]} ({unit})",
+        "changed": one.changed,
+        **cells,
+    }
+
+
+def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
+    """Mean joint moments of the legs over the gait cycle, a colour per result; None where none has strides."""
+    walked = {name: fit for name, fit in fits.items() if _strides(fit)}
+    if not walked:
+        return None
+    curves = {name: curves_of(fit, "estimate") for name, fit in walked.items()}
+    first = next(iter(walked.values()))
+    titles = {one.name: load_title(one, "moment") for one in panels_of(first.skeleton) if one.name in _MOMENTS}
+    panels = []
+    for joint, title in titles.items():
+        for side in FEET:
+            traces = [
+                {**mean_line(mean_curve(found)), "name": name, "line": {"color": colour, "width": 2}}
+                for (name, own), colour in zip(curves.items(), _COLOURS, strict=False)
+                if (found := own.get((f"{joint}_moment", side)))
+            ]
+            if traces:
+                panels.append(Panel(f"{style.SIDES[side][0].capitalize()} {title[0].lower()}{title[1:]}", traces))
+    if not panels:
+        return None
+    axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
+    axis["title"] = {"text": "% of the gait cycle", "font": {"size": 11}, "standoff": 2}
+    return small_multiples(panels, f"Mean joint moments (N m/kg) over the gait cycle of {', '.join(walked)}.", axis)

@@ -1,0 +1,213 @@
+"""Curves over the gait cycle: all strides of a person, right and left each from its own heel strike on.
+
+Strides are thin, their mean is thick with a band of one standard deviation around it; the estimate's own 95 % band is
+the darker one. What the usual pipeline gives is dotted. Where nothing was measured there is a gap.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
+from kinertia.estimation.result import Fit
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.gait_cycle import PERCENT
+from kinertia.report import style
+from kinertia.report.coordinate_titles import load_title, panels_of
+from kinertia.report.figure import Figure, compact
+from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.wording import start_of
+from kinertia.trial.data import FEET, runs
+
+MOST_STRIDES = 100
+"""Of a trial and side; of more, so many are taken, evenly spread."""
+_MOST_DRAWN = 5
+"""Of a side; mean and bands are of all."""
+_BAND_SD = 1.96
+_SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY = 0.13, 0.25, 0.45
+_FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
+
+Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
+"""By quantity and side."""
+
+
+def cycle_figures(fit: Fit) -> dict[Kind, Figure]:
+    """All figures over the gait cycle, by kind; none where no trial has a stride."""
+    if not any(trial.strides for trial in fit.trials):
+        return {}
+    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"))
+    return {kind: drawn.figure(kind) for kind in UNITS}
+
+
+def cycle_figure(fit: Fit, kind: Kind) -> Figure | None:
+    """The one of this kind; None where no trial has a stride."""
+    return cycle_figures(fit).get(kind)
+
+
+def curves_of(fit: Fit, stage: Stage) -> Curves:
+    """All curves of a fit that figures are drawn from."""
+    found: dict[tuple[str, str], list[CycleCurve]] = {}
+    for trial in fit.trials:
+        for one in cycle_curves(trial, fit.mass_kg, stage, spread_evenly(trial.strides, MOST_STRIDES)):
+            found.setdefault((one.quantity, one.stride.side), []).append(one)
+    return found
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What the figures are drawn from."""
+
+    fit: Fit
+    estimate: Curves
+    usual: Curves
+
+    def figure(self, kind: Kind) -> Figure:
+        panels = [
+            Panel(f"{title} ({UNITS[kind]})", [*self._traces(quantity)], self._toe_offs())
+            for quantity, title in self._quantities(kind)
+            if any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
+        ]
+        axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
+        axis["title"] = {"text": "% of the gait cycle", "font": {"size": 11}, "standoff": 2}
+        return small_multiples(panels, self._alt(kind), axis)
+
+    def _quantities(self, kind: Kind) -> list[tuple[str, str]]:
+        """Names and titles, in the order of the panels."""
+        if kind == "force":
+            return list(_FORCE_TITLES.items())
+        coordinates = [one for one in panels_of(self.fit.skeleton) if one.rotational]
+        if kind == "angle":
+            return [(f"{one.name}_angle", one.title) for one in coordinates]
+        if kind == "power":  # of arms and trunk next to nothing
+            legs = _leg_coordinates(self.fit.skeleton)
+            coordinates = [one for one in coordinates if legs & set(one.columns.values())]
+        return [(f"{one.name}_{kind}", load_title(one, kind)) for one in coordinates]
+
+    def _traces(self, quantity: str) -> Iterator[dict[str, Any]]:
+        values = start_of(self.fit).values
+        for side in FEET:
+            curves, usual = (found.get((quantity, side), []) for found in (self.estimate, self.usual))
+            word, colour = style.SIDES[side]
+            if curves:
+                yield from _estimate(curves, word, colour)
+            if usual:
+                line = {"color": colour, "dash": "dot", "width": 1.6}
+                yield {**mean_line(mean_curve(usual)), "name": f"{word}, {values}", "line": line}
+
+    def _toe_offs(self) -> list[dict[str, Any]]:
+        """A vertical line per side at its mean toe off."""
+        shapes = []
+        for side in FEET:
+            strides = [stride for trial in self.fit.trials for stride in trial.strides if stride.side == side]
+            percents = [p for stride in strides if np.isfinite(p := stride.percent(stride.toe_off_s))]
+            if percents:
+                at = round(float(np.mean(percents)), 2)
+                line = {"color": style.faded(style.SIDES[side][1], 0.6), "width": 1, "dash": "dash"}
+                shapes.append({"type": "line", "x0": at, "x1": at, "y0": 0, "y1": 1, "yref": "domain", "line": line})
+        return shapes
+
+    def _alt(self, kind: Kind) -> str:
+        names = {
+            "angle": "Joint angles",
+            "moment": "Joint moments",
+            "power": "Joint powers",
+            "force": "Ground reactions",
+        }
+        counts = [sum(stride.side == side for trial in self.fit.trials for stride in trial.strides) for side in FEET]
+        unit, start = UNITS[kind], start_of(self.fit)
+        return (
+            f"{names[kind]} ({unit}) over the gait cycle, estimate against {start.values}; strides: {counts[0]} right, "
+            f"{counts[1]} left."
+        )
+
+
+def _leg_coordinates(skeleton: Skeleton) -> set[int]:
+    """Those that move a foot."""
+    feet = [skeleton.segments.index(foot) for foot in skeleton.feet]
+    return set(skeleton.map.owner[skeleton.support[feet].any(axis=0)].tolist())
+
+
+def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:
+    """Bands below, strides, and their mean on top."""
+    mean, spread = mean_curve(curves), _spread(curves)
+    if spread is not None:
+        yield {**_band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
+    sds = [one.sd for one in curves if one.sd is not None]
+    if sds:
+        half = _BAND_SD * _over_strides(np.nanmean, np.array(sds))
+        name = f"{word}, 95 % of the estimate"
+        yield {**_band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
+    if len(curves) > 1:
+        shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
+        line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
+        yield {**_strides(shown), "name": f"{word}, strides", "line": line}
+    name = f"{word}, mean" if len(curves) > 1 else f"{word}, one stride"
+    yield {**mean_line(mean), "name": name, "line": {"color": colour, "width": 2.2}}
+
+
+def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
+    """(101,) of the strides that were measured there; NaN where none was."""
+    return _over_strides(np.nanmean, np.array([one.value for one in curves]))
+
+
+def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
+    """(101,) standard deviation between strides, NaN where fewer than two were measured; None if so everywhere."""
+    values = np.array([one.value for one in curves])
+    several = np.isfinite(values).sum(axis=0) > 1
+    if not several.any():
+        return None
+    found = np.full(values.shape[1], np.nan)
+    found[several] = np.nanstd(values[:, several], axis=0, ddof=1)
+    return found
+
+
+def _over_strides(statistic: Any, values: np.ndarray) -> np.ndarray:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of percents that no stride has
+        return np.asarray(statistic(values, axis=0))
+
+
+def mean_line(values: np.ndarray) -> dict[str, Any]:
+    """The trace of one curve (101,)."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x0": 0,
+        "dx": 1,
+        "y": compact(values),
+        "hovertemplate": "%{x:.0f} %: %{y:.3g}<extra>%{fullData.name}</extra>",
+    }
+
+
+def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
+    """All of them as one line with gaps between them."""
+    x = np.tile(np.append(PERCENT, 100), len(curves)).astype(np.uint8)
+    y = np.concatenate([np.append(one.value, np.nan) for one in curves])
+    said = [f"{one.trial}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
+    hover = "%{x:.0f} %: %{y:.3g}<extra>" + (said[0] if len(said) == 1 else "%{fullData.name}") + "</extra>"
+    return {"type": "scatter", "mode": "lines", "x": x, "y": compact(y), "hovertemplate": hover}
+
+
+def _band(low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
+    """A closed outline around every stretch without a gap."""
+    x: list[np.ndarray] = []
+    y: list[np.ndarray] = []
+    for first, last in runs(np.isfinite(low) & np.isfinite(high)):
+        part = slice(first, last + 1)
+        x += [PERCENT[part], PERCENT[part][::-1], np.zeros(1)]
+        y += [low[part], high[part][::-1], np.full(1, np.nan)]
+    outline = {"fill": "toself", "fillcolor": colour, "line": {"width": 0}, "hoverinfo": "skip"}
+    if not x:
+        return {"type": "scatter", "mode": "lines", "x": [], "y": [], **outline}
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": np.concatenate(x)[:-1].astype(np.uint8),
+        "y": compact(np.concatenate(y)[:-1]),
+        **outline,
+    }

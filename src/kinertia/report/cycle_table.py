@@ -1,0 +1,54 @@
+"""The table of strides: mean and standard deviation of the spatiotemporal measures, per side."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.estimation.cycles import spatiotemporal_columns
+from kinertia.estimation.result import Fit
+from kinertia.trial.data import FEET
+
+_ROWS = (
+    ("speed_m_s", "speed (m/s)", 2),
+    ("cadence_steps_min", "cadence (steps/min)", 1),
+    ("stride_length_m", "stride length (m)", 3),
+    ("step_length_m", "step length (m)", 3),
+    ("stride_time_s", "stride time (s)", 3),
+    ("step_time_s", "step time (s)", 3),
+    ("step_width_m", "step width (m)", 3),
+    ("stance_percent", "stance (% of the cycle)", 1),
+    ("double_support_percent", "double support (% of the cycle)", 1),
+)
+
+
+class MeasureRow(NamedTuple):
+    """One measure in words; per side, mean and standard deviation."""
+
+    measure: str
+    right: str
+    left: str
+
+
+def stride_rows(fit: Fit) -> list[MeasureRow]:
+    """The table's rows; none where no trial has a stride."""
+    columns = spatiotemporal_columns(fit.trials)
+    if not columns["side"]:
+        return []
+    sides = np.array(columns["side"])
+    found = [
+        MeasureRow(title, *(_told(np.array(columns[name])[sides == side], digits) for side in FEET))
+        for name, title, digits in _ROWS
+    ]
+    return [MeasureRow("strides", *(str(int((sides == side).sum())) for side in FEET)), *found]
+
+
+def _told(values: np.ndarray, digits: int) -> str:
+    """Mean, with the standard deviation of several."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return "–"
+    if len(known) == 1:
+        return f"{known[0]:.{digits}f}"
+    return f"{known.mean():.{digits}f} ± {known.std(ddof=1):.{digits}f}"

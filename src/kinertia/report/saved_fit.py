@@ -1,0 +1,97 @@
+"""`load_fit`: a result from its folder, without the recordings that it was estimated from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from kinertia.errors import FileError
+from kinertia.estimation.identifiability import BaseParameters, Combination
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation
+from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from kinertia.io.object_archive import read_archive, write_archive
+from kinertia.io.provenance import VERSION, Provenance, versions
+from kinertia.model.axis_functions import Composed, PiecewisePolynomial
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.imported import Coupling, OsimCoordinate, OsimJoint, OsimModel
+from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.inverse_kinematics import InverseKinematics
+from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.smoothing import SmoothedSpline
+from kinertia.settings import Settings, Subject
+from kinertia.trial.data import FootLoads, Markers, Trial
+
+FIT_FILE = "fit.npz"
+
+
+@dataclass(frozen=True, eq=False)
+class SavedFit:
+    """What `fit.npz` holds.
+
+    Attributes:
+        fit: the result.
+        provenance: command and files that it is from, if they are known.
+        versions: of what computed it.
+    """
+
+    fit: Fit
+    provenance: Provenance | None
+    versions: Mapping[str, str]
+
+
+_KINDS = (
+    SavedFit, Provenance, Fit, TrialFit, Subject, Settings,
+    Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
+    Skeleton, Joint, Axis, Marker, PiecewisePolynomial, Composed, BodySegmentParameters,
+    OsimModel, OsimJoint, OsimCoordinate, Coupling,
+    Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads,
+)  # fmt: skip
+"""All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
+
+
+def write_fit(fit: Fit, provenance: Provenance | None, path: Path) -> None:
+    """Write everything that a result is into one file."""
+    write_archive(path, SavedFit(fit, provenance, versions()), _KINDS, {"kinertia": VERSION})
+
+
+def read_saved(folder: str | Path) -> SavedFit:
+    """The result in a folder, with what it is from.
+
+    Raises:
+        FileError: as `load_fit`.
+    """
+    path = Path(folder) / FIT_FILE
+    if not Path(folder).is_dir():
+        raise FileError(folder, "no such folder; give one that kinertia fit has written")
+    if not path.is_file():
+        older = (Path(folder) / "fit.json").is_file()
+        problem = f"holds no {FIT_FILE}: " + (
+            "these results are from a version that did not write it; run kinertia fit again"
+            if older
+            else "no results of kinertia fit are there; give the folder that its option -o named"
+        )
+        raise FileError(folder, problem)
+    saved = read_archive(path, _KINDS)
+    if not isinstance(saved, SavedFit):
+        raise FileError(path, "is no result of kinertia fit; give another folder")
+    return saved
+
+
+def load_fit(folder: str | Path) -> Fit:
+    """A result from the folder it was saved to: figures, tables, cycles and `save`, without the recordings.
+
+    Raises:
+        FileError: no result is there, or it cannot be read.
+
+    Examples:
+        >>> folder = fit.save("results")
+        >>> again = kinertia.load_fit(folder)
+        >>> bool((again.bsp.estimate == fit.bsp.estimate).all())
+        True
+    """
+    return read_saved(folder).fit

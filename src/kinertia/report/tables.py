@@ -1,0 +1,109 @@
+"""Everything that a result says in numbers, as tables: for Excel, MATLAB, R and scripts."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.cycles import cycle_columns, spatiotemporal_columns
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.report.files import write_columns
+
+Column = Sequence[Any] | np.ndarray
+Table = Mapping[str, Column]
+"""Columns of one length, by name."""
+
+
+def person_tables(fit: Fit) -> dict[str, Table]:
+    """Tables of all trials together: body segment parameters, calibration, strides and curves over the cycle."""
+    found: dict[str, Table] = {"bsp": fit.bsp_columns()}
+    if fit.posterior is not None:
+        names = list(fit.posterior.calibration)
+        told = [fit.posterior.calibration[name] for name in names]
+        values = {key: [one[key] for one in told] for key in ("value", "prior_sd", "sd", "unit")}
+        found["calibration"] = {"quantity": names, **values}
+    if any(trial.strides for trial in fit.trials):
+        found["spatiotemporal"] = spatiotemporal_columns(fit.trials)
+        found["cycles"] = cycle_columns(fit.trials, fit.mass_kg)
+        found["cycles_literature"] = cycle_columns(fit.trials, fit.mass_kg, "literature")
+    return found
+
+
+def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
+    """Tables over the time (s) of one trial: coordinates in degrees and m, joint moments in N m (forces in N)."""
+    names, turns = fit.skeleton.coordinates, fit.skeleton.rotational
+
+    def over_time(values: np.ndarray) -> Table:
+        return {"time_s": trial.time, **dict(zip(names, values.T, strict=True))}
+
+    q = trial.motion.q
+    found = {"coordinates": over_time(np.where(turns, np.degrees(q), q))}
+    found |= {
+        "moments" if stage == "estimate" else f"moments_{stage}": over_time(loads)
+        for stage, loads in trial.joint_loads.items()
+    }
+    if trial.joint_load_sd is not None:
+        found["moments_sd"] = over_time(trial.joint_load_sd)
+    axes = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
+    residual = trial.residuals["estimate"]
+    found["residuals"] = {"time_s": trial.time, **dict(zip(axes, residual.T, strict=True))}
+    return found
+
+
+def write_csv(fit: Fit, folder: Path) -> None:
+    """One file per table; those of a trial in a folder of its name."""
+    for name, table in person_tables(fit).items():
+        write_columns(folder / f"{name}.csv", table)
+    for trial in fit.trials:
+        (folder / trial.name).mkdir()
+        for name, table in trial_tables(fit, trial).items():
+            write_columns(folder / trial.name / f"{name}.csv", table)
+
+
+def write_json(fit: Fit, path: Path) -> None:
+    """One file: tables by name, and under "trials" those of every trial; a gap is null."""
+    told: dict[str, Any] = {name: _lists(table) for name, table in person_tables(fit).items()}
+    told["trials"] = {
+        trial.name: {name: _lists(table) for name, table in trial_tables(fit, trial).items()} for trial in fit.trials
+    }
+    path.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def write_mat(fit: Fit, path: Path) -> None:
+    """One file for MATLAB: a struct per table with a field per column, and a struct array `trials`."""
+    from scipy.io import savemat
+
+    told: dict[str, Any] = {name: _fields(table) for name, table in person_tables(fit).items()}
+    told["trials"] = [
+        {"name": trial.name, **{name: _fields(table) for name, table in trial_tables(fit, trial).items()}}
+        for trial in fit.trials
+    ]
+    savemat(path, told, long_field_names=True, oned_as="column")
+
+
+def _lists(table: Table) -> dict[str, list[Any]]:
+    return {name: [_plain(value) for value in _list(values)] for name, values in table.items()}
+
+
+def _list(values: Column) -> list[Any]:
+    return values.tolist() if isinstance(values, np.ndarray) else list(values)
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _fields(table: Table) -> dict[str, Any]:
+    """Texts as cells; names as MATLAB allows them."""
+    found = {}
+    for name, values in table.items():
+        texts = any(isinstance(value, str) for value in _list(values)[:1])
+        word = re.sub(r"\W", "_", name, flags=re.ASCII)
+        found[word if word[:1].isalpha() else f"x{word}"] = np.array(values, dtype=object if texts else None)
+    return found

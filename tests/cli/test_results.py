@@ -1,0 +1,81 @@
+"""Commands on finished results: they need no recordings."""
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import loadmat
+
+from command_line import run
+from kinertia.report.saved_fit import FIT_FILE
+
+
+@pytest.fixture
+def results(demo_run, tmp_path):
+    """What is needed of a result folder, alone."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name in (FIT_FILE, "report.html", "fit.json"):
+        shutil.copy(demo_run[1] / name, folder)
+    return folder
+
+
+def test_the_report_is_written_again_as_it_was(results):
+    before = (results / "report.html").read_text(encoding="utf-8")
+    (results / "report.html").unlink()
+    told = run("report", results)
+    assert told.status == 0, told.err
+    assert (results / "report.html").read_text(encoding="utf-8") == before
+    assert "<code>kinertia " in before  # command and files stay known
+
+
+def test_export_says_what_the_tables_say(fit, results):
+    told = run("export", results, "--csv", "--json", "--mat")
+    assert told.status == 0, told.err
+    folder = results / "export"
+    (trial,) = fit.trials
+    csv = pd.read_csv(folder / "cycles.csv")
+    pd.testing.assert_frame_equal(csv, fit.cycles(), check_dtype=False, rtol=1e-15, atol=0)
+    moments = pd.read_csv(folder / trial.name / "moments.csv", index_col="time_s")
+    np.testing.assert_allclose(moments, trial.moments["estimate"], rtol=1e-15)
+    plain = json.loads((folder / "tables.json").read_text())
+    np.testing.assert_array_equal(plain["bsp"]["estimate"], fit.bsp.estimate)
+    assert None in plain["cycles"]["value"]  # gaps
+    np.testing.assert_array_equal(plain["trials"][trial.name]["moments"]["knee_angle_r"], moments.knee_angle_r)
+    mat = loadmat(folder / "tables.mat", simplify_cells=True)
+    np.testing.assert_array_equal(mat["bsp"]["estimate"], fit.bsp.estimate)
+    assert list(mat["bsp"]["segment"]) == list(fit.bsp.segment)
+    assert mat["trials"]["name"] == trial.name
+    angle = np.degrees(trial.coordinates.knee_angle_r)
+    np.testing.assert_allclose(mat["trials"]["coordinates"]["knee_angle_r"], angle, rtol=1e-12)
+
+
+def test_export_asks_for_a_form(results):
+    told = run("export", results)
+    assert told.status == 2
+    assert "--csv, --json or --mat" in " ".join(told.err.split())
+
+
+@pytest.mark.parametrize("command", [["report"], ["export", "--csv"]])
+def test_a_folder_without_results_is_told(tmp_path, command):
+    told = run(command[0], tmp_path, *command[1:])
+    assert told.status == 2
+    assert "no results of kinertia fit are there" in " ".join(told.err.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_fit_takes_a_folder_with_a_subject_file(tmp_path):
+    told = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert told.status == 2
+    assert "holds no subject file; draft one with: kinertia init" in " ".join(told.err.split())
+    (tmp_path / "subject.toml").write_text("[subject]\nmas_kg = 60.0\n")
+    told = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert "subject.toml, line 2" in told.err
+    (tmp_path / "subject.toml").rename(tmp_path / "a.toml")
+    told = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert "a.toml, line 2" in told.err
+    (tmp_path / "b.toml").write_text("")
+    told = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert "several .toml files (a.toml, b.toml)" in " ".join(told.err.split())

@@ -1,0 +1,82 @@
+"""Labels that make no body are named with their cause; those of sound trials never are."""
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.recording import read_recording
+from kinertia.model.body_sides import sides_trouble
+from kinertia.trial.data import Markers
+
+SOUND = [
+    "gait2354/subject01_static.trc",
+    "gait2354/subject01_walk1.trc",
+    "rajagopal_walk/static_walk_1.trc",
+    "rajagopal_walk/motion_capture_walk.trc",
+    "pig_c3d/subject_a_static.c3d",
+    "pig_c3d/subject_a_walk.c3d",
+    "pig_c3d/subject_b_static.c3d",
+    "pig_c3d/subject_b_walk.c3d",
+]
+
+
+@pytest.fixture(params=SOUND)
+def recorded(request, measured_file):
+    """Markers of a sound recording, and their set."""
+    markers = read_recording(measured_file(request.param)).markers
+    return markers, choose_marker_set(markers.labels)
+
+
+def exchanged(markers, marker_set, *pairs):
+    """The markers with the labels of these landmarks exchanged; None where one of them is not there."""
+    new = {}
+    for one, other in pairs:
+        labels = (*marker_set.landmarks.get(one, ()), *marker_set.landmarks.get(other, ()))
+        if len(labels) != 2 or not set(labels) <= set(markers.labels):
+            return None
+        new |= {labels[0]: labels[1], labels[1]: labels[0]}
+    return Markers(markers.time, tuple(new.get(label, label) for label in markers.labels), markers.positions)
+
+
+def test_sound_trials_are_not_doubted(recorded):
+    assert sides_trouble(*recorded) == ""
+
+
+def test_a_turned_person_is_the_same_person(recorded):
+    markers, marker_set = recorded
+    angle = np.radians(130.0)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    assert sides_trouble(Markers(markers.time, markers.labels, markers.positions @ turn.T), marker_set) == ""
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_mirrored_axes(recorded, axis):
+    markers, marker_set = recorded
+    mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
+    told = sides_trouble(Markers(markers.time, markers.labels, markers.positions * mirror), marker_set)
+    assert "left and right" in told
+    assert "all" in told
+    assert "mirrored" in told
+
+
+@pytest.mark.parametrize(
+    ("pairs", "words"),
+    [
+        ([("knee_lateral_r", "knee_medial_r")], "outer marker of the right knee is on its inner side"),
+        ([("knee_lateral_l", "knee_medial_l")], "outer marker of the left knee is on its inner side"),
+        ([("ankle_lateral_l", "ankle_medial_l")], "outer marker of the left ankle is on its inner side"),
+        ([("heel_r", "metatarsal_r")], "right foot points backwards"),
+        ([("asis_r", "psis_r"), ("asis_l", "psis_l")], "pelvis points backwards"),
+        ([("asis_r", "asis_l")], "left and right look swapped in the labels"),
+        ([("knee_lateral_r", "knee_lateral_l")], "left and right look swapped in the labels"),
+    ],
+)
+def test_swapped_labels(recorded, pairs, words):
+    markers, marker_set = recorded
+    swapped = exchanged(markers, marker_set, *pairs)
+    if swapped is None:
+        pytest.skip("the trial does not have these markers, one label each")
+    told = sides_trouble(swapped, marker_set)
+    assert words in told
+    assert all(label in told for label in marker_set.landmarks[pairs[0][0]])
+    assert "correct" in told

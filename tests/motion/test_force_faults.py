@@ -1,0 +1,83 @@
+"""Forces in wrong axes, with wrong signs, units and zeros are named; sound ones never are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.recording import read_recording
+from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.plate_assignment import build_trial
+
+WALKS = {
+    "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+    "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
+    "plug-in gait a": ("pig_c3d/subject_a_walk.c3d", None),
+    "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
+}
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, measured_file):
+    """A measured walk."""
+    markers, forces = WALKS[request.param]
+    return read_recording(measured_file(markers), None if forces is None else measured_file(forces))
+
+
+def with_force(walk, change, torque=1.0):
+    """The walk with other forces at the same centres of pressure, and torques times a factor."""
+    plates = walk.plates
+    wrench = np.concatenate((plates.force, plates.moment), axis=2)
+    point = centre_of_pressure(wrench)
+    free = torque * (plates.moment - np.cross(point, plates.force)) * [0, 1, 0]
+    force = change(plates.force)
+    return replace(walk, plates=replace(plates, force=force, moment=np.cross(point, force) + free))
+
+
+def told(walk):
+    """What is said of the forces of a walk."""
+    if trouble := loads_trouble(walk.plates):
+        return trouble
+    marker_set = choose_marker_set(walk.markers.labels)
+    present = set(walk.markers.labels)
+    feet = {side: [one for one in labels if one in present] for side, labels in marker_set.foot_labels().items()}
+    trial, pelvis = build_trial(walk, feet), marker_set.segments["pelvis"]
+    return direction_trouble(trial, pelvis) or offset_trouble(trial, pelvis)
+
+
+def test_sound_walks_are_not_doubted(walk):
+    assert told(walk) == ""
+
+
+@pytest.mark.parametrize(
+    ("signs", "words"),
+    [
+        ([-1, 1, 1], "the horizontal force along X has the wrong sign"),
+        ([1, 1, -1], "the horizontal force along Z has the wrong sign"),
+        ([-1, 1, -1], "the forces are turned by 180 degrees about the vertical"),
+    ],
+)
+def test_signs(walk, signs, words):
+    assert told(with_force(walk, lambda force: force * signs)).startswith(words)
+
+
+@pytest.mark.parametrize(("axis", "name"), [(0, "X"), (2, "Z")])
+@pytest.mark.parametrize("offset", [-50.0, 50.0])
+def test_horizontal_offsets(walk, axis, name, offset):
+    push = offset * np.eye(3)[axis]
+    found = told(with_force(walk, lambda force: force + (force[..., 1:2] > 0) * push))
+    assert f"N along {name} on average that do not accelerate the body" in found
+    assert f"show {'+' if offset > 0 else '-'}" in found
+
+
+def test_torques_in_newton_millimetres(walk):
+    assert "they are in N mm" in told(with_force(walk, lambda force: force, torque=1000.0))
+
+
+def test_forces_with_another_axis_up(walk):
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    plates = walk.plates
+    up = replace(walk, plates=replace(plates, force=plates.force @ turn.T, moment=plates.moment @ turn.T))
+    assert "the largest forces point along Z" in told(up)

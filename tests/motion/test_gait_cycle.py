@@ -1,0 +1,131 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinertia.motion.gait_cycle import feet_under_pelvis, strides_of, turning_points
+from kinertia.motion.kinematics import Kinematics, solve_kinematics
+from kinertia.motion.spatiotemporal import spatiotemporal
+from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial, runs
+from kinertia.trial.rms import rms
+
+RATE = 100.0
+FRAME = 1.0 / RATE
+
+
+@pytest.fixture(scope="module")
+def walked():
+    return walk(walking_subject(), rate_hz=RATE, duration_s=4.0)
+
+
+@pytest.fixture(scope="module")
+def trial(walked) -> Trial:
+    """Everything measured, but by markers and plates only."""
+    loads = FootLoads(walked.time, walked.foot_loads[:, :, :3], walked.foot_loads[:, :, 3:])
+    return Trial("walk", walked.markers, loads, np.ones(len(walked.time), dtype=bool))
+
+
+def kinematics_of(walked, trial) -> Kinematics:
+    return solve_kinematics(walked.skeleton, trial, 0.0, 12.0)
+
+
+@pytest.fixture(scope="module")
+def measured(walked, trial) -> Kinematics:
+    return kinematics_of(walked, trial)
+
+
+def contacts(walked, side) -> list[tuple[float, float]]:
+    loaded = walked.foot_loads[:, FEET.index(side), 1] > LOAD_THRESHOLD_N
+    spans = [(walked.time[a], walked.time[b]) for a, b in runs(loaded)]
+    return [span for span in spans if span[0] > walked.time[0] and span[1] < walked.time[-1]]
+
+
+def test_strides_run_from_contact_to_contact(walked, measured):
+    found = strides_of(walked.skeleton, measured)
+    assert {stride.side for stride in found} == set(FEET)
+    for stride in found:
+        assert stride.on_plates
+        starts = [start for start, _ in contacts(walked, stride.side)]
+        assert min(abs(stride.start_s - start) for start in starts) < 1e-9
+        ((_, off),) = [span for span in contacts(walked, stride.side) if span[0] == stride.start_s]
+        assert stride.toe_off_s == off
+        assert stride.opposite_toe_off_s < stride.opposite_strike_s < stride.toe_off_s < stride.end_s
+    for side in FEET:
+        own = [stride for stride in found if stride.side == side]
+        assert [stride.number for stride in own] == list(range(1, len(own) + 1))
+        assert all(a.end_s == b.start_s for a, b in pairwise(own))
+
+
+def test_where_no_plate_sees_a_contact_the_motion_tells_it(walked, trial, measured):
+    """Plates for the first contact of each foot only; the other strides begin and end nearly where they did."""
+    blind = trial.loads.time > 1.6
+    force, moment = (np.where(blind[:, None, None], 0.0, part) for part in (trial.loads.force, trial.loads.moment))
+    few = replace(trial, loads=replace(trial.loads, force=force, moment=moment), measured=trial.markers.time < 1.5)
+    found, known = (strides_of(walked.skeleton, k) for k in (kinematics_of(walked, few), measured))
+    assert [(s.side, s.number) for s in found] == [(s.side, s.number) for s in known]
+    assert not all(stride.on_plates for stride in found)
+    gaps = [
+        getattr(a, name) - getattr(b, name)
+        for a, b in zip(found, known, strict=True)
+        for name in ("start_s", "end_s", "toe_off_s")
+    ]
+    assert np.abs(gaps).max() < 2.5 * FRAME
+    assert rms(np.array(gaps)) > 0
+
+
+def test_one_who_squats_takes_no_strides(walked, trial):
+    """Both feet move back and forth under the pelvis, together."""
+    time = walked.time
+    q = np.tile(walked.motion.q[0], (len(time), 1))
+    deep = 0.5 - 0.5 * np.cos(2 * np.pi * 0.5 * time)
+    for name, range_rad in (("hip_flexion", 1.5), ("knee_angle", 1.7), ("ankle_angle", 0.4)):
+        for side in FEET:
+            q[:, walked.skeleton.coordinates.index(f"{name}_{side}")] = range_rad * deep
+    positions = walked.skeleton.marker_positions(walked.skeleton.pose(q))
+    squat = replace(trial, markers=replace(trial.markers, positions=positions))
+    kinematics = kinematics_of(walked, squat)
+    feet = feet_under_pelvis(walked.skeleton, kinematics)
+    assert np.ptp(feet.ahead(feet.heel["r"])) > 0.15
+    assert strides_of(walked.skeleton, kinematics) == ()
+
+
+@pytest.mark.parametrize("turned", [0.0, 30.0])
+@pytest.mark.parametrize("belt_m_s", [0.0, 1.2])
+def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, belt_m_s, turned):
+    turn = Rotation.from_euler("y", turned, degrees=True).as_matrix()
+    rotated = trial.rotated(turn)
+    slid = rotated.markers.positions - (turn @ [belt_m_s, 0.0, 0.0]) * walked.time[:, None, None]
+    kinematics = kinematics_of(walked, replace(rotated, markers=replace(rotated.markers, positions=slid)))
+    strides = strides_of(walked.skeleton, kinematics)
+    found = spatiotemporal(feet_under_pelvis(walked.skeleton, kinematics), strides)
+    assert len(found) >= 4
+    pelvis = walked.motion.q[:, 0]
+    for stride, one in zip(strides, found, strict=True):
+        start, end = np.interp([stride.start_s, stride.end_s], walked.time, pelvis)
+        speed = (end - start) / (stride.end_s - stride.start_s)
+        # this walker's standing heel slides by 0.02 m/s, which on a belt cannot be told from the belt
+        assert one.speed_m_s == pytest.approx(speed, rel=0.03 if belt_m_s else 0.005)
+        assert one.stride_length_m == pytest.approx(one.speed_m_s * one.stride_time_s)
+        assert one.cadence_steps_min == pytest.approx(120 / one.stride_time_s)
+        assert 0.4 * one.stride_length_m < one.step_length_m < 0.6 * one.stride_length_m
+        assert 0.02 < one.step_width_m < 0.25
+    for side in FEET:
+        own = [one for stride, one in zip(strides, found, strict=True) if stride.side == side]
+        loaded = [(end - start) for start, end in contacts(walked, side)]
+        assert own[0].stance_percent == pytest.approx(100 * loaded[0] / own[0].stride_time_s, abs=1.5)
+    both = (walked.foot_loads[:, :, 1] > LOAD_THRESHOLD_N).all(axis=1)
+    first = strides[0]
+    inside = (walked.time >= first.start_s) & (walked.time < first.end_s)
+    assert found[0].double_support_percent == pytest.approx(100 * both[inside].mean(), abs=3.0)
+
+
+def test_turning_points_are_maxima_that_rise_enough():
+    time = np.arange(0, 10, 0.01)
+    wave = np.sin(2 * np.pi * 0.5 * time) + 0.04 * np.sin(2 * np.pi * 9 * time)
+    found = turning_points(wave, 0.5)
+    np.testing.assert_allclose(time[found], [0.5, 2.5, 4.5, 6.5, 8.5], atol=0.06)
+    assert turning_points(wave, 3.0) == []
+    assert turning_points(np.arange(5.0), 0.5) == []  # still rising at its end

@@ -1,0 +1,77 @@
+"""What differs between results: found where it was put, and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from command_line import run
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.report.comparison import comparison_columns, differences, moments_figure, remarks, render_comparison
+from kinertia.report.files import save_fit
+from report_page import Elements
+
+
+def moved(fit, segment, column, sds):
+    table = fit.estimate.table().copy()
+    row = fit.estimate.segments.index(segment)
+    table[row, column] += sds * np.sqrt(2) * fit.posterior.sd[row, column]
+    return replace(fit, estimate=BodySegmentParameters.from_table(fit.estimate.segments, table))
+
+
+def test_what_changed_beyond_its_error_bars_is_found(fit):
+    other = moved(moved(fit, "thigh_r", 0, 2.1), "shank_l", 3, -1.8)
+    found = {(one.segment, one.parameter): one for one in differences(fit, other)}
+    assert len(found) == 120
+    assert [key for key, one in found.items() if one.changed] == [("thigh_r", "mass")]
+    one = found["shank_l", "com_z"]
+    assert one.change / one.sd == pytest.approx(-1.8)
+    columns = pd.DataFrame(comparison_columns({"before": fit, "after": other}))
+    assert columns[columns.changed].segment.tolist() == ["thigh_r"]
+    told = Elements(render_comparison({"before": fit, "after": other})).text
+    assert "1 of 120 parameters changed beyond their error bars" in told
+    assert "None of 120" in Elements(render_comparison({"before": fit, "again": fit})).text
+
+
+def test_without_error_bars_nothing_is_called_changed(fit, two_level):
+    assert not any(one.changed for one in differences(fit, two_level))
+    assert remarks({"a": fit, "b": two_level}) == ["no error bars, so nothing is marked as changed: b (two-level)"]
+    assert "No error bars: differences only." in render_comparison({"a": fit, "b": two_level})
+
+
+def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
+    from kinertia.report.saved_fit import load_fit
+
+    heavy = replace(fit, subject=fit.subject.model_copy(update={"mass_kg": 90.0}))
+    (said,) = remarks({"a": fit, "b": heavy})
+    assert said == "a is of 72.6 kg, b of 90.0 kg: one person?"
+    own = load_fit(fit_with_model("gait2354", True))
+    said = " ".join(remarks({"a": fit, "b": own}))
+    assert "different models" in said
+    assert "do not share these segments" in said
+    assert differences(fit, own)  # of those that both have
+    assert moments_figure({"a": fit, "b": own}) is not None
+
+
+def test_moments_are_those_of_cycles(fit):
+    figure = moments_figure({"a": fit, "b": fit})
+    titles = [note["text"] for note in figure.layout["annotations"]]
+    panel = next(k for k, title in enumerate(titles) if title.startswith("<b>Right knee moment, flexion +"))
+    traces = [trace for trace in figure.data if trace["xaxis"] == (f"x{panel + 1}" if panel else "x")]
+    assert [trace["name"] for trace in traces] == ["a", "b"]
+    cycles = fit.cycles()
+    knee = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == "r")]
+    np.testing.assert_allclose(traces[0]["y"], knee.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
+
+
+def test_the_command(fit, demo_run, tmp_path):
+    save_fit(moved(fit, "torso", 0, 3.0), tmp_path / "again")
+    told = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
+    assert told.status == 0, told.err
+    assert "1 of 120 parameters changed beyond their error bars (mass of torso)" in " ".join(told.out.split())
+    assert {path.name for path in (tmp_path / "comparison").iterdir()} == {"compare.html", "compare.csv"}
+    again = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
+    assert again.status == 0, again.err  # its own results are replaced
+    for wrong in ([demo_run[1]], [demo_run[1], demo_run[1]], [demo_run[1], tmp_path]):
+        assert run("compare", *wrong, "-o", tmp_path / "c").status == 2
