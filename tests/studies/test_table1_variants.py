@@ -51,7 +51,9 @@ def changed(variant):
     names = {f.name for f in fields(Variant)} - {"title", "share"}
     found = {name for name in names if getattr(variant, name) != getattr(BASE, name)}
     options = variant.estimate.keywords if isinstance(variant.estimate, partial) else {}
-    return (found - {"estimate"}) | set(options) if options else found
+    signal = options.get("signal")
+    of_signal = set(signal.keywords) if isinstance(signal, partial) else set()
+    return (found - {"estimate"}) | set(options) | of_signal if options else found
 
 
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.title)
@@ -59,6 +61,7 @@ def test_one_thing_is_changed_at_a_time(variant):
     two = {
         "400 iterations, no tolerance": {"tolerance", "most_iterations"},
         "moments about the ground, 400 iterations": {"signal", "most_iterations"},
+        "moments about the ground, N and N m as they are": {"signal", "length_m"},
         NEAREST.title: {"signal", "tolerance"},
     }
     if variant.title in two:
