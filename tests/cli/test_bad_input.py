@@ -93,7 +93,7 @@ def edit_cell(line, column, value):
         ({"forces": "walc.mot"}, r"no such file in .*lab", "did you mean 'walk.mot'"),
         ({"loads": "walc.xml"}, r"no such file in .*lab", "did you mean 'walk.xml'"),
         ({"static": "statik.trc"}, r"no such file in .*lab", "did you mean 'static.trc'"),
-        ({"walk": "../lab"}, "is a folder|needs", "give a file|kinertia init"),
+        ({"walk": "../lab"}, "holds no subject file", "kinertia init"),
     ],
 )
 def test_missing_file(lab, changes, where, advice):
@@ -147,7 +147,6 @@ def test_xml_that_explains_no_loads(lab, shared_data):
 @pytest.mark.parametrize(
     ("change", "line", "what"),
     [
-        (edit_cell(3, 2, "150"), r"(, line 3)?", "150"),
         (edit_cell(3, 3, "40"), r"(, line \d)?", "40"),
         (edit_cell(3, 3, "many"), ", line 3", "many"),
         (edit_cell(3, 4, "furlong"), ", line 3", "furlong.*expected.*mm"),
@@ -159,7 +158,7 @@ def test_xml_that_explains_no_loads(lab, shared_data):
         (edit_cell(20, 5, "1o3.2"), ", line 20", "1o3.2.*number"),
         (edit_cell(20, 1, "0.9"), r", line 2\d", "time"),
     ],
-    ids=["frames", "markers", "not a count", "unit", "short row", "not a number", "time"],
+    ids=["markers", "not a count", "unit", "short row", "not a number", "time"],
 )
 def test_spoiled_trc(lab, name, change, line, what):
     spoil(lab / name, change)
@@ -350,13 +349,27 @@ def assert_checked(lab, words):
     assert words in " ".join(outcome.out.split())
 
 
-@pytest.mark.parametrize("label", ["R.Heel", "R.ASIS", "V.Sacral"])
-def test_marker_missing_for_the_whole_trial(lab, label):
-    def hide(positions, index):
+def hide(path, label):
+    def change(positions, index):
         positions[:, index(label)] = np.nan
 
-    changed_markers(lab / "walk.trc", hide)
-    expect(refused(lab), "trial 'walk'|walk.trc", re.escape(label), "label|use|remove")
+    changed_markers(path, change)
+
+
+def test_marker_of_three_missing_for_the_whole_trial(lab):
+    hide(lab / "walk.trc", "V.Sacral")
+    expect(refused(lab), "trial 'walk'", "2 of the markers on the pelvis", "at least 3")
+
+
+def test_marker_missing_for_the_whole_trial(lab):
+    """The others say where its segment is: a note."""
+    hide(lab / "walk.trc", "R.Heel")
+    files = {name: lab / COMMAND[name] if name in ("forces", "loads", "static") else COMMAND[name] for name in COMMAND}
+    options = [word for name, value in files.items() for word in (f"--{name}", value)]
+    outcome = run("fit", lab / "walk.trc", *options, "-o", lab / "out", "-v")
+    assert outcome.status in (0, 1), outcome.err
+    noted = " ".join(outcome.out.split())
+    assert re.search(rf"assumed: walk\S*: [^.]*R\\.Heel", noted), noted
 
 
 def test_segment_without_markers(lab):

@@ -28,7 +28,8 @@ GRAVITY = 9.80665
 RESULTS = {
     *("report.html", "fit.json", "bsp.csv", "model.osim", "kinematics.mot", "residuals.sto"),
     *("inverse_dynamics.sto", "inverse_dynamics_literature.sto", "inverse_dynamics_sd.sto"),
-    *("ground_reactions.mot", "external_loads.xml"),
+    *("ground_reactions.mot", "external_loads.xml", "fit.npz"),
+    *("cycles.csv", "cycles_literature.csv", "spatiotemporal.csv"),
 }
 LAB = {"static.c3d", "walk.c3d", "subject.toml", "README.txt", "LICENSE.txt"}
 

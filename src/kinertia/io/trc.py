@@ -42,6 +42,14 @@ def read_trc_recording(path: str | Path) -> Recording:
     frames = _count(path, header, "NumFrames")
     if not len(values):
         raise FileError(path, f"the header announces {frames} frames but the file has 0; export the file again", 3)
+    last = lines[line_numbers[-1] - 1].split("\t")
+    if len(values) < frames and len(last) < 2 + 3 * len(labels):
+        raise FileError(
+            path,
+            f"ends in the middle of a row, and has {len(values)} of the {frames} frames that its header announces: a part "
+            "of it is lost; copy or export the file again",
+            line_numbers[-1],
+        )
     counted = f"{path.name}: its header announces {frames} frames, the file has {len(values)}: all of them were read"
     count_notes = () if len(values) == frames else (counted,)
     time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
