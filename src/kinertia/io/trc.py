@@ -46,8 +46,8 @@ def read_trc_recording(path: str | Path) -> Recording:
     if len(values) < frames and len(last) < 2 + 3 * len(labels):
         raise FileError(
             path,
-            f"ends in the middle of a row, and has {len(values)} of the {frames} frames that its header announces: a part "
-            "of it is lost; copy or export the file again",
+            f"ends in the middle of a row, and has {len(values)} of the {frames} frames that its header announces: a "
+            "part of it is lost; copy or export the file again",
             line_numbers[-1],
         )
     counted = f"{path.name}: its header announces {frames} frames, the file has {len(values)}: all of them were read"
