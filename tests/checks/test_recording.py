@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinertia.checks.recording import check_recording, common_marker_set
+from kinertia.checks.marker_set_match import common_marker_set
+from kinertia.checks.recording import check_recording
 from kinertia.checks.verdict import stands_against
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording

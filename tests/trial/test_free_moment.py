@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gait_loads import MASS_KG, gait_loads
-from kinertia.checks.recording import check_recording, markers_of_model
+from kinertia.checks.marker_set_match import markers_of_model
+from kinertia.checks.recording import check_recording
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording

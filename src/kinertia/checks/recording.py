@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.checks.marker_set_match import MarkerSetMatch, judged_labels, match_labels
 from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.checks.verdict import Verdict
-from kinertia.errors import KinertiaError, MarkerSetError, OsimError, TrialError
+from kinertia.errors import KinertiaError, MarkerSetError, TrialError
 from kinertia.estimation.force_mass import CONTRADICTING_MASS
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
-from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
-from kinertia.model.anatomy import segment_of
 from kinertia.model.body_sides import sides_trouble
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.imported import OsimModel
-from kinertia.model.marker_set import MarkerSet, check_marker_set, nearest_labels
+from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble
 from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
@@ -41,27 +38,6 @@ OFF_PLATE_SHARE = 0.05
 """More of the firm load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
 _RARE = 0.5
 _LISTED = 8
-
-
-@dataclass(frozen=True, eq=False)
-class MarkerSetMatch:
-    """Which labels of a marker set a recording has.
-
-    Attributes:
-        name: of the set.
-        fits: whether it is the recording's set; if not, it is the nearest preset.
-        missing: labels of the set that the recording lacks, each with those of `others` that look most alike.
-        n_labels: of the set.
-        others: labels of the recording that are not in the set and stay unused.
-        of_model: whether the set is the markers of an OpenSim model.
-    """
-
-    name: str
-    fits: bool
-    missing: dict[str, list[str]]
-    n_labels: int
-    others: tuple[str, ...]
-    of_model: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,13 +128,13 @@ def check_recording(
         window_s: the stretch that the user vouches for.
         static: the static trial that goes with it, if there is one.
     """
-    match, used = _match(recording.markers.labels, marker_set)
+    match, used = match_labels(recording.markers.labels, marker_set)
     own = recording.markers
     if used is not None:
         own = own.select([label for label in used.labels if label in own.labels])
     moves, seen = travel(own), visibility(own)
     standing = moves.kind == "stands still"
-    found, feet = [*_axes(own), *_labels(match)], None
+    found, feet = [*_axes(own), *judged_labels(match)], None
     if used is not None:
         feet, trouble = _feet(recording.markers.labels, used)
         found += trouble
@@ -189,69 +165,9 @@ def _telling(markers: Markers, marker_set: MarkerSet) -> TellingMovements | None
     return TellingMovements.of(markers, pelvis, torso)
 
 
-def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
-    """The preset that a fit would choose for one of these recordings of one person; None if for none."""
-    for recording in recordings:
-        with suppress(MarkerSetError):
-            return choose_marker_set(recording.markers.labels)
-    return None
-
-
-def markers_of_model(model: OsimModel) -> MarkerSet:
-    """The markers of an OpenSim model by segment, without landmarks: no model is built from them.
-
-    Raises:
-        OsimError: there are none.
-    """
-    markers = model.skeleton.markers
-    if not markers:
-        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
-    owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
-    names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
-    segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}
-    return MarkerSet(model.path.name, {}, segments, {})
-
-
-def _match(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:
-    """How the labels fit the set, or the nearest preset; and the set if it is theirs."""
-    wanted = nearest_preset(labels) if marker_set is None else marker_set
-    used: MarkerSet | None = wanted
-    try:
-        if marker_set is None:
-            choose_marker_set(labels)
-        elif marker_set.landmarks:
-            check_marker_set(marker_set, labels)
-        elif not set(marker_set.labels) & set(labels):
-            used = None
-    except MarkerSetError:
-        used = None
-    others = tuple(label for label in labels if label not in wanted.labels)
-    missing = nearest_labels([label for label in wanted.labels if label not in labels], others)
-    return MarkerSetMatch(
-        wanted.name, used is not None, missing, len(wanted.labels), others, not wanted.landmarks
-    ), used
-
-
 def _axes(markers: Markers) -> list[Verdict]:
     trouble = axes_trouble(extent_m(markers))
     return [Verdict("fail", trouble)] if trouble else []
-
-
-def _labels(match: MarkerSetMatch) -> list[Verdict]:
-    had = match.n_labels - len(match.missing)
-    if match.fits:
-        return [Verdict("pass", f"{had} of the {match.n_labels} labels of the marker set {match.name} are present")]
-    if match.of_model:
-        return [Verdict("fail", f"no label of the model {match.name} is in the file; expected its markers' names")]
-    nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are present"
-    nearest = nearest if had else "no preset shares a label with the file"
-    return [
-        Verdict(
-            "fail",
-            f"no marker set fits ({nearest}), so it is unknown which markers are on which foot; write a marker set as "
-            f"TOML and name it with --markers",
-        )
-    ]
 
 
 def _never(seen: Sequence[Visibility]) -> list[Verdict]:

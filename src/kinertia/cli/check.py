@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from kinertia.checks.marker_set_match import common_marker_set, markers_of_model
 from kinertia.checks.model import ModelCheck, check_model
-from kinertia.checks.recording import RecordingCheck, check_recording, common_marker_set, markers_of_model
+from kinertia.checks.recording import RecordingCheck, check_recording
 from kinertia.checks.verdict import stands_against
 from kinertia.cli.options import Force, Quiet, Verbose, results_folder
 from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
