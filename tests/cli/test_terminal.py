@@ -83,6 +83,6 @@ def test_errors_with_letters_that_it_lacks(done):
 @pytest.mark.slow
 def test_a_whole_fit(encoding, tmp_path):
     done = _kinertia(encoding, "demo", "--measured", "-o", tmp_path / NAME)
-    assert done.returncode == 1, done.stderr  # a check of the measured walk fails
+    assert done.returncode == 0, done.stderr
     assert "results in" in done.stdout
     assert (tmp_path / NAME / "report.html").is_file()

@@ -229,6 +229,12 @@ def test_errors_of_the_whole(folder, text, line, message):
     assert caught.value.line == line
 
 
+@pytest.mark.parametrize("name", ["x" * 300, "a/" * 3000, "x" * 300 + "/walk.trc"])
+def test_names_longer_than_the_system_allows_are_no_files(folder, name):
+    with pytest.raises(FileError, match="no such file"):
+        read(folder, changed('"static.trc"', f'"{name}"'))
+
+
 def test_file_that_is_not_text_or_not_there(folder):
     (folder / "subject.toml").write_bytes(b"[subject]\nname = '\xff'\n")
     with pytest.raises(FileError, match="UTF-8") as caught:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from pathlib import Path
@@ -30,7 +31,8 @@ def same_folder(one: str, other: str) -> bool:
 def path_from(folder: Path, written: str) -> Path:
     """A path as it stands in a file, counted from a folder; backslashes are separators unless a file has them."""
     path = folder / _at_home(written)
-    return path if path.is_file() else folder / _at_home(written.replace("\\", "/"))
+    # false, and not an error, where the system allows no such name
+    return path if os.path.isfile(path) else folder / _at_home(written.replace("\\", "/"))
 
 
 def _at_home(written: str) -> Path:

@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PureWindowsPath
@@ -56,13 +57,13 @@ def _file(value: object, info: ValidationInfo) -> Path:
     if not isinstance(value, str | Path):
         raise ValueError("must be a path in quotes")
     path = path_from(folder_of(info), str(value)).resolve()
-    if path.is_file():
+    if os.path.isfile(path):  # false where the system allows no such name
         return path
-    if path.is_dir():
+    if os.path.isdir(path):
         raise ValueError(f"{path} is a folder; give a file")
     if trouble := path_trouble(str(value)):
         raise ValueError(trouble)
-    names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
+    names = sorted(entry.name for entry in path.parent.iterdir()) if os.path.isdir(path.parent) else []
     near = difflib.get_close_matches(path.name, names, n=1)
     raise ValueError(f"no such file in {path.parent}" + (f"; did you mean '{near[0]}'?" if near else ""))
 
