@@ -235,6 +235,11 @@ def test_names_longer_than_the_system_allows_are_no_files(folder, name):
         read(folder, changed('"static.trc"', f'"{name}"'))
 
 
+def test_brackets_within_brackets(folder):
+    with pytest.raises(FileError, match="too many brackets"):
+        read(folder, changed('"static.trc"', "[" * 5000))
+
+
 def test_file_that_is_not_text_or_not_there(folder):
     (folder / "subject.toml").write_bytes(b"[subject]\nname = '\xff'\n")
     with pytest.raises(FileError, match="UTF-8") as caught:

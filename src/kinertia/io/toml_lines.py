@@ -62,6 +62,10 @@ def parse_toml(text: str, path: Path) -> TomlFile:
     """
     try:
         return TomlFile(text, tomllib.loads(text))
+    except RecursionError:
+        raise FileError(
+            path, "not valid TOML: brackets within brackets, too many to read; correct or remove them"
+        ) from None
     except tomllib.TOMLDecodeError as error:
         what, _, where = str(error).rpartition(" (at ")
         number = re.match(r"line (\d+)", where)
