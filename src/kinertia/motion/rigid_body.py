@@ -294,7 +294,7 @@ def root_balance(
     a: np.ndarray,
     about: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 6) load as `root_load`, and of its derivatives only (n, 6, 6) those by a of the first six axes, the root's."""
+    """(n, 6) load as `root_load`, and (n, 6, 6) its derivatives by a of the first six axes, the root's, only."""
     n, count = x.shape
     load, by = np.zeros((n, 6)), np.empty((n, 6, 6))
     frame = empty_frame(count, gravity_m_s2)

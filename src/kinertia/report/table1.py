@@ -81,7 +81,7 @@ def table1_figure(table: Table1) -> Figure:
     axes = figure.subplots(1, len(_CLASSES))
     segments = list(dict.fromkeys(name.partition(".")[0] for name in table.parameters))
     errors = {"start": np.array([draw.start_errors for draw in table.draws])}
-    errors |= {c: np.array([draw.parameter_errors[c] for draw in table.draws]) for c in CONDITIONS}
+    errors |= {c: np.array([draw.parameter_errors[c][-1] for draw in table.draws]) for c in CONDITIONS}
     for axis, (heading, members) in zip(axes, _CLASSES.items(), strict=True):
         for key, values in errors.items():
             heights = []
