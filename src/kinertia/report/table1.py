@@ -65,11 +65,12 @@ def table1_rows(table: Table1) -> list[list[str]]:
             ("  published", PUBLISHED.__getitem__, 3),
         ):
             values = [asdict(source(condition)) for condition in CONDITIONS]
-            rows.append([label, *(" / ".join(_short(value[name], digits) for name in names) for value in values)])
+            rows.append([label, *(" / ".join(short(value[name], digits) for name in names) for value in values)])
     return rows
 
 
-def _short(value: float, digits: int) -> str:
+def short(value: float, digits: int) -> str:
+    """The number as the tables print it."""
     return f"{value:.{digits}g}".replace("e-0", "e-")
 
 

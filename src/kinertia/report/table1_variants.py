@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.report.extras import has_matplotlib
-from kinertia.report.table1 import QUANTITIES
+from kinertia.report.table1 import QUANTITIES, short
 from kinertia.studies.table1 import PUBLISHED, Errors, Table1
 from kinertia.studies.table1_variants import CLASSES, LONG, LONG_GROUND, NOISY, distance, helped, stopped_by
 from kinertia.trial.rms import rms
@@ -32,7 +32,6 @@ _CLEAN = ("no_correction_no_noise", "correction_no_noise")
 _MARKS = {1e-2: "v", 1e-4: "s", 1e-6: "o"}
 """Relative change of the cost, and what marks the iteration that falls below it first."""
 _SHOWN = {LONG: ("moments about the pelvis", "#0072B2"), LONG_GROUND: ("moments about the ground", "#D55E00")}
-_COLUMNS = {"inertia": slice(4, 7), "mass": slice(0, 1), "CoM": slice(1, 4)}
 
 
 def variants_frame(tables: Mapping[str, Table1]) -> pd.DataFrame:
@@ -53,27 +52,18 @@ def variants_frame(tables: Mapping[str, Table1]) -> pd.DataFrame:
 
 def variants_rows(tables: Mapping[str, Table1]) -> list[list[str]]:
     """The table as text, RMS errors "without / with correction"; the published values come first."""
-    rows = [_row("published", 1, [PUBLISHED[c] for c in (*NOISY, *_CLEAN)], [1.0, 1.0, 1.0], 1.0)]
+    rows = [_row("published", 1, PUBLISHED.__getitem__, (1.0, 1.0, 1.0), 1.0)]
     for title, table in tables.items():
-        means = [table.mean(condition) for condition in (*NOISY, *_CLEAN)]
-        rows.append(_row(title, len(table.draws), means, list(helped(table).values()), distance(table)))
+        rows.append(_row(title, len(table.draws), table.mean, helped(table).values(), distance(table)))
     return rows
 
 
-def _row(title: str, draws: int, errors: Sequence[Errors], shares: Sequence[float], factor: float) -> list[str]:
-    pairs = [[asdict(each)[name] for each in errors] for _, name, _ in QUANTITIES.values()]
-    told = [
-        " / ".join(f"{value:.2g}".replace("e-0", "e-") for value in pair)
-        for pair in (*(p[:2] for p in pairs), pairs[0][2:])
-    ]
-    return [
-        title,
-        str(draws),
-        *told[:-1],
-        ", ".join(f"{100 * share:.0f}" for share in shares),
-        told[-1],
-        f"{factor:.2f}",
-    ]
+def _row(title: str, draws: int, errors: Callable[[str], Errors], shares: Iterable[float], factor: float) -> list[str]:
+    noisy, clean = ([asdict(errors(condition)) for condition in conditions] for conditions in (NOISY, _CLEAN))
+    pairs = [[each[name] for each in noisy] for _, name, _ in QUANTITIES.values()]
+    pairs.append([each["inertia_rms_kgm2"] for each in clean])
+    *with_noise, exact = (" / ".join(short(value, 2) for value in pair) for pair in pairs)
+    return [title, str(draws), *with_noise, ", ".join(f"{100 * s:.0f}" for s in shares), exact, f"{factor:.2f}"]
 
 
 def variants_figure(tables: Mapping[str, Table1]) -> Figure:
@@ -82,11 +72,11 @@ def variants_figure(tables: Mapping[str, Table1]) -> Figure:
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, len(CLASSES))
-    for axis, (name, field) in zip(axes, CLASSES.items(), strict=True):
+    for axis, (name, (field, columns)) in zip(axes, CLASSES.items(), strict=True):
         for title, (named, colour) in _SHOWN.items():
             for line, kind, condition in zip(("--", "-"), ("uncorrected", "corrected"), NOISY, strict=True):
                 draws = tables[title].draws
-                mean = _along([draw.parameter_errors[condition] for draw in draws], _COLUMNS[name])
+                mean = _along([draw.parameter_errors[condition] for draw in draws], columns)
                 axis.plot(np.arange(1, len(mean) + 1), mean, line, color=colour, label=f"{named}, {kind}")
                 for tolerance, mark in _MARKS.items():
                     stop = round(float(np.median([stopped_by(draw.costs[condition], tolerance) for draw in draws])))

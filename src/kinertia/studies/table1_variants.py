@@ -32,8 +32,12 @@ from kinertia.synthetic.walk import HEIGHT_M, SyntheticTrial
 from kinertia.trial.rms import rms
 
 NOISY = ("no_correction_noise", "correction_noise")
-CLASSES = {"inertia": "inertia_rms_kgm2", "mass": "mass_rms_kg", "CoM": "com_rms_m"}
-"""Class of parameters and its error in `Errors`."""
+CLASSES = {
+    "inertia": ("inertia_rms_kgm2", slice(4, 7)),
+    "mass": ("mass_rms_kg", slice(0, 1)),
+    "CoM": ("com_rms_m", slice(1, 4)),
+}
+"""Class of parameters: its error in `Errors`, and its place in the seven of a segment."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,6 @@ def run_variants(
     variants: Mapping[str, Variant] = VARIANTS,
     repeats: int = 10,
     seed: int = 1,
-    workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, Table1]:
     """Every variant's draws, in parallel processes; with a measured trial made consistent, that as a variant, too."""
@@ -109,7 +112,7 @@ def run_variants(
         for number in range(repeats * variant.times)
     ]
     draws: dict[str, list[Draw]] = {title: [] for title in variants}
-    found = in_parallel(_draw, [case for _, case in cases], workers, progress)
+    found = in_parallel(_draw, [case for _, case in cases], progress=progress)
     for (title, _), draw in zip(cases, found, strict=True):
         draws[title].append(draw)
     tables = {}
@@ -126,7 +129,7 @@ def _draw(case: tuple[SyntheticTrial, int, int, Setup, tuple[str, ...]]) -> Draw
 def helped(table: Table1) -> dict[str, float]:
     """Share of the draws in which correction makes the error of each class smaller."""
     errors = [[asdict(draw.errors[condition]) for condition in NOISY] for draw in table.draws]
-    return {name: float(np.mean([b[field] < a[field] for a, b in errors])) for name, field in CLASSES.items()}
+    return {name: float(np.mean([b[field] < a[field] for a, b in errors])) for name, (field, _) in CLASSES.items()}
 
 
 def distance(table: Table1) -> float:
