@@ -42,6 +42,7 @@ def test_the_command_writes_what_it_shows(session):
     assert np.linalg.eigvalsh(np.array(person.information))[0] > -1e-6
 
 
+@pytest.mark.slow
 def test_a_fit_leaves_out_what_it_has_said_itself(session, measured_walk, tmp_path):
     path, _ = session
     own = prepare_subject(subject_with(tmp_path, measured_walk, f'session = "{path.as_posix()}"'))
