@@ -269,7 +269,9 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
     return changed
 
 
-_TABLES: dict[str, type[Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)
+_TABLES: dict[str, type[Table]] = dict(
+    subject=Subject, model=Model, trial=TrialFiles, settings=Settings, instruments=InstrumentsFiles
+)
 
 
 def _sentence(detail: Any) -> str:
