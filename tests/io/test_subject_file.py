@@ -154,11 +154,21 @@ def test_byte_order_mark_and_windows_line_ends(folder):
 
 @pytest.mark.parametrize("table", [field.alias or name for name, field in SubjectFile.model_fields.items()])
 def test_unknown_key_in_every_table(folder, table):
+    table = "segment.thigh_r" if table == "segment" else table
     heading = f"[[{table}]]" if table == "trial" else f"[{table}]"
     text = GOOD if heading in GOOD else f"{GOOD}\n{heading}\n"
     text = text.replace(heading, f"{heading}\nzzz = 1", 1)
     with pytest.raises(FileError, match=rf"unknown key 'zzz' in \[{table}\]; known: "):
         read(folder, text)
+
+
+def test_a_segment_is_a_table_of_its_own(folder):
+    with pytest.raises(FileError, match=r"under a heading like \[segment.thigh_r\]"):
+        read(folder, f"{GOOD}\n[segment]\nthigh_r = 8.9\n")
+    with pytest.raises(FileError, match=r"mass_kg = 8.9: must be a value with its standard deviation in quotes"):
+        read(folder, f"{GOOD}\n[segment.thigh_r]\nmass_kg = 8.9\n")
+    known = read(folder, f'{GOOD}\n[segment.thigh_r]\nmass_kg = "8.9 ± 0.4"\nsource = "DXA"\n').segments
+    assert known["thigh_r"].parameters() == {"mass": (8.9, 0.4)}
 
 
 def test_result_is_frozen(folder):
