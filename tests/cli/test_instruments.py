@@ -114,6 +114,7 @@ loads = "{walk.as_posix()}_grf.xml"
         (["walk.c3d"], "expected a subject file"),
         (["subject.toml", "-o", "."], "a folder; give the name of a file"),
         (["subject.toml", "-o", "nowhere/x.toml"], "no such folder"),
+        (["subject.toml", "-o", "subject.toml"], "not a file that kinertia instruments wrote"),
     ],
 )
 def test_what_cannot_be_is_refused_first(arguments, told, measured_walk, monkeypatch):
