@@ -86,6 +86,12 @@ def variants_figure(tables: Mapping[str, Table1]) -> Figure:
             axis.axhline(value, color="#999999", linestyle=line, linewidth=1, label=f"published, {kind}")
         axis.set_xscale("log")
         axis.set_yscale("log")
+        for formatter in (
+            axis.xaxis.set_major_formatter,
+            axis.yaxis.set_major_formatter,
+            axis.yaxis.set_minor_formatter,
+        ):
+            formatter("{x:g}")
         axis.set_title(f"{QUANTITIES[name.lower()][0]}, RMS error")
         axis.set_xlabel("iteration, the start being the first")
         axis.grid(True, axis="y", alpha=0.3)
