@@ -118,6 +118,7 @@ def check_recording(
     mass_kg: float | None = None,
     window_s: tuple[float, float] | None = None,
     static: Recording | None = None,
+    height_m: float | None = None,
 ) -> RecordingCheck:
     """Look at one recording as a fit would, up to the first model.
 
@@ -127,6 +128,7 @@ def check_recording(
         mass_kg: by the scale; the file's own if None.
         window_s: the stretch that the user vouches for.
         static: the static trial that goes with it, if there is one.
+        height_m: stature; the file's own if None.
     """
     match, used = match_labels(recording.markers.labels, marker_set)
     own = recording.markers
