@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kinertia.checks.marker_set_match import common_marker_set, markers_of_model
+from kinertia.checks.marker_set_match import common_marker_set
 from kinertia.checks.recording import RecordingCheck, check_recording
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
@@ -15,6 +15,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.marker_set import MarkerSet
+from kinertia.model.model_markers import markers_of_model
 from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
 

@@ -1,4 +1,4 @@
-"""Do the forces belong to the motion? Wrong axes, signs, units and zeros of force plates, before any model.
+"""Do the forces belong to the motion? Wrong directions, signs and zeros of force plates, before any model.
 
 The ground accelerates the body as the markers show it: forces integrated over time are the changes of the velocity of
 the centre of mass, and the pelvis moves nearly as that does. On sound walks the two correlate by 0.7 and more along
@@ -13,15 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.motion.smoothing import SmoothingError, smooth
-from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads, Trial
+from kinertia.trial.data import FloatArray, Trial
 
-_FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
-_LONGEST_ARM_M = 0.15
-"""Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
-_STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
-_IDLE_PERCENT = (2.0, 15.0)
-"""A plate that somebody walks over is idle for at least so many percent of the record."""
 _PELVIS_HZ = 6.0
 _OPPOSED = -0.4
 _LEAST_CHANGE_M_S = 0.02
@@ -30,49 +23,6 @@ _LEAST_WINDOW_S = 0.4
 OFFSET_LIMIT_N = 20.0
 """Horizontal force that no acceleration of the body accounts for, mean over a window."""
 _HORIZONTAL = {"X": 0, "Z": 2}
-
-
-def loads_trouble(plates: PlateLoads) -> str:
-    """What is wrong with the axes or units of the plates' loads by themselves; empty where nothing is."""
-    peaks = np.abs(plates.force).max(axis=(0, 1), initial=0.0)
-    axis = "XYZ"[int(np.argmax(peaks))]
-    if axis != "Y" and peaks[1] < 0.7 * peaks.max():
-        return (
-            f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is "
-            f"up in the markers; export forces and markers in the same axes"
-        )
-    if trouble := _never_unloaded(plates):
-        return trouble
-    wrench = np.concatenate((plates.force, plates.moment), axis=2)
-    arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > _FIRM_LOAD_N]
-    arms /= plates.force[..., 1][plates.force[..., 1] > _FIRM_LOAD_N]
-    typical = float(np.median(arms)) if arms.size else 0.0
-    if typical > _LONGEST_ARM_M:
-        return (
-            f"the torques are those of vertical forces at {typical:.2g} m from the foot; expected less than 0.04 m: "
-            f"they are in N mm, or not about the centre of pressure; export them in N m, about the point of the force"
-        )
-    return ""
-
-
-def _never_unloaded(plates: PlateLoads) -> str:
-    """Which plate somebody walked over shows a small steady force where others show none; empty where none does."""
-    for name, vertical in zip(plates.names, plates.force[..., 1].T, strict=True):
-        low, high = np.percentile(vertical, _IDLE_PERCENT)
-        steady = high - low < _STEADY_N
-        if vertical.max() > _STEP_N and low > LOAD_THRESHOLD_N and high < _MOST_IDLE_N and steady:
-            return (
-                f"{name} never shows less than {vertical.min():.0f} N, and a steady {(low + high) / 2:.0f} N while "
-                f"nobody stands on it: the zero of its vertical force is wrong; zero the plates without load, or "
-                f"subtract it before export"
-            )
-    return ""
-
-
-def _free_moment(wrench: FloatArray) -> FloatArray:
-    point = centre_of_pressure(wrench)
-    result: FloatArray = (wrench[..., 3:] - np.cross(point, wrench[..., :3]))[..., 1]
-    return result
 
 
 @dataclass(frozen=True)

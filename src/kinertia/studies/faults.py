@@ -1,7 +1,7 @@
 """Is a wrong measurement named? Known mistakes are made in the files of real walks, one at a time.
 
-`kinertia check` looks at the files first; what it does not doubt is fitted, and its joint moments are compared with those
-of the sound files.
+`kinertia check` looks at the files first; what it does not doubt is fitted, and its joint moments are compared with
+those of the sound files.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ class FaultOutcome:
         outcome: see `Outcome`.
         said: the first new sentence; empty where there is none.
         by: who said it: "check" or "fit".
-        change_sd, change_nm: change of the joint moments (RMS) over their deviations (RMS), and in N m, of the coordinate
+        change_sd, change_nm: change of the joint moments (RMS) over their deviations (RMS), and in N m, of the
+        coordinate
             where the former is largest; NaN where no fit was made.
     """
 

@@ -120,7 +120,12 @@ def all_on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> Measur
     if corners is not None:
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         corners = corners.copy()
-        corners[0] = [[high[0], low[1], high[2]], [low[0], low[1], high[2]], [low[0], low[1], low[2]], [high[0], low[1], low[2]]]
+        corners[0] = [
+            [high[0], low[1], high[2]],
+            [low[0], low[1], high[2]],
+            [low[0], low[1], low[2]],
+            [high[0], low[1], low[2]],
+        ]
     return person.with_plates(replace(plates, force=force, moment=moment, corners=corners))
 
 

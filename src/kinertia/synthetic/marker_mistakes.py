@@ -55,9 +55,7 @@ def sides_exchanged(where: str = "both") -> Change:
 
 def wands_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
     """A marker of the right thigh and one of the right shank that are no landmarks, exchanged in the walk."""
-    joints = {
-        label for name, labels in person.marker_set.landmarks.items() if "wand" not in name for label in labels
-    }
+    joints = {label for name, labels in person.marker_set.landmarks.items() if "wand" not in name for label in labels}
     seen = set(person.walk.markers.labels)
     picked = [
         [one for one in person.marker_set.segments[name] if one not in joints and one in seen]
@@ -138,7 +136,8 @@ def spikes(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
     """300 mm off in every twentieth frame."""
     off = np.zeros_like(way)
     off[10::20, 0] = 0.3
-    return way + off
+    result: FloatArray = way + off
+    return result
 
 
 def frozen(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
@@ -160,12 +159,14 @@ def bridged(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
 
 def jumping(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
     """60 mm higher from the middle on."""
-    return way + np.where(time > middle_s, 0.06, 0.0)[:, None] * np.array([0.0, 1.0, 0.0])
+    result: FloatArray = way + np.outer(np.where(time > middle_s, 0.06, 0.0), [0.0, 1.0, 0.0])
+    return result
 
 
 def displaced(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
     """Fallen off before the walk and put back 50 mm higher."""
-    return way + np.array([0.0, 0.05, 0.0])
+    result: FloatArray = way + np.array([0.0, 0.05, 0.0])
+    return result
 
 
 def exchanged_for_a_while(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
@@ -177,9 +178,9 @@ def exchanged_for_a_while(person: MeasuredPerson, rng: np.random.Generator) -> M
 
     def changed(markers: Markers) -> Markers:
         places = markers.positions.copy()
-        columns = [markers.labels.index(name) for name in names]
-        rows = np.flatnonzero(np.abs(markers.time - middle) <= 0.2)
-        places[np.ix_(rows, columns)] = places[np.ix_(rows, columns[::-1])]
+        one, other = (markers.labels.index(name) for name in names)
+        rows = np.abs(markers.time - middle) <= 0.2
+        places[rows, one], places[rows, other] = places[rows, other], places[rows, one]
         return replace(markers, positions=places)
 
     return person.in_walk(changed)
@@ -197,8 +198,16 @@ def closed_up(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerso
 
 
 def half_speed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    """Markers of the walk at half their rate."""
-    return person.in_walk(lambda markers: replace(markers, time=markers.time[0] + 2 * (markers.time - markers.time[0])))
+    """Markers of the walk at half their rate; in a C3D file, which has one clock, forces as well."""
+
+    def slow(time: FloatArray) -> FloatArray:
+        start = person.walk.markers.time[0]
+        result: FloatArray = start + 2 * (time - start)
+        return result
+
+    if person.plates.corners is not None:
+        person = person.with_plates(replace(person.plates, time=slow(person.plates.time)))
+    return person.in_walk(lambda markers: replace(markers, time=slow(markers.time)))
 
 
 def virtual_markers(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
@@ -210,13 +219,20 @@ def virtual_markers(person: MeasuredPerson, rng: np.random.Generator) -> Measure
     sets = person.marker_set
 
     def changed(markers: Markers) -> Markers:
-        corner = {n: markers.select(sets.landmarks[n]).positions.mean(axis=1) for n in ("asis_r", "asis_l", "psis_r", "psis_l")}
+        corner = {
+            n: markers.select(sets.landmarks[n]).positions.mean(axis=1)
+            for n in ("asis_r", "asis_l", "psis_r", "psis_l")
+        }
         origin = (corner["asis_r"] + corner["asis_l"]) / 2
         z = _units(corner["asis_r"] - corner["asis_l"])
         y = _units(np.cross(z, origin - (corner["psis_r"] + corner["psis_l"]) / 2))
         axes = np.stack([np.cross(y, z), y, z], axis=2)
         hips = [origin + axes @ hip_in_pelvis(width, depth, "bell", side) for side in "rl"]
-        return Markers(markers.time, (*markers.labels, "centre_r", "centre_l"), np.concatenate([markers.positions, np.stack(hips, 1)], 1))
+        return Markers(
+            markers.time,
+            (*markers.labels, "centre_r", "centre_l"),
+            np.concatenate([markers.positions, np.stack(hips, 1)], 1),
+        )
 
     segments = dict(sets.segments)
     segments |= {f"thigh_{side}": (*segments[f"thigh_{side}"], f"centre_{side}") for side in "rl"}
@@ -228,9 +244,7 @@ def _forces_to_the_end(person: MeasuredPerson) -> MeasuredPerson:
     plates, markers = person.plates, person.walk.markers
     if plates.corners is None:
         return person
-    ratio = round(len(plates.time) / (len(markers.time) or 1))
-    step = 1.0 / markers.rate_hz / (plates.time[1] - plates.time[0])
-    ratio = round(step)
+    ratio = round(1.0 / markers.rate_hz / float(plates.time[1] - plates.time[0]))
     count = ratio * len(markers.time)
     return person.with_plates(
         replace(plates, time=plates.time[:count], force=plates.force[:count], moment=plates.moment[:count])

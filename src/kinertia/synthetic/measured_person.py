@@ -130,7 +130,9 @@ def write_person(folder: Path, person: MeasuredPerson) -> Path:
 
 
 def _marker_set_text(marker_set: MarkerSet) -> str:
-    landmarks, segments = ({k: list(v) for k, v in table.items()} for table in (marker_set.landmarks, marker_set.segments))
+    landmarks, segments = (
+        {k: list(v) for k, v in table.items()} for table in (marker_set.landmarks, marker_set.segments)
+    )
     tables = (("[landmarks]", landmarks), ("[segments]", segments), ("[widths]", marker_set.widths))
     return f"name = {json.dumps(marker_set.name)}\n" + _toml(tables)
 

@@ -117,8 +117,12 @@ MISTAKES = (
     ),
     Mistake("thigh and shank markers swapped in the walk", markers.wands_exchanged, "look swapped"),
     # whose body
-    Mistake("static trial of another person, 10 % taller", markers.scaled(1.10, "static"), "static trial is of another"),
-    Mistake("static trial of another person, 7 % shorter", markers.scaled(0.93, "static"), "static trial is of another"),
+    Mistake(
+        "static trial of another person, 10 % taller", markers.scaled(1.10, "static"), "static trial is of another"
+    ),
+    Mistake(
+        "static trial of another person, 7 % shorter", markers.scaled(0.93, "static"), "static trial is of another"
+    ),
     Mistake(
         "static trial of another session, markers 10 mm elsewhere",
         markers.placed_anew(0.010),
