@@ -12,7 +12,7 @@ from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_
 from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, TrialError
 from kinertia.estimation.doubts import Doubt, motion_doubts, static_doubts, trial_doubts
-from kinertia.estimation.force_mass import CONTRADICTING_MASS
+from kinertia.estimation.force_mass import CONTRADICTING_MASS, unit_hint
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
@@ -309,6 +309,8 @@ def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
     )
     if abs(off) <= FORCE_MASS_TOLERANCE:
         return [Verdict("pass", told)]
+    if hint := unit_hint(mass.mass_kg, scale_kg):
+        return [Verdict("fail", f"{hint}: {told}")]
     return [
         Verdict(
             "fail" if abs(off) > CONTRADICTING_MASS else "caution",

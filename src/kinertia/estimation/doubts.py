@@ -12,7 +12,7 @@ from kinertia.errors import TrialError
 from kinertia.model.body_sides import sides_trouble
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
-from kinertia.model.stature import stature_doubts
+from kinertia.model.stature import floor_doubts, stature_doubts
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
@@ -44,9 +44,10 @@ def static_doubts(static: Recording, marker_set: MarkerSet | None, height_m: flo
     """
     own = _worn(static.markers, marker_set)
     found = _refused(axes_trouble(extent_m(own)) or spikes_trouble(own) or _sides(static.markers, marker_set))
-    if found or height_m is None or marker_set is None or not marker_set.landmarks:
+    if found or marker_set is None or not marker_set.landmarks:
         return found
-    return _told(stature_doubts(static, marker_set, height_m))
+    stature = [] if height_m is None else stature_doubts(static, marker_set, height_m)
+    return _told([*floor_doubts(static.markers, marker_set), *stature])
 
 
 def trial_doubts(
@@ -82,7 +83,9 @@ def trial_doubts(
             trouble = load_places_trouble(recording, feet)
     if trouble:
         return _refused(trouble)
-    told = [*jump_doubts(own), *straight_doubts(own, dict(marker_set.segments) if marker_set else {}), *session]
+    # a stretch that was written by a computer often ends with a jump
+    straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
+    told = [*straight, *jump_doubts(own), *session]
     if recording.plates is not None:
         told += loads_doubts(recording.plates)
         told += [] if feet is None else load_places_doubts(recording, feet)

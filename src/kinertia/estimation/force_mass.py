@@ -68,6 +68,8 @@ class ForceMass:
             f"from {self.time[0]:.3f} to {self.time[-1]:.3f} s the vertical force corresponds to {self.mass_kg:.1f} "
             f"kg; stated mass {mass_kg:.1f} kg"
         )
+        if hint := unit_hint(self.mass_kg, mass_kg):
+            return f"{hint}: {told}"
         share = self.carried / mass_kg - 1.0
         if self.mass_kg > mass_kg:
             return (
@@ -88,6 +90,23 @@ class ForceMass:
             f"plates, if nothing else can have carried a part of the weight (a chair, a handrail, a harness, a foot "
             f"beside the plates)"
         )
+
+
+_UNITS = (
+    (1 / GRAVITY_M_S2, "the forces look to be in kg (kilograms-force); export them in N"),
+    (0.45359, "the stated mass looks to be in pounds; give it in kg"),
+    (0.2248, "the forces look to be in pounds-force; export them in N"),
+    (2.2046, "the stated mass looks to have been divided by the kilograms of a pound; give it in kg"),
+    (0.001, "the forces look to be in kN; export them in N"),
+)
+_UNIT_OFF = 0.1
+"""A ratio of forces to mass within this share of a ratio of units is likelier that of units than of people."""
+
+
+def unit_hint(by_force_kg: float, stated_kg: float) -> str:
+    """The unit that is wrong, where forces and stated mass differ as two units do; else empty."""
+    ratio = by_force_kg / stated_kg
+    return next((told for factor, told in _UNITS if abs(ratio / factor - 1) <= _UNIT_OFF), "")
 
 
 def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:

@@ -52,16 +52,31 @@ def directions_turned(degrees: float) -> Change:
     return loads(change)
 
 
-def scaled(force: float = 1.0, point: float = 1.0, torque: float = 1.0, plates: slice = slice(None)) -> Change:
-    """Forces, points and torques times these, on all plates or on some."""
+def scaled(force: float = 1.0, point: float = 1.0, plates: slice = slice(None)) -> Change:
+    """Forces with their torques, and points times these, on all plates or on some."""
 
     def change(loads: PlateLoads) -> PlateLoads:
-        parts = [part.copy() for part in acting(loads)]
-        for part, factor in zip(parts, (force, point, torque * force), strict=True):
-            part[:, plates] *= factor
-        return loads_of(loads, *parts)
+        forces, points, torques = (part.copy() for part in acting(loads))
+        forces[:, plates] *= force
+        points[:, plates] *= point
+        torques[:, plates] *= force
+        return loads_of(loads, forces, points, torques)
 
     return loads(change)
+
+
+def torques_in_n_mm(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+    """Torques a thousand times as large; of plates with corners, all moments about the plate's middle."""
+    plates = person.plates
+    if plates.corners is not None:
+        middle = plates.corners.mean(axis=1)
+        about = plates.moment - np.cross(middle, plates.force)
+        return person.with_plates(replace(plates, moment=1000.0 * about + np.cross(middle, plates.force)))
+    force, point, torque = acting(plates)
+    loaded = force[..., 1] > LOAD_THRESHOLD_N
+    if np.abs(torque[loaded]).max() < 0.1:  # the file has none
+        return None
+    return person.with_plates(loads_of(plates, force, point, 1000.0 * torque))
 
 
 def moved(x_m: float, z_m: float) -> Change:
@@ -130,10 +145,10 @@ def all_on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> Measur
 
 
 def plates_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """The channels of two plates exchanged: each load lies where the other plate is."""
+    """The channels of two plates exchanged: each load lies where the other plate is. Force files have no channels."""
     plates = person.plates
     order = _by_time(plates)
-    if len(order) < 2:
+    if len(order) < 2 or plates.corners is None:
         return None
     force, point, torque = (part.copy() for part in acting(plates))
     first, second = order[:2]

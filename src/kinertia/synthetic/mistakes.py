@@ -51,10 +51,16 @@ def _other_sex(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPers
 
 
 def _said(person: MeasuredPerson, told: dict[str, object]) -> MeasuredPerson:
-    return replace(person, subject=person.subject.model_copy(update=told))
+    """In the subject file, and in the static trial where that says it as well."""
+    known = {key: value for key, value in told.items() if getattr(person.static, key, None) is not None}
+    static = replace(person.static, **known)  # type: ignore[arg-type]
+    walk = replace(person.walk, **{k: v for k, v in known.items() if getattr(person.walk, k) is not None})  # type: ignore[arg-type]
+    return replace(person, subject=person.subject.model_copy(update=told), static=static, walk=walk)
 
 
 _OUTER = "the outer marker of the (right|left) {joint} is on its inner side"
+_PLACE = "centres? of pressure|plate.*: [xz]: [-+]"
+"""By `check`, or as the place of a plate by the estimate."""
 _ASIS_PSIS = (("asis_r", "psis_r"), ("asis_l", "psis_l"))
 
 MISTAKES = (
@@ -88,7 +94,7 @@ MISTAKES = (
     Mistake(
         "heel and toe swapped in the walk, one foot",
         markers.exchanged(("heel_l", "metatarsal_l"), where="walk"),
-        "left foot points backwards",
+        "left foot points backwards|look swapped",
     ),
     Mistake(
         "all left and right labels swapped",
@@ -142,7 +148,7 @@ MISTAKES = (
     Mistake(
         "cameras calibrated anew: all markers 100 mm further on than the plates",
         markers.moved((0.1, 0.0, 0.0), "walk"),
-        "cent(re|res) of pressure",
+        _PLACE,
     ),
     # time
     Mistake("80 ms of marker frames cut out and closed up", markers.closed_up, "frames are missing"),
@@ -164,12 +170,12 @@ MISTAKES = (
     Mistake("sign of the horizontal force along Z", forces.with_signs(1, 1, -1), "wrong sign|wrong signs"),
     Mistake("forces turned by 180 degrees", forces.with_signs(-1, 1, -1), "turned by 180 degrees"),
     Mistake("forces turned by 90 degrees", forces.directions_turned(90.0), "turned by -?90 degrees"),
-    Mistake("torques in N mm", forces.scaled(torque=1000.0), "N mm"),
+    Mistake("torques in N mm", forces.torques_in_n_mm, "N mm"),
     Mistake("points of application in mm", forces.scaled(point=1000.0), "in mm"),
     Mistake("forces in kg", forces.scaled(force=1 / 9.81), "in kg"),
     Mistake("forces in kN", forces.scaled(force=1e-3), "kN"),
-    Mistake("centres of pressure 50 mm off along X, both plates", forces.moved(0.05, 0.0), "cent(re|res) of pressure"),
-    Mistake("centres of pressure 50 mm off along Z, both plates", forces.moved(0.0, 0.05), "cent(re|res) of pressure"),
+    Mistake("centres of pressure 50 mm off along X, both plates", forces.moved(0.05, 0.0), _PLACE),
+    Mistake("centres of pressure 50 mm off along Z, both plates", forces.moved(0.0, 0.05), _PLACE),
     Mistake("plates exchanged", forces.plates_exchanged, "exchanged"),
     Mistake("both feet on one plate for 0.12 s", forces.on_one_plate, "both feet"),
     Mistake("50 N on the horizontal X axis", forces.with_offset(x_n=50.0), "zero of that axis"),

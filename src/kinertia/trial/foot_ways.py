@@ -27,7 +27,7 @@ class FootWay:
     Attributes:
         time: (n,) s.
         back, front: (n, 2) m, horizontal places (x, z) of the two markers that are farthest apart, interpolated where
-            they are not seen; the same for a foot with one marker. Which is the heel is not known.
+            they are not seen; the same for a foot with one marker. The foot swings forwards from back to front.
         stands: first and last time (s) of every stretch in which it stands, and whether the trial shows both ends.
     """
 
@@ -36,12 +36,20 @@ class FootWay:
     front: FloatArray
     stands: tuple[tuple[float, float, bool], ...]
 
+    def beyond(self, time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(k,) m, how far places (k, 2) at times (k,) are in front of the back, and in front of the front."""
+        back, front = (self._at(end, time) for end in (self.back, self.front))
+        along = front - back
+        length = np.maximum(np.linalg.norm(along, axis=1), 1e-6)
+        ahead: FloatArray = ((place - back) * along).sum(axis=1) / length
+        return ahead, ahead - length
+
+    def _at(self, end: FloatArray, time: FloatArray) -> FloatArray:
+        return np.column_stack([np.interp(time, self.time, end[:, axis]) for axis in range(2)])
+
     def off_foot(self, time: FloatArray, place: FloatArray) -> FloatArray:
         """(k, 2) m from the nearest point between back and front to places (k, 2) on the ground at times (k,)."""
-        back, front = (
-            np.column_stack([np.interp(time, self.time, end[:, axis]) for axis in range(2)])
-            for end in (self.back, self.front)
-        )
+        back, front = (self._at(end, time) for end in (self.back, self.front))
         along = front - back
         share = ((place - back) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
         result: FloatArray = place - back - np.clip(share, 0.0, 1.0)[:, None] * along
@@ -58,20 +66,29 @@ def foot_ways(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[Foot
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
     if len(markers.time) < 5 or any(not place.size or not _seen(place).any(axis=0).any() for place in places):
         return None
-    speeds = _speeds(markers, places)
     ways = []
-    for place, speed in zip(places, speeds, strict=True):
+    for place, velocity in zip(places, _velocities(markers, places), strict=True):
         back, front = _ends(markers.time, place)
-        ways.append(FootWay(markers.time, back, front, _stands(markers.time, speed)))
+        if _swing(velocity, front - back) < 0:
+            back, front = front, back
+        stands = _stands(markers.time, np.linalg.norm(velocity, axis=2))
+        ways.append(FootWay(markers.time, back, front, stands))
     return ways[0], ways[1]
+
+
+def _swing(velocity: FloatArray, along: FloatArray) -> float:
+    """Positive where the foot is mostly fast (n, m, 3) along this direction (n, 2), not against it."""
+    shown = np.isfinite(velocity).all(axis=2).any(axis=1)
+    mean = np.nanmean(velocity[shown][..., [0, 2]], axis=1)
+    return float(((mean * along[shown]).sum(axis=1) * np.linalg.norm(mean, axis=1)).sum())
 
 
 def _seen(place: FloatArray) -> FloatArray:
     return np.asarray(np.isfinite(place).all(axis=2))
 
 
-def _speeds(markers: Markers, places: Sequence[FloatArray]) -> list[FloatArray]:
-    """(n, m) m/s of every marker of each foot against the ground."""
+def _velocities(markers: Markers, places: Sequence[FloatArray]) -> list[FloatArray]:
+    """(n, m, 3) m/s of every marker of each foot against the ground."""
     velocities = [np.gradient(place, markers.time, axis=0) for place in places]
     low = []
     for place, velocity in zip(places, velocities, strict=True):
@@ -84,7 +101,7 @@ def _speeds(markers: Markers, places: Sequence[FloatArray]) -> list[FloatArray]:
     belt = np.median(every, axis=0) * np.array([1.0, 0.0, 1.0]) if len(every) else np.zeros(3)
     if np.linalg.norm(belt) < _LEAST_BELT_M_S:
         belt = np.zeros(3)
-    return [np.linalg.norm(velocity - belt, axis=2) for velocity in velocities]
+    return [velocity - belt for velocity in velocities]
 
 
 def _stands(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:

@@ -8,7 +8,7 @@ load), and right and left are off that line by the same outwards, within 8 mm (2
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
@@ -26,7 +26,11 @@ _RATE = (0.7, 1.4)
 _FAR_M = 0.15
 """Half of a load farther than this from both feet is under neither."""
 _FAR_TOO_FAR_M = 5.0
-_OFFSET_M = 0.035
+_OFFSET_M = 0.03
+_END = 0.05
+_BEGIN_M, _END_M = 0.015, 0.06
+"""On sound trials, from squats to forefoot runs, the first twentieth of a load is 36 to 99 mm in front of the heel's
+marker, and the last one at most 25 mm in front of the foremost, which may be on the metatarsals."""
 _OUTSIDE_M, _OUTSIDE_SHARE = 0.13, 0.02
 _BOTH_M = 0.08
 
@@ -42,6 +46,7 @@ class _Contact:
         weight: (k,) N, its vertical force where that is firm.
         time: (k,) s.
         off_m: (2, k, 2) m, horizontally from each foot to the centre of pressure.
+        ends_m: how far the first twentieth of the load is in front of the heel, and the last one in front of the toes.
     """
 
     plate: int
@@ -51,6 +56,7 @@ class _Contact:
     weight: FloatArray
     time: FloatArray
     off_m: FloatArray
+    ends_m: tuple[float, float]
 
     @property
     def off_own_m(self) -> FloatArray:
@@ -107,16 +113,20 @@ def _contacts(plates: PlateLoads, ways: tuple[FootWay, FootWay]) -> list[_Contac
                 continue
             off = np.stack([way.off_foot(plates.time[rows], point[rows, p]) for way in ways])
             near = [float(vertical[rows] @ np.linalg.norm(one, axis=1)) for one in off]
+            foot = int(np.argmin(near))
+            ahead = ways[foot].beyond(plates.time[rows], point[rows, p])
+            ends_m = (_quantile(ahead[0], vertical[rows], _END), _quantile(ahead[1], vertical[rows], 1 - _END))
             begins, ends = first > 0 and start > first_s, last < len(plates.time) - 1 and end < last_s
             found.append(
                 _Contact(
                     p,
                     start if begins else np.nan,
                     end if ends else np.nan,
-                    int(np.argmin(near)),
+                    foot,
                     vertical[rows],
                     plates.time[rows],
                     off,
+                    ends_m,
                 )
             )
     return found
@@ -142,10 +152,14 @@ def _unit_trouble(contacts: Sequence[_Contact]) -> str:
 
 def _half_within(contact: _Contact) -> float:
     """m from the nearer foot, within which half of the load is."""
-    distance = np.linalg.norm(contact.off_m, axis=2).min(axis=0)
-    order = np.argsort(distance)
-    passed = np.cumsum(contact.weight[order]) / contact.weight.sum()
-    return float(distance[order][np.searchsorted(passed, 0.5)])
+    return _quantile(np.linalg.norm(contact.off_m, axis=2).min(axis=0), contact.weight, 0.5)
+
+
+def _quantile(values: FloatArray, weight: FloatArray, share: float) -> float:
+    """The value below which this share of the weight is."""
+    order = np.argsort(values)
+    passed = np.cumsum(weight[order]) / weight.sum()
+    return float(values[order][min(int(np.searchsorted(passed, share)), len(order) - 1)])
 
 
 def _rate_trouble(contacts: Sequence[_Contact], ways: Sequence[FootWay]) -> str:
@@ -183,7 +197,7 @@ def _exchange_trouble(plates: PlateLoads, contacts: Sequence[_Contact], ways: tu
         for contact in contacts:
             rows = np.searchsorted(plates.time, contact.time)
             off = np.stack([way.off_foot(contact.time, moved[rows, contact.plate]) for way in ways])
-            far.append(_half_within(_Contact(contact.plate, 0.0, 0.0, 0, contact.weight, contact.time, off)))
+            far.append(_half_within(replace(contact, off_m=off)))
         if max(far) < best[0]:
             best = (max(far), (one, other))
     if best[0] > _FAR_M / 2:
@@ -266,11 +280,27 @@ def _offset_doubt(contacts: Sequence[_Contact]) -> str:
         return ""
     mean = (np.mean(means[0], axis=0) + np.mean(means[1], axis=0)) / 2
     if np.linalg.norm(mean) <= _OFFSET_M:
-        return ""
+        return _ends_doubt(contacts)
     return (
         f"centres of pressure of both feet are off the line from heel to toe by {1e3 * mean[0]:+.0f} mm along X and "
         f"{1e3 * mean[1]:+.0f} mm along Z: cameras and plates have different origins, or all plates are off; check the "
         f"places of the plates with a pole or by standing on a marker"
+    )
+
+
+def _ends_doubt(contacts: Sequence[_Contact]) -> str:
+    """Loads that begin behind the heel or end in front of the toes: what an offset along the foot does first."""
+    behind, before = (float(np.median([one.ends_m[k] for one in contacts])) for k in range(2))
+    if behind >= _BEGIN_M and before <= _END_M:
+        return ""
+    where = (
+        f"begin {1e3 * behind:.0f} mm in front of the heels' markers (usual are 35 to 100)"
+        if behind < _BEGIN_M
+        else f"end {1e3 * before:.0f} mm in front of the foremost markers of the feet (usual are 25 at most)"
+    )
+    return (
+        f"centres of pressure {where}, median of {len(contacts)} contacts: cameras and plates have different origins, "
+        "or all plates are off along the walk; check the places of the plates with a pole or by standing on a marker"
     )
 
 
