@@ -80,10 +80,12 @@ def _hardly_loaded(plates: PlateLoads) -> str:
     """What all plates show is too little for a person, and more than noise."""
     peak = max((idle.peak_n for idle in plates.idle or ()), default=np.inf)
     if not _WEAKEST_N < peak < LOAD_THRESHOLD_N or plates.force.any():
+        return ""
     return (
         f"the largest vertical force is {peak:.2g}: the forces are in kN, or in multiples of the body weight; export "
         "them in N"
     )
+
 
 def _free_moment(wrench: FloatArray) -> FloatArray:
     point = centre_of_pressure(wrench)
