@@ -22,20 +22,24 @@ from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.measured_person import MeasuredPerson, read_person, write_person
 from kinertia.synthetic.mistakes import MISTAKES, Mistake
+from kinertia.synthetic.walk import walk, walking_subject
 
 Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
 """What became of a mistake: named; warned with another cause; moments within their deviations; neither; there is
 nothing to make it with."""
+_WALK_S, _PLATE_RATE_HZ, _START, _SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _LEGS = re.compile(r"(hip|knee|ankle|subtalar)_")
 
 
 class Finding(NamedTuple):
-    """What was said of files or of their fit: "fail" or "caution", and the sentence."""
+    """What was said of files or of their fit: "fail" or "caution", the sentence, and by whom ("check" or "fit")."""
 
     level: str
     sentence: str
+    by: str = "check"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +100,16 @@ def run_faults(
         progress: called with the share that is done.
     """
     sound = in_parallel(_sound, list(walks.items()), workers, lambda share: progress(0.1 * share))
-    cases = [(walk, mistake.name) for walk in sound for mistake in mistakes]
+    cases = [(one, mistake.name) for one in sound for mistake in mistakes]
     return sound, in_parallel(_spoilt, cases, workers, lambda share: progress(0.1 + 0.9 * share))
+
+
+def synthetic_walk(folder: Path) -> SubjectFile:
+    """Files of the package's own walk, in a careful laboratory, written into this folder."""
+    subject = walking_subject()
+    trial = walk(subject, _WALK_S, _PLATE_RATE_HZ, _START)
+    recordings = record(subject, trial, LabNoise(), np.random.default_rng(1), _SAMPLES_PER_FRAME)
+    return read_subject(write_lab(folder, recordings))
 
 
 def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
@@ -108,7 +120,7 @@ def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            found.append(Finding("fail", str(error)))
+            found.append(Finding("fail", str(error), "fit"))
         else:
             found += of_fit(fit)
             moments = moments_of(fit)
@@ -116,33 +128,32 @@ def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
 
 
 def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
-    walk, name = case
-    mistake = next(one for one in MISTAKES if one.name == name)
-    return outcome_of(walk, mistake)
+    sound, name = case
+    return outcome_of(sound, next(one for one in MISTAKES if one.name == name))
 
 
-def outcome_of(walk: SoundWalk, mistake: Mistake) -> FaultOutcome:
+def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
     """Make the mistake in the files of the walk, and see what becomes of it."""
-    person = mistake.change(_person(walk.subject, walk.name), np.random.default_rng(_seed(mistake.name)))
+    person = mistake.change(_person(sound.subject, sound.name), np.random.default_rng(_seed(mistake.name)))
     if person is None:
-        return FaultOutcome(walk.name, mistake.name, "not possible")
+        return FaultOutcome(sound.name, mistake.name, "not possible")
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), person)
         by_check = checked(path)
-        told = judged(mistake, walk.findings, by_check)
+        told = judged(mistake, sound.findings, by_check)
         if told is not None:
-            return FaultOutcome(walk.name, mistake.name, told[0], told[1], "check")
+            return FaultOutcome(sound.name, mistake.name, told[0], told[1], "check")
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            told = judged(mistake, walk.findings, [Finding("fail", str(error))])
+            told = judged(mistake, sound.findings, [Finding("fail", str(error), "fit")])
             outcome, said = told or ("warned", str(error))
-            return FaultOutcome(walk.name, mistake.name, outcome, said, "fit")
-    sd, nm = change(walk.moments, moments_of(fit))
-    told = judged(mistake, walk.findings, of_fit(fit))
+            return FaultOutcome(sound.name, mistake.name, outcome, said, "fit")
+    sd, nm = change(sound.moments, moments_of(fit))
+    told = judged(mistake, sound.findings, of_fit(fit))
     if told is not None:
-        return FaultOutcome(walk.name, mistake.name, told[0], told[1], "fit", sd, nm)
-    return FaultOutcome(walk.name, mistake.name, "harmless" if sd <= 1.0 else "silent", "", "", sd, nm)
+        return FaultOutcome(sound.name, mistake.name, told[0], told[1], "fit", sd, nm)
+    return FaultOutcome(sound.name, mistake.name, "harmless" if sd <= 1.0 else "silent", "", "", sd, nm)
 
 
 def _person(subject: SubjectFile, name: str) -> MeasuredPerson:
@@ -162,8 +173,8 @@ def checked(subject: Path) -> list[Finding]:
 
 def of_fit(fit: Fit) -> list[Finding]:
     """What `kinertia fit` doubts once it has computed."""
-    warned = [Finding("caution", sentence) for sentence in fit.warnings]
-    return warned + [Finding(*verdict) for verdict in verdicts(fit) if verdict.level != "pass"]
+    warned = [Finding("caution", sentence, "fit") for sentence in fit.warnings]
+    return warned + [Finding(*verdict, "fit") for verdict in verdicts(fit) if verdict.level != "pass"]
 
 
 def judged(

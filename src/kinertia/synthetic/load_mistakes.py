@@ -111,37 +111,21 @@ def _with_more(extra: Callable[[FloatArray], FloatArray]) -> Change:
 
 
 def on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """The foot of the second plate lands on the first for the first 0.12 s, in front of the other foot."""
+    """The foot of the second plate lands on the first for the first 0.08 s, in front of the other foot."""
     plates = person.plates
     order = _by_time(plates)
     if len(order) < 2:
         return None
     first, second = order[:2]
     loaded = np.flatnonzero(plates.force[:, second, 1] > LOAD_THRESHOLD_N)
-    inside = (plates.time >= plates.time[loaded[0]]) & (plates.time < plates.time[loaded[0]] + 0.12)
+    inside = (plates.time >= plates.time[loaded[0]]) & (plates.time < plates.time[loaded[0]] + 0.08)
+    if not (plates.force[inside, first, 1] > LOAD_THRESHOLD_N).all():
+        return None
     force, moment = plates.force.copy(), plates.moment.copy()
     for part in (force, moment):
         part[inside, first] += part[inside, second]
         part[inside, second] = 0.0
     return person.with_plates(replace(plates, force=force, moment=moment))
-
-
-def all_on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    """Both feet on one plate: the first shows what all do."""
-    plates = person.plates
-    force, moment = np.zeros_like(plates.force), np.zeros_like(plates.moment)
-    force[:, 0], moment[:, 0] = plates.force.sum(axis=1), plates.moment.sum(axis=1)
-    corners = plates.corners
-    if corners is not None:
-        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-        corners = corners.copy()
-        corners[0] = [
-            [high[0], low[1], high[2]],
-            [low[0], low[1], high[2]],
-            [low[0], low[1], low[2]],
-            [high[0], low[1], low[2]],
-        ]
-    return person.with_plates(replace(plates, force=force, moment=moment, corners=corners))
 
 
 def plates_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:

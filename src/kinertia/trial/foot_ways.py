@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.trial.data import FEET, FloatArray, Markers, runs
+from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers, runs
 from kinertia.trial.ground_contact import bridged
 
 _LOW = 0.15
@@ -64,7 +64,7 @@ def foot_ways(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[Foot
         feet: labels of the markers on each foot, "r" and "l".
     """
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
-    if len(markers.time) < 5 or any(not place.size or not _seen(place).any(axis=0).any() for place in places):
+    if len(markers.time) < 5 or any(not np.any(_seen(place)) for place in places):
         return None
     ways = []
     for place, velocity in zip(places, _velocities(markers, places), strict=True):
@@ -83,7 +83,7 @@ def _swing(velocity: FloatArray, along: FloatArray) -> float:
     return float(((mean * along[shown]).sum(axis=1) * np.linalg.norm(mean, axis=1)).sum())
 
 
-def _seen(place: FloatArray) -> FloatArray:
+def _seen(place: FloatArray) -> BoolArray:
     return np.asarray(np.isfinite(place).all(axis=2))
 
 

@@ -31,8 +31,10 @@ _END = 0.05
 _BEGIN_M, _END_M = 0.015, 0.06
 """On sound trials, from squats to forefoot runs, the first twentieth of a load is 36 to 99 mm in front of the heel's
 marker, and the last one at most 25 mm in front of the foremost, which may be on the metatarsals."""
-_OUTSIDE_M, _OUTSIDE_SHARE = 0.13, 0.02
-_BOTH_M = 0.08
+_OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
+_BOTH_M, _ONE_STEP_S, _MOSTLY = 0.08, 1.5, 0.5
+"""Loads that last longer than a step are of both feet, in turn (walking on one belt) or at once (squats): then most of
+the load is between them, farther than this from both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,17 +311,18 @@ def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact]) -> str:
     told = []
     for contact in contacts:
         distance = np.linalg.norm(contact.off_m, axis=2)
-        between = (distance > _BOTH_M).all(axis=0) & (distance[contact.foot] > _OUTSIDE_M)
-        share = float(contact.weight[between].sum() / contact.weight.sum())
-        if share > _OUTSIDE_SHARE and _half_within(contact) < _BOTH_M:
-            told.append(
-                f"{plates.names[contact.plate]} from {contact.time[between][0]:.3f} to {contact.time[between][-1]:.3f} "
-                "s"
-            )
+        away = distance[contact.foot] > _OUTSIDE_M
+        # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
+        if contact.time[-1] - contact.time[0] > _ONE_STEP_S:
+            away = (distance > _BOTH_M).all(axis=0) & (np.prod(contact.off_m, axis=0).sum(axis=1) < 0)
+        share = float(contact.weight[away].sum() / contact.weight.sum())
+        if share > (_MOSTLY if contact.time[-1] - contact.time[0] > _ONE_STEP_S else _OUTSIDE_SHARE):
+            when = contact.time[away]
+            told.append(f"{plates.names[contact.plate]} from {when[0]:.3f} to {when[-1]:.3f} s")
     if not told:
         return ""
     return (
-        f"the centre of pressure is between the feet, more than {1e3 * _OUTSIDE_M:.0f} mm off the foot that stands on "
-        f"the plate: both feet are on it ({', '.join(told)}), and what each does is not known; use a trial with one "
-        "foot on each plate, or give a window without that time (window_s)"
+        f"the centre of pressure leaves the foot that stands on the plate: both feet are on it ({', '.join(told)}), "
+        "and what each does is not known; use a trial with one foot on each plate, or give a window without that time "
+        "(window_s)"
     )
