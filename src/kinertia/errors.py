@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 
 class KinertiaError(Exception):
@@ -20,6 +21,16 @@ class KinertiaError(Exception):
         ...     print(type(error).__name__)
         FileError
     """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """With all it carries: errors come from other processes as well."""
+        return _restored, (type(self), self.args, vars(self))
+
+
+def _restored(kind: type[KinertiaError], args: tuple[Any, ...], carried: dict[str, Any]) -> KinertiaError:
+    error = kind.__new__(kind, *args)
+    vars(error).update(carried)
+    return error
 
 
 class FileError(KinertiaError):

@@ -166,7 +166,10 @@ def _seed(name: str) -> list[int]:
 
 def checked(subject: Path) -> list[Finding]:
     """What `kinertia check` doubts."""
-    found, unreadable = check_files(files_of_subject(read_subject(subject)))
+    try:
+        found, unreadable = check_files(files_of_subject(read_subject(subject)))
+    except KinertiaError as error:
+        return [Finding("fail", str(error))]
     told = [Finding("fail", sentence) for sentence in unreadable]
     return told + [Finding(*verdict) for _, one in found for verdict in one.verdicts if verdict.level != "pass"]
 

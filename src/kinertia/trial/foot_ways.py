@@ -64,7 +64,7 @@ def foot_ways(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[Foot
         feet: labels of the markers on each foot, "r" and "l".
     """
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
-    if len(markers.time) < 5 or any(not np.any(_seen(place)) for place in places):
+    if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
         return None
     ways = []
     for place, velocity in zip(places, _velocities(markers, places), strict=True):
@@ -78,7 +78,7 @@ def foot_ways(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[Foot
 
 def _swing(velocity: FloatArray, along: FloatArray) -> float:
     """Positive where the foot is mostly fast (n, m, 3) along this direction (n, 2), not against it."""
-    shown = np.isfinite(velocity).all(axis=2).any(axis=1)
+    shown = _seen(velocity).any(axis=1)
     mean = np.nanmean(velocity[shown][..., [0, 2]], axis=1)
     return float(((mean * along[shown]).sum(axis=1) * np.linalg.norm(mean, axis=1)).sum())
 

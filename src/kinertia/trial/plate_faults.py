@@ -42,8 +42,10 @@ def loads_trouble(plates: PlateLoads) -> str:
 
 def loads_doubts(plates: PlateLoads) -> list[str]:
     """Zeros that are wrong or drift, by what plates read while nobody stands on them."""
+    if plates.idle is None:
+        return []
     found = []
-    for name, idle in zip(plates.names, plates.idle or (), strict=True):
+    for name, idle in zip(plates.names, plates.idle, strict=True):
         off = [(axis, value) for axis, value in zip("XYZ", idle.level_n, strict=True) if abs(value) > _ZERO_N]
         if off:
             told = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off)
