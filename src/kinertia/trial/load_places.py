@@ -82,9 +82,9 @@ def load_places_trouble(recording: Recording, feet: Mapping[str, Sequence[str]])
         return ""
     return (
         _unit_trouble(contacts)
-        or _rate_trouble(contacts, ways)
+        or _rate_trouble(recording.plates, ways)
         or _exchange_trouble(recording.plates, contacts, ways)
-        or _time_trouble(contacts, ways)
+        or _time_trouble(recording.plates, contacts, ways)
         or _place_trouble(contacts)
     )
 
@@ -164,9 +164,15 @@ def _quantile(values: FloatArray, weight: FloatArray, share: float) -> float:
     return float(values[order][min(int(np.searchsorted(passed, share)), len(order) - 1)])
 
 
-def _rate_trouble(contacts: Sequence[_Contact], ways: Sequence[FootWay]) -> str:
+def _rate_trouble(plates: PlateLoads, ways: Sequence[FootWay]) -> str:
     """Feet stand half or twice as long by the markers as by the plates."""
-    loaded = [one.end_s - one.start_s for one in contacts if np.isfinite(one.end_s - one.start_s)]
+    last_row = len(plates.time) - 1
+    loaded = [
+        float(plates.time[last] - plates.time[first])
+        for vertical in plates.force[..., 1].T
+        for first, last in runs(bridged(plates.time, vertical > _EDGE_N))
+        if first > 0 and last < last_row and plates.time[last] - plates.time[first] >= _SHORTEST_S
+    ]
     standing = [end - start for way in ways for start, end, whole in way.stands if whole]
     if not loaded or not standing:
         return ""
@@ -218,7 +224,7 @@ def _middles(plates: PlateLoads, point: FloatArray, used: Sequence[int]) -> dict
     return {p: np.average(point[firm[p], p], axis=0, weights=plates.force[firm[p], p, 1]) for p in used}
 
 
-def _time_trouble(contacts: Sequence[_Contact], ways: Sequence[FootWay]) -> str:
+def _time_trouble(plates: PlateLoads, contacts: Sequence[_Contact], ways: tuple[FootWay, FootWay]) -> str:
     """Loads that begin and end earlier or later than the feet land and leave."""
     late = []
     for contact in contacts:
@@ -239,14 +245,14 @@ def _time_trouble(contacts: Sequence[_Contact], ways: Sequence[FootWay]) -> str:
     if abs(delay) <= _DELAY_S or min(begin * np.sign(delay), end * np.sign(delay)) < _DELAY_S / 2:
         return ""
     word = "late" if delay > 0 else "early"
-    far = max(map(_half_within, contacts))
+    far = max(map(_half_within, _contacts(replace(plates, time=plates.time - delay), ways)), default=np.inf)
     told = (
         f"loads begin {1e3 * begin:+.0f} ms and end {1e3 * end:+.0f} ms after feet land and leave by their markers "
         f"(median of {len(late)})"
     )
     if far > _FAR_M / 2:
         return (
-            f"{told}, and act up to {1e3 * far:.0f} mm from them: the forces are of another trial, or "
+            f"{told}, and would act up to {1e3 * far:.0f} mm from them then: the forces are of another trial, or "
             f"{1e3 * abs(delay):.0f} ms {word}; give the forces of this trial"
         )
     return (
@@ -311,10 +317,11 @@ def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact]) -> str:
     told = []
     for contact in contacts:
         distance = np.linalg.norm(contact.off_m, axis=2)
-        away = distance[contact.foot] > _OUTSIDE_M
+        between = (distance > _BOTH_M).all(axis=0) & (np.prod(contact.off_m, axis=0).sum(axis=1) < 0)
+        away = between | (distance[contact.foot] > _OUTSIDE_M)
         # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
         if contact.time[-1] - contact.time[0] > _ONE_STEP_S:
-            away = (distance > _BOTH_M).all(axis=0) & (np.prod(contact.off_m, axis=0).sum(axis=1) < 0)
+            away = between
         share = float(contact.weight[away].sum() / contact.weight.sum())
         if share > (_MOSTLY if contact.time[-1] - contact.time[0] > _ONE_STEP_S else _OUTSIDE_SHARE):
             when = contact.time[away]
