@@ -154,7 +154,7 @@ def check_recording(
     if trial is not None and used is not None:
         found += _turning(trial, used)
         refused = any(one.refused for one in doubts)
-        found += [] if refused else _verdicts(motion_doubts(trial, used.segments.get("pelvis", ())))
+        found += [] if refused else _verdicts(motion_doubts(recording, trial, used))
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
         recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)

@@ -14,6 +14,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
+from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from kinertia.trial.marker_faults import (
@@ -92,17 +93,20 @@ def trial_doubts(
     return _told(told)
 
 
-def motion_doubts(trial: Trial, pelvis: Sequence[str]) -> list[Doubt]:
+def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> list[Doubt]:
     """What speaks against loads that were sorted by foot: whether they move the body as the markers show.
 
     Args:
-        trial: in the laboratory's axes.
-        pelvis: labels of the markers on the pelvis.
+        recording: as read.
+        trial: what became of it, in the laboratory's axes.
+        marker_set: which marker is on which segment.
     """
+    pelvis = marker_set.segments.get("pelvis", ())
     if trouble := direction_trouble(trial, pelvis):
         return _refused(trouble)
     offset = offset_trouble(trial, pelvis)
-    return _told([offset] if offset else [])
+    owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    return _told([*([offset] if offset else []), *gain_doubts(recording, trial, owners)])
 
 
 def warnings_of(name: str, doubts: Sequence[Doubt]) -> list[str]:

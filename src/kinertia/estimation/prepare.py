@@ -207,8 +207,7 @@ def _looked_at(item: TrialInput, static: Recording, marker_set: MarkerSet) -> tu
             )
     warnings = warnings_of(recording.name, trial_doubts(recording, marker_set, static, feet))
     trial = build_trial(recording, feet, item.window_s)
-    pelvis = marker_set.segments.get("pelvis", ())
-    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(trial, pelvis))]
+    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(recording, trial, marker_set))]
 
 
 def _turned(trial: Trial, marker_set: MarkerSet) -> tuple[Trial, float]:

@@ -148,7 +148,7 @@ def _looked_at(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[s
     marker_set = markers_of_model(model)
     warnings = warnings_of(recording.name, trial_doubts(recording, marker_set, None, labels))
     trial = build_trial(recording, labels, item.window_s)
-    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(trial, marker_set.segments.get("pelvis", ())))]
+    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(recording, trial, marker_set))]
 
 
 def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:

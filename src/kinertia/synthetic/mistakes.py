@@ -134,9 +134,9 @@ MISTAKES = (
     ),
     # time
     Mistake("80 ms of marker frames cut out and closed up", markers.closed_up, "frames are missing"),
-    Mistake("markers at half their rate", markers.half_speed, "rate"),
-    Mistake("forces 100 ms late", forces.late(0.1), "late"),
-    Mistake("forces of another trial", forces.of_another_trial, "another trial"),
+    Mistake("markers at half their rate", markers.half_speed, "frame rate"),
+    Mistake("forces 100 ms late", forces.late(0.1), r"forces are \d+ ms late"),
+    Mistake("forces of another trial", forces.of_another_trial, "are of another trial, or"),
     # single markers
     Mistake("spikes of 300 mm every 20 frames", markers.one_marker("knee_lateral_r", markers.spikes), "spikes"),
     Mistake("a marker frozen for half a second", markers.one_marker("ankle_lateral_l", markers.frozen), "stands still"),
@@ -163,7 +163,7 @@ MISTAKES = (
     Mistake("50 N on the horizontal X axis", forces.with_offset(x_n=50.0), "zero of that axis"),
     Mistake("50 N on the vertical axis", forces.with_offset(y_n=50.0), "zero of its vertical force"),
     Mistake("zero of the vertical force drifts by 60 N", forces.with_drift(60.0), "drift"),
-    Mistake("one plate reads 10 % too much", forces.scaled(force=1.1, plates=slice(0, 1)), "gain"),
+    Mistake("one plate reads 10 % too much", forces.scaled(force=1.1, plates=slice(1, 2)), "^(trial .*: )?the gain of"),
     Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), "turned by"),
     # who
     Mistake("height 20 cm too much", _more(height_m=0.2), "height|stature"),

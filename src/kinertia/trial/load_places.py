@@ -28,9 +28,10 @@ _FAR_M = 0.15
 _FAR_TOO_FAR_M = 5.0
 _OFFSET_M = 0.03
 _END = 0.05
-_BEGIN_M, _END_M = 0.015, 0.06
-"""On sound trials, from squats to forefoot runs, the first twentieth of a load is 36 to 99 mm in front of the heel's
-marker, and the last one at most 25 mm in front of the foremost, which may be on the metatarsals."""
+_BEGIN_M, _END_M = -0.015, 0.06
+"""There is no foot behind the marker at the back of the heel: on sound trials, from squats to forefoot runs, the first
+twentieth of a load is 36 to 99 mm in front of it. The last one is at most 25 mm in front of the foremost marker, which
+may be on the metatarsals."""
 _OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
 _BOTH_M, _ONE_STEP_S, _MOSTLY = 0.08, 1.5, 0.5
 """Loads that last longer than a step are of both feet, in turn (walking on one belt) or at once (squats): then most of
@@ -252,7 +253,7 @@ def _time_trouble(plates: PlateLoads, contacts: Sequence[_Contact], ways: tuple[
     )
     if far > _FAR_M / 2:
         return (
-            f"{told}, and would act up to {1e3 * far:.0f} mm from them then: the forces are of another trial, or "
+            f"{told}, and are up to {1e3 * far:.0f} mm off the feet when moved by that: they are of another trial, or "
             f"{1e3 * abs(delay):.0f} ms {word}; give the forces of this trial"
         )
     return (
@@ -302,7 +303,7 @@ def _ends_doubt(contacts: Sequence[_Contact]) -> str:
     if behind >= _BEGIN_M and before <= _END_M:
         return ""
     where = (
-        f"begin {1e3 * behind:.0f} mm in front of the heels' markers (usual are 35 to 100)"
+        f"begin {-1e3 * behind:.0f} mm behind the heels' markers (usual are 35 to 100 mm in front of them)"
         if behind < _BEGIN_M
         else f"end {1e3 * before:.0f} mm in front of the foremost markers of the feet (usual are 25 at most)"
     )
