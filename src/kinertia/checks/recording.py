@@ -150,11 +150,12 @@ def check_recording(
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
-    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
+    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates)]
     if trial is not None and used is not None:
         found += _turning(trial, used)
         refused = any(one.refused for one in doubts)
         found += [] if refused else _verdicts(motion_doubts(recording, trial, used))
+    found += _weight(mass, scale)
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
         recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)

@@ -16,7 +16,7 @@ _SEEN = 0.8
 
 
 def owners_of(skeleton: Skeleton) -> dict[str, str]:
-    """Which segment of the anthropometric tables each marker of a model is on; empty where its body's name is none's."""
+    """Which segment of the anthropometric tables each marker of a model is on; empty where that is unknown."""
     return {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
 
 

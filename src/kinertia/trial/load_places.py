@@ -21,7 +21,8 @@ from kinertia.trial.ground_contact import bridged
 _FIRM_N = 5 * LOAD_THRESHOLD_N
 _EDGE_N = 50.0
 _SHORTEST_S = 0.15
-_DELAY_S = 0.045
+_DELAY_S, _LONGEST_DELAY_S = 0.045, 0.25
+"""Clocks and filters delay by less than the latter; what is later began at another time."""
 _RATE = (0.7, 1.4)
 _FAR_M = 0.15
 """Half of a load farther than this from both feet is under neither."""
@@ -251,7 +252,7 @@ def _time_trouble(plates: PlateLoads, contacts: Sequence[_Contact], ways: tuple[
         f"loads begin {1e3 * begin:+.0f} ms and end {1e3 * end:+.0f} ms after feet land and leave by their markers "
         f"(median of {len(late)})"
     )
-    if far > _FAR_M / 2:
+    if far > _FAR_M / 2 or abs(delay) > _LONGEST_DELAY_S:
         return (
             f"{told}, and are up to {1e3 * far:.0f} mm off the feet when moved by that: they are of another trial, or "
             f"{1e3 * abs(delay):.0f} ms {word}; give the forces of this trial"
