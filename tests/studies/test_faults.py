@@ -31,8 +31,16 @@ NOT_POSSIBLE = {
     "outer and inner knee markers swapped in the static trial, one leg",
     "outer and inner ankle markers swapped in the static trial, one leg",
     "outer and inner elbow markers swapped in the static trial, one arm",
+    "both feet on one plate for 0.08 s",
 }
-LEFT_TO_THE_FIT = set()
+"""Plug-in Gait has no inner markers, and the first foot has left when the second has landed on its plate."""
+LEFT_TO_THE_FIT = {
+    "computed joint centres listed as markers",
+    "floor of the cameras 30 mm too low",
+    "centres of pressure 50 mm off along X, both plates",
+    "plates turned by 3 degrees about the vertical",
+    "the other sex",
+}
 """What `check` says nothing about: the study in `docs/faults.md` tells what becomes of it."""
 QUICK_EVERY = 4
 
@@ -51,17 +59,17 @@ def sound(person, tmp_path_factory):
     return found
 
 
-def cases():
-    for k, mistake in enumerate(MISTAKES):
-        marks = [] if k % QUICK_EVERY == 0 else [pytest.mark.slow]
-        yield pytest.param(mistake, id=mistake.name, marks=marks)
+CASES = [
+    pytest.param(mistake, id=mistake.name, marks=[] if k % QUICK_EVERY == 0 else [pytest.mark.slow])
+    for k, mistake in enumerate(MISTAKES)
+]
 
 
 def test_fifty_mistakes():
     assert len({mistake.name for mistake in MISTAKES}) == len(MISTAKES) == 50
 
 
-@pytest.mark.parametrize("mistake", cases())
+@pytest.mark.parametrize("mistake", CASES)
 def test_mistakes_are_named(mistake, person, sound, tmp_path):
     spoilt = mistake.change(person, np.random.default_rng(5))
     assert (spoilt is None) == (mistake.name in NOT_POSSIBLE)
