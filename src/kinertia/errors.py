@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 
 class KinertiaError(Exception):
@@ -22,14 +21,14 @@ class KinertiaError(Exception):
         FileError
     """
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """With all it carries: errors come from other processes as well."""
-        return _restored, (type(self), self.args, vars(self))
+    def __reduce__(self) -> tuple[object, ...]:
+        """Back from another process as it was: errors are not made anew of their message alone."""
+        return _restored, (type(self), self.args, self.__dict__)
 
 
-def _restored(kind: type[KinertiaError], args: tuple[Any, ...], carried: dict[str, Any]) -> KinertiaError:
+def _restored(kind: type[KinertiaError], args: tuple[object, ...], data: dict[str, object]) -> KinertiaError:
     error = kind.__new__(kind, *args)
-    vars(error).update(carried)
+    error.__dict__.update(data)
     return error
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.model.stature import floor_doubts, stature_doubts
 from kinertia.trial.data import Markers
 
@@ -19,9 +18,9 @@ PEOPLE = {
 
 
 @pytest.fixture(params=PEOPLE.items(), ids=list(PEOPLE))
-def person(request, measured_file):
+def person(request, measured_recording):
     name, height_m = request.param
-    static = read_recording(measured_file(name))
+    static = measured_recording(name)
     return static, choose_marker_set(static.markers.labels), height_m
 
 

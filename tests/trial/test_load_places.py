@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
@@ -23,10 +22,10 @@ WALKS = {
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_file):
+def walk(request, measured_recording):
     """A measured walk and the labels of its feet."""
     markers, forces = WALKS[request.param]
-    found = read_recording(measured_file(markers), None if forces is None else measured_file(forces))
+    found = measured_recording(markers, forces)
     feet = choose_marker_set(found.markers.labels).foot_labels()
     return found, {side: [one for one in labels if one in found.markers.labels] for side, labels in feet.items()}
 
