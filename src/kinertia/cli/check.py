@@ -58,8 +58,10 @@ def check(
     is on them; the stretch in which all ground contact is measured; the
     vertical force against body mass; the mean vertical
     moment over whole strides, which should be near zero; swapped labels,
-    mirrored axes, spikes; forces with a wrong axis, sign, unit or zero.
-    With the static trial: whether it is of the same person.
+    mirrored axes, spikes, jumps, lost or invented frames; forces with a wrong
+    axis, sign, unit, zero, gain, place or clock.
+    With the static trial: whether it is of the same person and session, and
+    goes with the stature.
 
     Model: total mass; each segment against the literature for this person;
     impossible, rounded or placeholder inertias; left against right.
