@@ -21,6 +21,7 @@ from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.range_terms import add_ranges
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
@@ -363,6 +364,8 @@ class MapProblem:
             self.moving,
             self.still,
         )
+        inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
+        add_ranges(normal, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving])
         dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
         for piece in pieces(len(dynamic)):
             terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])
