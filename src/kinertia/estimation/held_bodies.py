@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.prior import SIDES_CORRELATION, BspPrior, with_symmetry
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
@@ -45,7 +45,8 @@ def widened(
             sd = np.array([alone.sd[h, 0], *np.hypot(alone.sd[h, 1:4], swing)])
             change = _changes(own.mass_kg[rows[name]], own.mass_kg[h], away) * sd
             covariance[place, place] += change @ change.T
-    return replace(prior, covariance=covariance)
+    # a hand's mass, and how its wrist is held, are much alike on both sides, too
+    return replace(prior, covariance=with_symmetry(covariance, prior.mean.segments, SIDES_CORRELATION))
 
 
 def _centre(skeleton: Skeleton, own: BodySegmentParameters, held: str, name: str) -> np.ndarray:

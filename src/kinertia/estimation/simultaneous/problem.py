@@ -253,10 +253,30 @@ class MapProblem:
 
     def shortened(self, step: np.ndarray) -> np.ndarray:
         """The step with no logarithm (mass, second moments) changing by more than one."""
-        logs = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
         step = step.copy()
-        step[logs] = np.clip(step[logs], -1.0, 1.0)
+        step[self.logs] = np.clip(step[self.logs], -1.0, 1.0)
         return step
+
+    @property
+    def logs(self) -> np.ndarray:
+        """Where the static unknowns are logarithms: per segment of the mass, and three of square roots of second
+        moments.
+        """
+        result: np.ndarray = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
+        return result
+
+    def bends(self, here: Linearised) -> np.ndarray:
+        """(S,) what Gauss-Newton leaves out of the second derivatives by the logarithms, where the cost falls with them.
+
+        The data may ask for a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
+        them what holds a Gauss-Newton step back: it would promise much and keep nothing, again and again. A cost F of
+        exp(x) has the second derivative F'' exp(2 x) + F' exp(x), and the last term is the slope by x; by the logarithm
+        of a square root it is twice the slope.
+        """
+        slope = -(here.right + sum(normal.static_right for normal in here.normals))[self.logs].reshape(-1, 4)
+        result = np.zeros(self.layout.size)
+        result[self.logs] = (np.maximum(slope, 0.0) * [1.0, 2.0, 2.0, 2.0]).ravel()
+        return result
 
     def full(self, parts: Sequence[np.ndarray], static: np.ndarray) -> list[np.ndarray]:
         """Coordinates and derivatives of the freed skeleton: the static ones do not move."""

@@ -83,7 +83,7 @@ information: 1e-3 would hold the first steps back."""
 _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
-_MAX_ITERATIONS = 40
+_MAX_ITERATIONS = 100
 
 
 @one_blas_thread
@@ -206,7 +206,7 @@ def _step(
     parts, displaced = eliminated
     information = here.information + sum(each.information for each in displaced)
     right = here.right + sum(each.right for each in displaced)
-    information[np.diag_indices_from(information)] += damping * scale
+    information[np.diag_indices_from(information)] += damping * scale + problem.bends(here)
     step = np.linalg.solve(information, right)
     moved_sd = float(np.sqrt(step @ information @ step))
     coefficients, moved = [], []
