@@ -20,7 +20,8 @@ from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, s
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
-from kinertia.io.recording import read_recording
+from kinertia.io.qualisys import is_plate_file
+from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.model.anthropometry import check_subject
@@ -30,7 +31,6 @@ from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
 from kinertia.trial.telling_movements import missing_movements
 
-_MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")
 _LISTED = 8
 
 
@@ -53,8 +53,8 @@ def check(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Markers (.trc, .c3d), each with its forces (.mot, .sto; matched by name); or a subject file (.toml); "
-            "or models (.osim).",
+            help="Markers (.trc, .c3d, .tsv, .csv), each with its forces (.mot, .sto, .tsv; matched by name); or a "
+            "subject file (.toml); or models (.osim).",
         ),
     ],
     loads: Annotated[
@@ -188,17 +188,17 @@ def _wanted(
     for path in files:
         if path.is_dir():
             raise FileError(path, "is a folder; give the files in it, or its subject file (kinertia init drafts one)")
-        if path.suffix.lower() not in (*_MARKER_FILES, *_FORCE_FILES):
-            known = ", ".join((*_MARKER_FILES, *_FORCE_FILES, ".toml", ".osim"))
+        if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
+            known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
             hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
             raise FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
-    marked = [path for path in files if path.suffix.lower() in _MARKER_FILES]
+    marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
     forces = [path for path in files if path not in marked]
     pairs = _matched(marked, forces)
     alone = [path for path in forces if path not in pairs.values()]
     if alone:
         goes = "goes with none of the marker files by its name" if marked else "holds forces only"
-        raise FileError(alone[0], f"{goes}; check it together with its markers (.trc, .c3d)")
+        raise FileError(alone[0], f"{goes}; check it together with its markers ({', '.join(MARKER_FILES)})")
     wanted = [_Files(path, pairs.get(path)) for path in marked]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))

@@ -24,7 +24,11 @@ POSTURE_SD_RAD = float(np.radians(20.0))
 
 
 def widened(
-    prior: BspPrior, skeleton: Skeleton, own: BodySegmentParameters, alone: BspPrior, with_it: Mapping[str, Sequence[str]]
+    prior: BspPrior,
+    skeleton: Skeleton,
+    own: BodySegmentParameters,
+    alone: BspPrior,
+    with_it: Mapping[str, Sequence[str]],
 ) -> BspPrior:
     """The prior of the estimated bodies, each with all that moves with it as one.
 

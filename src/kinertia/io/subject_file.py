@@ -104,7 +104,7 @@ class Model(Table):
     `markers` is a preset's name, an absolute path, or None: detect it.
     """
 
-    static: File | None = Field(default=None, description="static trial, .c3d or .trc")
+    static: File | None = Field(default=None, description="static trial, .c3d, .trc, .tsv or .csv")
     markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
     osim: File | None = Field(default=None, description="scaled OpenSim model, .osim, in place of a static trial")
     calibrate: bool = Field(default=False, description="OpenSim model only; true: markers and joint centres may move")
@@ -114,8 +114,10 @@ class TrialFiles(Table):
     """Files of one dynamic trial; `window_s` (start, end) overrides the measured window, s."""
 
     name: TrialName = Field(description="name in files and report; left out: the marker file's")
-    markers: File = Field(description="markers, .c3d or .trc")
-    forces: File | None = Field(default=None, description="plate forces, .mot or .sto; C3D has its own")
+    markers: File = Field(description="markers, .c3d, .trc, .tsv or .csv")
+    forces: File | None = Field(
+        default=None, description="plate forces, .mot or .sto; C3D, .tsv and .csv have their own"
+    )
     loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
 

@@ -61,9 +61,7 @@ class Observations:
         return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
 
 
-def observe(
-    skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidth: Bandwidth
-) -> Observations:
+def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidth: Bandwidth) -> Observations:
     """The observations of trials of one person, and the noise of their markers.
 
     Args:

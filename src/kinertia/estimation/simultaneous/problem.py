@@ -266,7 +266,7 @@ class MapProblem:
         return result
 
     def bends(self, here: Linearised) -> np.ndarray:
-        """(S,) what Gauss-Newton leaves out of the second derivatives by the logarithms, where the cost falls with them.
+        """(S,) what Gauss-Newton leaves out of second derivatives by the logarithms, where the cost falls with them.
 
         The data may ask for a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
         them what holds a Gauss-Newton step back: it would promise much and keep nothing, again and again. A cost F of

@@ -1,4 +1,4 @@
-"""Terms of the coordinates' ranges in a trial's normal equations: beyond its range a coordinate pays, within it nothing.
+"""Terms of the coordinates' ranges in a trial's normal equations: beyond its range a coordinate pays, within it not.
 
 Where markers hardly show a coordinate, the turn of a forearm above all, the estimate would send it through poses that
 no joint has, in long steps that do not end. What is paid is one-sided: the square of what is beyond, over a deviation,
@@ -72,4 +72,4 @@ def add_ranges(normal: NormalEquations, basis: MotionBasis, stretch: Stretch, bo
         np.add.at(normal.right, at + i, values[:, i, None] * terms.pull[paying])
         for j in range(i, values.shape[1]):
             square = (values[:, i] * values[:, j])[:, None] * terms.weight[paying]
-            np.add.at(normal.band, (at[:, None] + i, j - i, columns, columns), square)
+            np.add.at(normal.band[:, j - i], (at[:, None] + i, columns, columns), square)
