@@ -117,6 +117,6 @@ def test_the_same_key_in_two_tables_is_told_apart(tmp_path):
 def test_an_unknown_preset_lists_those_that_exist():
     with pytest.raises(
         FileError,
-        match=r"no such marker set.*cgm2, cleveland-clinic, opencap, opencap-mocap, plug-in-gait, rajagopal, rajagopal-",
+        match=r"no such marker set.*cgm2, cleveland-clinic, opencap, opencap-mocap, plug-in-gait, rajagopal, r",
     ):
         read_marker_set("helen-hayes")
