@@ -6,7 +6,7 @@ ground reactions (as a series of the same harmonics), so that the centre of pres
 speed is added to the forward translation. The standing person is the model of the same subject, adapted to the walk,
 in a standing pose.
 
-    python benchmarks/synthetic_walk_table.py ../shared/data
+    python benchmarks/synthetic_walk_table.py FOLDER_OF_MEASURED_TRIALS
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Fixtures shared by the tests."""
 
 import builtins
+import functools
 import importlib.util
 import os
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io.recording import read_recording
 from kinertia.report import extras
 from kinertia.settings import Settings, Subject
+from kinertia.trial.data import Recording
 from once import once
 from quick_two_level import given_back
 from walks import fit_arguments
@@ -137,6 +139,17 @@ def measured_file(request, measured_walk):
         return measured_walk / of_package if of_package != name else request.getfixturevalue("shared_data") / name
 
     return find
+
+
+@pytest.fixture(scope="session")
+def measured_recording(measured_file):
+    """Recordings by the names of the files that `read_recording` takes; each is read once."""
+
+    @functools.cache
+    def read(*names: str | None) -> Recording:
+        return read_recording(*(None if name is None else measured_file(name) for name in names))
+
+    return read
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
     python docs/tools/examples.py
 
-runs every command shown behind `$` (with the measured files of ../shared, where the page names them) and puts the
+runs every command shown behind `$` (with measured files, where the page names them) and puts the
 numbers of now into the pages. Words that have changed are told, and to be mended by hand. The tests of the pages use
 the same functions.
 """

@@ -15,9 +15,9 @@ from typing import Any
 import typer
 
 from kinertia.cli.app import application
-from kinertia.io.subject_file import InstrumentsFiles, Model, TrialFiles
+from kinertia.io.subject_file import InstrumentsFiles, Model, PriorFiles, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
-from kinertia.settings import Settings, Subject, Table
+from kinertia.settings import KnownSegment, Settings, Subject, Table
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))
@@ -105,6 +105,8 @@ _GENERATED = {
     "marker set": _marker_set,
     "settings": lambda: _table(Settings),
     "instruments": lambda: _table(InstrumentsFiles),
+    "prior": lambda: _table(PriorFiles),
+    "segment": lambda: _table(KnownSegment),
 }
 
 

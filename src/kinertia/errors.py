@@ -21,6 +21,16 @@ class KinertiaError(Exception):
         FileError
     """
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Back from another process as it was: errors are not made anew of their message alone."""
+        return _restored, (type(self), self.args, self.__dict__)
+
+
+def _restored(kind: type[KinertiaError], args: tuple[object, ...], data: dict[str, object]) -> KinertiaError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(data)
+    return error
+
 
 class FileError(KinertiaError):
     """A file is missing, unreadable, or not what its name says.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,6 +27,24 @@ def _force_cutoff(value: object) -> object:
     raise ValueError('must be "auto", "none" or a positive frequency in Hz')
 
 
+_STATED = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:\+-|\+/-|±)\s*([\d.]+(?:[eE][-+]?\d+)?)\s*")
+
+
+def _stated(value: object) -> tuple[float, float]:
+    """Value and deviation of "8.9 +- 0.4"."""
+    if isinstance(value, tuple):  # of a table that exists
+        return value
+    match = _STATED.fullmatch(value) if isinstance(value, str) else None
+    try:
+        numbers = tuple(float(part) for part in match.groups()) if match else ()
+    except ValueError:
+        numbers = ()
+    if len(numbers) == 2 and numbers[1] > 0.0:
+        return numbers
+    raise ValueError('must be a value with its standard deviation in quotes, like "8.9 +- 0.4"')
+
+
+Stated = Annotated[tuple[float, float], BeforeValidator(_stated)]
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
 ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_cutoff)]
 
@@ -109,3 +128,52 @@ class Instruments(Table):
     same_plates: bool = Field(
         default=False, description="true: columns of the same name are the same plate in all force files (.mot, .sto)"
     )
+
+
+class PriorSettings(Table):
+    """What the estimate starts from and leans on, besides the literature.
+
+    Examples:
+        >>> kinertia.settings.PriorSettings(masses_kept=True).sides_correlation is None
+        True
+    """
+
+    sides_correlation: float | None = Field(
+        default=None,
+        ge=0.0,
+        lt=1.0,
+        description="how alike left and right are: 0 not at all, 0.9 as the literature's prior has it",
+    )
+    masses_kept: bool = Field(default=False, description="true: segment masses stay as the prior has them")
+
+
+class KnownSegment(Table):
+    """What was measured of one segment: values with standard deviations, and where they are from.
+
+    Centres of mass count along the axes of the segment, moments of inertia about the centre of mass and the same axes:
+    as in `bsp.csv`.
+
+    Examples:
+        >>> kinertia.settings.KnownSegment(mass_kg="8.9 +- 0.4", source="DXA").parameters()
+        {'mass': (8.9, 0.4)}
+    """
+
+    mass_kg: Stated | None = Field(default=None, description='"value +- sd", kg')
+    com_x_mm: Stated | None = Field(default=None, description="centre of mass, forwards, mm")
+    com_y_mm: Stated | None = Field(default=None, description="centre of mass, upwards along the segment, mm")
+    com_z_mm: Stated | None = Field(default=None, description="centre of mass, to the person's right, mm")
+    ixx_kgm2: Stated | None = Field(default=None, description="moment of inertia about the x axis, kg m2")
+    iyy_kgm2: Stated | None = Field(default=None, description="about the y axis")
+    izz_kgm2: Stated | None = Field(default=None, description="about the z axis")
+    source: str | None = Field(default=None, description="how it was measured; shown in the notes of a fit")
+
+    def parameters(self) -> dict[str, tuple[float, float]]:
+        """Value and deviation by parameter (`PARAMETERS`), SI."""
+        found = {}
+        for key in type(self).model_fields:
+            stated = getattr(self, key)
+            if key != "source" and stated is not None:
+                parameter, unit = key.rsplit("_", 1)
+                factor = 1e-3 if unit == "mm" else 1.0
+                found[parameter] = (factor * stated[0], factor * stated[1])
+        return found

@@ -179,9 +179,9 @@ WALKS = {
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_measured_walks(measured_file, name):
+def test_measured_walks(measured_recording, name):
     forces, mass_kg, level, window = WALKS[name]
-    recording = read_recording(measured_file(name), None if forces is None else measured_file(forces))
+    recording = measured_recording(name, forces)
     own = Path(__file__).parents[1] / "subject4.toml"
     marker_set = read_marker_set(own) if "subject4" in name else common_marker_set([recording])
     found = check_recording(recording, marker_set, mass_kg)

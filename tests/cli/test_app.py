@@ -65,6 +65,7 @@ def test_installed_command():
     assert re.fullmatch(r"error: .*no\.toml: no such file; .*\n", done.stderr)
 
 
+@pytest.mark.slow
 def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
     fit = fit_of("gait2354")
     lines = fit.outcome.out.splitlines()
@@ -129,6 +130,7 @@ def person(tmp_path, measured_walk):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_evaluations")
 def test_init_then_fill_in_then_fit(person):
     """The drafted file says what is missing; with that filled in and a shorter window it runs as it is."""
@@ -252,6 +254,7 @@ def test_init_without_recordings(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_evaluations")
 def test_one_walk_as_two_trials(tmp_path, shared_data):
     walk, _, forces, _, loads, _, static, *_ = fit_arguments(shared_data, "gait2354")
@@ -273,9 +276,11 @@ def test_one_walk_as_two_trials(tmp_path, shared_data):
 @pytest.mark.parametrize(
     ("arguments", "stage"),
     [
-        (["fit", "walk.c3d", "--static", "static.c3d", "--sex", "male"], "calibration"),
+        pytest.param(
+            ["fit", "walk.c3d", "--static", "static.c3d", "--sex", "male"], "calibration", marks=pytest.mark.slow
+        ),
         pytest.param(["demo"], "inverse kinematics", marks=pytest.mark.slow),
-        (["study", "table1", "--repeats", "1"], "1 draws"),
+        pytest.param(["study", "table1", "--repeats", "1"], "1 draws", marks=pytest.mark.slow),
     ],
 )
 def test_interruption_leaves_nothing(tmp_path, person, arguments, stage):
@@ -297,7 +302,7 @@ def test_interruption_leaves_nothing(tmp_path, person, arguments, stage):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("name", ["SIGTERM", pytest.param("SIGHUP", marks=pytest.mark.slow)])
 def test_the_request_to_end_leaves_nothing(tmp_path, person, name):
     code = """
         import contextlib, os, signal, sys

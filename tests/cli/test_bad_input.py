@@ -361,6 +361,7 @@ def test_marker_of_three_missing_for_the_whole_trial(lab):
     expect(refused(lab), "trial 'walk'", "2 of the markers on the pelvis", "at least 3")
 
 
+@pytest.mark.slow
 def test_marker_missing_for_the_whole_trial(lab):
     """The others say where its segment is: a note."""
     hide(lab / "walk.trc", "R.Heel")
@@ -391,9 +392,9 @@ def test_trial_without_forces(lab):
     ("name", "parts"),
     [
         ("rotations_only.c3d", ("no points", "marker")),
-        ("plates_kistler_type3.c3d", ("no points", "marker")),
+        pytest.param("plates_kistler_type3.c3d", ("no points", "marker"), marks=pytest.mark.slow),
         ("plates_type1.c3d", ("marker",)),
-        ("bts.c3d", ("marker",)),
+        pytest.param("bts.c3d", ("marker",), marks=pytest.mark.slow),
         ("duplicate_labels.c3d", ("marker",)),
     ],
 )

@@ -188,6 +188,7 @@ def test_page_goes_only_where_it_may(lab):
     assert run("check", lab / "static.trc", "-o", lab / "foreign").status == 0  # its own is replaced
 
 
+@pytest.mark.slow
 def test_files_of_two_people_keep_their_masses(shared_data):
     """The walk of A carries no mass, the others do: with A's static alone it is A's, with B's files it is nobody's."""
     a, b = ([shared_data / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
@@ -224,17 +225,11 @@ def test_impossible_model_is_status_1(shared_data, tmp_path):
     assert "fail: physically impossible: tibia_l: triangle inequality iyy + izz > ixx violated" in text(outcome)
 
 
-MANY_BYTES = 1_200_000
-"""Files as large as this take longer than all others together."""
-
-
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["small ones", "all"])
-def test_every_measured_file_gets_an_answer(shared_data, every):
+@pytest.mark.slow
+def test_every_measured_file_gets_an_answer(shared_data):
     """No traceback on anything: each file is shown (0), warned of (1) or refused in one line (2)."""
     files = sorted(path for kind in ("trc", "c3d", "osim") for path in shared_data.rglob(f"*.{kind}"))
     assert len(files) > 20
-    if not every:
-        files = [path for path in files if path.stat().st_size < MANY_BYTES]
     seen = set()
     for path in files:
         outcome = run("check", path)
@@ -283,7 +278,8 @@ def test_model_of_other_markers_in_a_subject_file(lab, shared_data):
     assert "no markers in it" in outcome.err
 
 
-@pytest.mark.parametrize(("mass", "status"), [pytest.param("72.6", 0, marks=pytest.mark.slow), ("90", 1)])
+@pytest.mark.parametrize(("mass", "status"), [("72.6", 0), ("90", 1)])
+@pytest.mark.slow
 def test_nobody_reads_on(lab, mass, status):
     """As with `| head`: the page is there, and the status is the check's."""
     files = [str(lab / name) for name in ("walk.trc", "walk_grf.mot")]

@@ -1,5 +1,7 @@
 """Every command loads what it uses and no more: half of a fit's time went into modules that it did not need."""
 
+import pytest
+
 from command_line import loaded_after, loaded_by
 
 PICTURES = {"plotly", "matplotlib"}
@@ -15,6 +17,7 @@ def test_the_version_is_told_without_loading_the_commands():
     assert not loaded & {*SLOW, "numpy", "scipy", "pandas", "pydantic", "typer", "rich", "kinertia.cli.app"}
 
 
+@pytest.mark.slow
 def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(measured_walk, tmp_path):
     loaded = loaded_by("fit", measured_walk / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "report.html").is_file()
@@ -22,12 +25,14 @@ def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(measured_walk, t
     assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, "pandas", "kinertia.cli.check", "kinertia.cli.study"}
 
 
+@pytest.mark.slow
 def test_a_fit_of_text_files_does_not_load_the_reader_of_c3d(demo_run, tmp_path):
     loaded = loaded_by("fit", demo_run[1] / "lab" / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "bsp.csv").is_file()
     assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, *C3D, "pandas"}
 
 
+@pytest.mark.slow
 def test_a_check_loads_no_pictures_or_studies(measured_walk, tmp_path):
     loaded = loaded_by("check", measured_walk / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "check.html").is_file()

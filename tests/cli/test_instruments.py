@@ -42,6 +42,7 @@ def test_the_command_writes_what_it_shows(session):
     assert np.linalg.eigvalsh(np.array(person.information))[0] > -1e-6
 
 
+@pytest.mark.slow
 def test_a_fit_leaves_out_what_it_has_said_itself(session, measured_walk, tmp_path):
     path, _ = session
     own = prepare_subject(subject_with(tmp_path, measured_walk, f'session = "{path.as_posix()}"'))
@@ -113,6 +114,7 @@ loads = "{walk.as_posix()}_grf.xml"
         (["walk.c3d"], "expected a subject file"),
         (["subject.toml", "-o", "."], "a folder; give the name of a file"),
         (["subject.toml", "-o", "nowhere/x.toml"], "no such folder"),
+        (["subject.toml", "-o", "subject.toml"], "not a file that kinertia instruments wrote"),
     ],
 )
 def test_what_cannot_be_is_refused_first(arguments, told, measured_walk, monkeypatch):

@@ -49,7 +49,7 @@ def test_export_says_what_the_tables_say(fit, results):
     np.testing.assert_array_equal(plain["trials"][trial.name]["moments"]["knee_angle_r"], moments.knee_angle_r)
     mat = loadmat(folder / "tables.mat", simplify_cells=True)
     np.testing.assert_array_equal(mat["bsp"]["estimate"], fit.bsp.estimate)
-    assert list(mat["bsp"]["segment"]) == list(fit.bsp.segment)
+    assert [each.rstrip() for each in mat["bsp"]["segment"]] == list(fit.bsp.segment)
     assert mat["trials"]["name"] == trial.name
     angle = np.degrees(trial.coordinates.knee_angle_r)
     np.testing.assert_allclose(mat["trials"]["coordinates"]["knee_angle_r"], angle, rtol=1e-12)

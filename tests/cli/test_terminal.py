@@ -33,7 +33,7 @@ def _kinertia(encoding, *arguments):
     )
 
 
-@pytest.fixture(scope="module", params=["ascii", "cp1252"])
+@pytest.fixture(scope="module", params=[pytest.param("ascii", marks=pytest.mark.slow), "cp1252"])
 def encoding(request):
     return request.param
 

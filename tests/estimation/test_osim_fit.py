@@ -79,7 +79,7 @@ def test_changes_are_what_was_asked_for(fit_with_model, name, calibrate):
 
 
 def assert_targets(folder: Path) -> None:
-    """Issue 5: residual RMS at most 5 N and 3 N m, markers at most 12 mm, no silent departure of a parameter."""
+    """Residual RMS at most 5 N and 3 N m, markers at most 12 mm, no silent departure of a parameter."""
     told = json.loads((folder / "fit.json").read_text())
     assert told["converged"]
     for trial in told["trials"]:

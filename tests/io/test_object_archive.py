@@ -57,7 +57,7 @@ PLAIN = st.recursive(
         | st.dictionaries(st.text(max_size=3), inner, max_size=3)
         | st.builds(Pair, inner, inner)
     ),
-    max_leaves=8,
+    max_leaves=5,
 )
 
 

@@ -309,14 +309,17 @@ GENERATIONS = """
     folder, kills, rng = Path(sys.argv[1]), int(sys.argv[2]), random.Random(19)
     write(folder, 0)
     (folder / "mine.txt").write_text("mine")
-    last, replaced = 0, 0
+    started = time.perf_counter()
+    write(folder, 1)
+    one_write_s = time.perf_counter() - started
+    last, replaced = 1, 0
     for kill in range(kills):
         child = os.fork()
         if not child:
             for number in range(last + 1, last + 1000):
                 write(folder, number)
             os._exit(0)
-        time.sleep(0.05 * rng.random())
+        time.sleep(5 * one_write_s * rng.random())
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         found = read(folder)

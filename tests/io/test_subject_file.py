@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from kinertia.errors import FileError
 from kinertia.io.subject_draft import init_subject
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.io.toml_lines import TomlFile
 from kinertia.settings import Settings
 
@@ -151,6 +151,25 @@ def test_inline_tables_and_dotted_keys(folder):
 def test_byte_order_mark_and_windows_line_ends(folder):
     (folder / "subject.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
     assert read_subject(folder / "subject.toml").subject.sex == "female"
+
+
+@pytest.mark.parametrize("table", [field.alias or name for name, field in SubjectFile.model_fields.items()])
+def test_unknown_key_in_every_table(folder, table):
+    table = "segment.thigh_r" if table == "segment" else table
+    heading = f"[[{table}]]" if table == "trial" else f"[{table}]"
+    text = GOOD if heading in GOOD else f"{GOOD}\n{heading}\n"
+    text = text.replace(heading, f"{heading}\nzzz = 1", 1)
+    with pytest.raises(FileError, match=rf"unknown key 'zzz' in \[{table}\]; known: "):
+        read(folder, text)
+
+
+def test_a_segment_is_a_table_of_its_own(folder):
+    with pytest.raises(FileError, match=r"under a heading like \[segment.thigh_r\]"):
+        read(folder, f"{GOOD}\n[segment]\nthigh_r = 8.9\n")
+    with pytest.raises(FileError, match=r"mass_kg = 8.9: must be a value with its standard deviation in quotes"):
+        read(folder, f"{GOOD}\n[segment.thigh_r]\nmass_kg = 8.9\n")
+    known = read(folder, f'{GOOD}\n[segment.thigh_r]\nmass_kg = "8.9 ± 0.4"\nsource = "DXA"\n').segments
+    assert known["thigh_r"].parameters() == {"mass": (8.9, 0.4)}
 
 
 def test_result_is_frozen(folder):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.model.body_sides import sides_trouble
 from kinertia.trial.data import Markers
 
@@ -21,9 +20,9 @@ SOUND = [
 
 
 @pytest.fixture(params=SOUND)
-def recorded(request, measured_file):
+def recorded(request, measured_recording):
     """Markers of a sound recording, and their set."""
-    markers = read_recording(measured_file(request.param)).markers
+    markers = measured_recording(request.param).markers
     return markers, choose_marker_set(markers.labels)
 
 

@@ -3,7 +3,6 @@
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.model.same_body import body_trouble
 from kinertia.trial.data import Markers
 
@@ -16,9 +15,9 @@ PEOPLE = [
 
 
 @pytest.fixture(params=PEOPLE, ids=[static for static, _ in PEOPLE])
-def person(request, measured_file):
+def person(request, measured_recording):
     """Markers of somebody's static trial and walk, and their set."""
-    static, walk = (read_recording(measured_file(name)).markers for name in request.param)
+    static, walk = (measured_recording(name).markers for name in request.param)
     return static, walk, choose_marker_set(static.labels)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.plate_assignment import build_trial
@@ -20,10 +19,10 @@ WALKS = {
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_file):
+def walk(request, measured_recording):
     """A measured walk."""
     markers, forces = WALKS[request.param]
-    return read_recording(measured_file(markers), None if forces is None else measured_file(forces))
+    return measured_recording(markers, forces)
 
 
 def with_force(walk, change, torque=1.0):

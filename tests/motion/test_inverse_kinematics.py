@@ -246,11 +246,9 @@ def test_opensim_finds_the_same_coordinates(model):
 
 
 @pytest.mark.parametrize("person", ["a", "b"])
-def test_a_few_frames_are_solved_as_in_the_whole_trial(measured_file, person):
+def test_a_few_frames_are_solved_as_in_the_whole_trial(measured_recording, person):
     """Frames a second apart are no start for one another: a foot would end upside down."""
-    static, walk = (
-        read_recording(measured_file(f"pig_c3d/subject_{person}_{kind}.c3d")) for kind in ("static", "walk")
-    )
+    static, walk = (measured_recording(f"pig_c3d/subject_{person}_{kind}.c3d") for kind in ("static", "walk"))
     skeleton = build_gait27(static, choose_marker_set(static.markers.labels), 1.6, "female").skeleton
     every = round(walk.markers.rate_hz / 10)
     few = solve_ik(skeleton, sampled(walk.markers)).q

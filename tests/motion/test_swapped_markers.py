@@ -8,7 +8,6 @@ from generic_static import generic_model, smooth_motion
 from kinertia.errors import TrialError
 from kinertia.estimation.calibration import sampled
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.model.gait27 import ARM_ROTATIONS, build_gait27
 from kinertia.motion.swapped_markers import check_labels
 from kinertia.trial.data import Markers
@@ -46,17 +45,17 @@ SWAPS = {
 
 
 @pytest.fixture(scope="module")
-def walk(measured_file):
+def walk(measured_recording):
     known = {}
 
     def read(name):
         if name not in known:
             static_path, walk_path, height = WALKS[name]
-            static = read_recording(measured_file(static_path))
+            static = measured_recording(static_path)
             labels = static.markers.labels
             marker_set = read_marker_set(SUBJECT4) if name.startswith("subject4") else choose_marker_set(labels)
             skeleton = build_gait27(static, marker_set, height, "male").skeleton.free(ARM_ROTATIONS)
-            known[name] = skeleton, sampled(read_recording(measured_file(walk_path)).markers)
+            known[name] = skeleton, sampled(measured_recording(walk_path).markers)
         return known[name]
 
     return read

@@ -40,6 +40,7 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
     assert "No error bars: differences only." in render_comparison({"a": fit, "b": two_level})
 
 
+@pytest.mark.slow
 def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
     from kinertia.report.saved_fit import load_fit
 

@@ -81,6 +81,7 @@ def test_ground_reactions_are_shares_of_body_weight(fit, cycles):
         assert forward[:30].min() < -5 or forward[30:].max() > 5  # brakes first, then pushes
 
 
+@pytest.mark.slow
 def test_frames_that_were_not_measured_are_gaps(short_fit):
     """Windows of 0.3 s in strides of 1 s: the rest is empty, not zero and not invented."""
     cycles = short_fit.cycles()

@@ -46,6 +46,10 @@ CASES = {
     "rajagopal, own model calibrated": Case("rajagopal", True, residual=0.03, peak=0.025),
 }
 
+EVERY_CASE = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "demo")) for name in CASES]
+)
+
 
 @pytest.fixture(scope="module")
 def folder_of(request):
@@ -65,7 +69,7 @@ def rms(vectors) -> float:
     return float(np.sqrt(np.square(vectors).sum(axis=1).mean()))
 
 
-@pytest.mark.parametrize("name", CASES)
+@EVERY_CASE
 def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_path, name):
     case, folder = CASES[name], folder_of(CASES[name])
     told = json.loads((folder / "fit.json").read_text())["trials"][0]
@@ -106,7 +110,7 @@ def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tm
     assert compared >= 6
 
 
-@pytest.mark.parametrize("name", CASES)
+@EVERY_CASE
 def test_our_reader_takes_the_ground_reactions_as_they_are(folder_of, name):
     """Forces and their moments where there is load; each on the foot that it is named for."""
     folder = folder_of(CASES[name])
@@ -126,6 +130,7 @@ def test_our_reader_takes_the_ground_reactions_as_they_are(folder_of, name):
         np.testing.assert_allclose(loads.moment[loaded, plate], expected[loaded], atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("walk", ["demo", "gait2354"])
 def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_path, walk):
     """On the delivered forces plates and clock are at zero within their deviations, and residuals are no larger."""

@@ -281,6 +281,7 @@ def prolonged(trial, times):
     )
 
 
+@pytest.mark.slow
 def test_many_long_trials_stay_below_the_limit(fit):
     long = prolonged(fit.trials[0], 20)
     assert len(long.time) > 1500
@@ -304,6 +305,7 @@ def test_command_and_hashes_are_in_the_report(demo_run):
     assert "neither command nor files" in render(demo.fit)
 
 
+@pytest.mark.slow
 def test_the_command_in_a_report_repeats_the_fit(demo_run, tmp_path):
     lab, folder = demo_run[1] / "lab", tmp_path / "my results"
     given = ("fit", lab / "walk.trc", "--forces", lab / "walk_grf.mot", "--static", lab / "static.trc")

@@ -47,6 +47,7 @@ def test_page_of_measured_trials(fit_of):
             assert warning in page
 
 
+@pytest.mark.slow
 def test_page_of_speed(shared_data, tmp_path, monkeypatch):
     stages = pytest.importorskip("stages")
     monkeypatch.setattr(stages, "WINDOW_S", {"gait2354": (0.0, 0.6)})

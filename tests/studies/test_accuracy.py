@@ -67,6 +67,7 @@ def test_what_an_estimate_at_the_bound_can_attain():
     assert max(nothing.values()) < 0.6
 
 
+@pytest.mark.slow
 def test_draws_do_not_depend_on_the_number_of_processes():
     """None of its own, and two."""
     short = replace(PROOF["artefact"], walk_s=0.5)
@@ -81,24 +82,6 @@ def test_people_are_the_same_in_every_scenario():
     assert not np.allclose(draws[0].errors, draws[1].errors)
 
 
-@in_one_process()
-def test_bars_hold_short_form():
-    """Eight people: coverage cannot be told better than to some percent."""
-    found = run_accuracy({"artefact": replace(PROOF["artefact"], walk_s=SHORT_S)}, 8)["artefact"]
-    assert found.converged == 1.0
-    for name in CLASSES:
-        accuracy = found.classes[name]
-        assert accuracy.coverage > 0.90
-        assert 0.75 < accuracy.ratio < 1.25
-        assert accuracy.rms < 1.3 * accuracy.bound
-    assert found.classes["mass"].rms < found.classes["mass"].rms_literature
-    assert found.classes["CoM"].rms < found.classes["CoM"].rms_literature
-    for joint in JOINTS:
-        assert found.joints[joint].coverage > 0.92
-        if joint.startswith(("hip", "lumbar")):
-            assert found.joints[joint].moment_nm < 0.9 * found.joints[joint].usual_nm
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [key for key in PROOF if key != "faulty_walks"])
 def test_bars_hold(key):
@@ -106,7 +89,7 @@ def test_bars_hold(key):
 
     Where skin is of a kind that the estimate does not know, a joint's moments are covered a hair less.
     """
-    found = run_accuracy({key: PROOF[key]}, 24 if PROOF[key].others else 40)[key]
+    found = run_accuracy({key: PROOF[key]}, 12 if PROOF[key].others else 24)[key]
     for name in CLASSES:
         assert 0.92 < found.classes[name].coverage < 0.98
         assert 0.85 < found.classes[name].ratio < 1.15

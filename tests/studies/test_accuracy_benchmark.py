@@ -25,6 +25,7 @@ def test_errors_of_the_truth_are_zero():
     assert errors(trial.bsp, trial.bsp) == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_page(monkeypatch):
     monkeypatch.setattr("study_noise.study_walk", lambda: study_walk(0.5))
     draw = study_draw(0, two_level=False)

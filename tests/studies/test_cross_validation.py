@@ -33,6 +33,7 @@ def recordings(person):
     ]
 
 
+@pytest.mark.slow
 def test_own_parameters_explain_another_walk_better_than_the_literature_s(recordings):
     inputs = [TrialInput(replace(lab.walk, name=name)) for lab, name in zip(recordings, ("one", "two"), strict=True)]
     found = cross_validate(prepare(SUBJECT, recordings[0].static, inputs, Settings()))
@@ -57,6 +58,7 @@ def test_one_trial_cannot_be_held_out(recordings):
         cross_validate(prepare(SUBJECT, recordings[0].static, [TrialInput(recordings[0].walk)], Settings()))
 
 
+@pytest.mark.slow
 def test_command(person, tmp_path):
     lab = record(person, walk(person, WALK_S, RATE_HZ, 0.75), PERFECT, np.random.default_rng(0))
     subject = write_lab(tmp_path / "lab", lab)

@@ -46,6 +46,7 @@ def few_conditions(monkeypatch):
     monkeypatch.setattr(sensitivity_study, "CONDITIONS", kept)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_conditions")
 @in_one_process()
 def test_noise_makes_errors_larger():

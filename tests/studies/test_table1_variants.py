@@ -222,6 +222,7 @@ def test_trust_region_finds_the_truth_without_noise(exact, vector, trial):
     np.testing.assert_allclose(path[-1], vector.values(trial.bsp), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_options_of_the_optimiser(exact):
     path, costs = trust_region(*exact, True, most_iterations=3)
     assert path.shape == (4, 49)

@@ -11,7 +11,6 @@ from kinertia.checks.marker_set_match import markers_of_model
 from kinertia.checks.recording import check_recording
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
-from kinertia.io.recording import read_recording
 from kinertia.model.marker_set import MarkerSet
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, PlateLoads, Recording
@@ -172,10 +171,10 @@ MEASURED = {
 
 
 @pytest.mark.parametrize("name", MEASURED)
-def test_measured_trials(measured_file, name):
+def test_measured_trials(measured_file, measured_recording, name):
     """Of the measured walks only two hold a whole stride."""
     forces, level = MEASURED[name]
-    recording = read_recording(measured_file(name), None if forces is None else measured_file(forces))
+    recording = measured_recording(name, forces)
     own = None
     if "subject4" in name:
         own = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))

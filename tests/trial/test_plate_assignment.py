@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.io.recording import read_recording
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, runs
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
@@ -260,10 +259,10 @@ REAL = {
 
 
 @pytest.fixture(scope="module")
-def real(measured_file):
+def real(measured_recording):
     def read(name):
         files, feet, window = REAL[name]
-        return read_recording(*(measured_file(file) for file in files)), feet, window
+        return measured_recording(*files), feet, window
 
     return read
 

@@ -13,8 +13,9 @@ from kinertia.errors import FileError, SessionError
 from kinertia.estimation.from_files import check_plates, fit_subject
 from kinertia.estimation.session import SessionInstruments, person_instruments, session_instruments
 from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
-from kinertia.io.session_file import session_text
+from kinertia.io.session_file import read_session, session_text
 from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
 
 
@@ -46,7 +47,7 @@ def instruments(
             fit = fit_subject(each, progress)
         people.append(person_instruments(fit, recordings(each)))
     found = session_instruments(people, wanted[0].instruments)
-    output.write_text(session_text(VERSION, found.found, found.people), encoding="utf-8")
+    write_then_rename(output, session_text(VERSION, found.found, found.people))
     _report(found)
     out.print(f"written to {output}; name it in the subject files: session = ... under [instruments]", soft_wrap=True)
 
@@ -66,6 +67,11 @@ def _check_output(output: Path) -> None:
         raise FileError(output, "a folder; give the name of a file")
     if not output.absolute().parent.is_dir():
         raise FileError(output, f"no such folder: {output.absolute().parent}")
+    if output.exists():
+        try:
+            read_session(output)
+        except FileError:
+            raise FileError(output, "not a file that kinertia instruments wrote; give another name with -o") from None
 
 
 def _report(found: SessionInstruments) -> None:

@@ -8,14 +8,16 @@ from pathlib import Path
 
 from kinertia.errors import SessionError, SettingsError
 from kinertia.estimation.estimate import estimate
+from kinertia.estimation.known_body import with_known_body
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.result import Fit
 from kinertia.estimation.session import with_instruments
+from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.provenance import recordings
 from kinertia.io.recording import read_recording
 from kinertia.io.session_file import read_session
-from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
+from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 
@@ -48,7 +50,7 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     session = () if known.session is None else read_session(known.session)
     if session:
         check_plates(wanted)
-    ready = _prepared(wanted, progress)
+    ready = _with_known_body(_prepared(wanted, progress), wanted)
     if known == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
@@ -56,6 +58,15 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
             ready, notes=(*ready.notes, "[instruments] is not used: two-level takes plates and clock as exact")
         )
     return with_instruments(ready, known, session, recordings(wanted))
+
+
+def _with_known_body(ready: Prepared, wanted: SubjectFile) -> Prepared:
+    if wanted.prior == PriorFiles() and not wanted.segments:
+        return ready
+    if wanted.settings.method == "two-level":
+        return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
+    earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
+    return with_known_body(ready, wanted.prior, earlier, wanted.segments)
 
 
 def check_plates(wanted: SubjectFile) -> None:

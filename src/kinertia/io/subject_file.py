@@ -23,6 +23,13 @@
     plate_sd_mm = 2.0              # from a spot check of the centre of pressure
     session = "instruments.toml"   # what `kinertia instruments` wrote
 
+    [segment.thigh_r]              # what was measured of a segment; as many as there are
+    mass_kg = "8.9 +- 0.4"
+    source = "DXA"
+
+    [prior]
+    bsp = "spring/bsp.csv"         # an earlier estimate in place of the literature's
+
 `read_subject` checks it whole and names the line of what is wrong; `kinertia.io.subject_draft` drafts one.
 """
 
@@ -49,7 +56,7 @@ from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, pat
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Instruments, Settings, Subject, Table, folder_of
+from kinertia.settings import Instruments, KnownSegment, PriorSettings, Settings, Subject, Table, folder_of
 
 
 def _file(value: object, info: ValidationInfo) -> Path:
@@ -137,6 +144,14 @@ class InstrumentsFiles(Instruments):
     session: File | None = Field(default=None, description="what kinertia instruments wrote of the same session")
 
 
+class PriorFiles(PriorSettings):
+    """What the estimate starts from, and the file of an earlier one."""
+
+    bsp: File | None = Field(
+        default=None, description="bsp.csv of an earlier fit: its estimates and sd in place of the literature's"
+    )
+
+
 class SubjectFile(Table):
     """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist.
 
@@ -151,6 +166,8 @@ class SubjectFile(Table):
     trials: tuple[TrialFiles, ...] = Field(alias="trial", strict=False, min_length=1)
     settings: Settings = Settings()
     instruments: InstrumentsFiles = InstrumentsFiles()
+    prior: PriorFiles = PriorFiles()
+    segments: dict[str, KnownSegment] = Field(default={}, alias="segment")
 
 
 def subject_file_in(folder: Path) -> Path:
@@ -271,18 +288,29 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
     return changed
 
 
-_TABLES: dict[str, type[Table]] = dict(subject=Subject, model=Model, trial=TrialFiles, settings=Settings)
+_TABLES: dict[str, type[Table]] = dict(
+    subject=Subject,
+    model=Model,
+    trial=TrialFiles,
+    settings=Settings,
+    instruments=InstrumentsFiles,
+    prior=PriorFiles,
+    segment=KnownSegment,
+)
 
 
 def _sentence(detail: Any) -> str:
     """One sentence for the user from one of pydantic's errors."""
     *holder, key = detail["loc"]
     table, kind = str(holder[0] if holder else key), detail["type"]
+    inside = ".".join(part for part in holder if isinstance(part, str))
     if kind == "extra_forbidden":
         known = list(_TABLES[table].model_fields) if holder else list(_TABLES)
         near = difflib.get_close_matches(str(key), known, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-        return f"unknown key '{key}'{f' in [{table}]' if holder else ''}; {hint}"
+        return f"unknown key '{key}'{f' in [{inside}]' if holder else ''}; {hint}"
+    if table == "segment" and len(detail["loc"]) < 3:
+        return "every segment is a table of its own under a heading like [segment.thigh_r]"
     if table == "trial" and (not holder or isinstance(key, int)) and kind != "missing":
         return "every trial is a table of its own under the heading [[trial]], in double brackets"
     if not holder:

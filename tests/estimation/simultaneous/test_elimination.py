@@ -98,6 +98,7 @@ def test_deviations_of_moments_are_those_of_the_whole(whole, cut, here):
     close(sd[1], sd[0])
 
 
+@pytest.mark.slow
 def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
     """Two trials, whose stretches are as short as can be."""
     given = (whole.skeleton, whole.prior, whole.calibration, [whole.trials[0], small_problem().trials[0]], 0.05)

@@ -82,6 +82,7 @@ def test_loads_and_motion_cover_the_window(trial, plain):
     np.testing.assert_allclose(loads.sum(axis=1)[10:-10], window[10:-10], atol=25.0)
 
 
+@pytest.mark.slow
 def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
     wrong = {"knee_tilt_1_r": 0.12, "knee_tilt_2_r": 0.08}
     off = replace(trial, skeleton=trial.skeleton.lock(wrong))
@@ -138,6 +139,7 @@ def test_a_wandering_marker_is_named(trial):
     )
 
 
+@pytest.mark.slow
 def test_a_marker_attached_anew_between_trials_is_named(trial):
     at = trial.markers.labels.index("R.Thigh.Front")
     turned = trial.skeleton.pose(trial.motion.q).rotation[:, trial.skeleton.marker_segments[at]]
@@ -155,6 +157,7 @@ def test_a_marker_attached_anew_between_trials_is_named(trial):
     assert places[1] - places[0] == pytest.approx(-0.05, abs=0.01)
 
 
+@pytest.mark.slow
 def test_markers_that_stay_do_so_in_every_trial(trial):
     """Else a second trial would make a model with wrong marker places look right."""
     rng = np.random.default_rng(0)
@@ -209,6 +212,7 @@ def measured(shared_data) -> Fit:
     return estimate_bsp(Subject(name="B", sex="female"), static, [TrialInput(walked)], Settings(method="simultaneous"))
 
 
+@pytest.mark.slow
 def test_measured_walk_meets_residuals_and_markers(measured):
     (trial,) = measured.trials
     residual = np.sqrt(np.square(trial.residuals["estimate"]).reshape(-1, 2, 3).sum(axis=2).mean(axis=0))
@@ -237,6 +241,7 @@ def test_files_of_a_simultaneous_fit(measured, tmp_path):
     assert isinstance(noise["wandering"], list)
 
 
+@pytest.mark.slow
 def test_others_of_the_session_tell_what_a_plate_reads_and_the_clock(trial):
     """Three people on a plate that reads 5 % too little, forces a frame late: two of them help the third."""
 

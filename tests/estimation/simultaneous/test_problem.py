@@ -67,6 +67,7 @@ def test_cost_is_half_the_sum_of_squares(any_problem):
     assert cost(problem, coefficients, static) == pytest.approx(expected + problem.prior_terms(static)[2])
 
 
+@pytest.mark.parametrize("any_problem", [pytest.param("27 DOF", marks=pytest.mark.slow), "curved axes"], indirect=True)
 def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
     problem = any_problem
     (coefficients,), static = point(problem)

@@ -52,7 +52,7 @@ def old_text(text: bytes, changes) -> bytes:
     return text
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [MODELS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in MODELS[1:])])
 def test_only_mass_properties_change(opensim, shared_data, tmp_path, name):
     ours = read_osim(shared_data / name)
     wanted = other_bsp(ours.bsp)

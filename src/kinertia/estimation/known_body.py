@@ -1,0 +1,112 @@
+"""What is known of this person's body besides the tables: measured segments, and the estimate of an earlier session.
+
+An earlier estimate takes the place of the literature's values and deviations; correlations stay the literature's, for
+a table of deviations has none. Measured parameters are then added as what they are, measurements with errors of their
+own: the mean moves towards them by how well each is known, and what goes with them (the other side, the trunk that a
+thigh is cut from) moves along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.errors import PriorError
+from kinertia.estimation.prepare import Prepared
+from kinertia.estimation.prior import BspPrior, with_symmetry
+from kinertia.io.bsp_file import BspTable
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.settings import KnownSegment, PriorSettings
+
+_UNLIKE_SD = 3.0
+"""Deviations from the tables beyond which the user is asked to look again."""
+_KEPT_SHARE = 1e-3
+"""Deviation of a mass that is kept, over its prior's."""
+
+
+def with_known_body(
+    ready: Prepared, settings: PriorSettings, earlier: BspTable | None, segments: Mapping[str, KnownSegment]
+) -> Prepared:
+    """A prepared person of whom more is known than mass, height and sex.
+
+    Args:
+        ready: with the literature's prior.
+        settings: of the prior.
+        earlier: an estimate with deviations, in place of the literature's.
+        segments: measured parameters by segment.
+
+    Raises:
+        PriorError: a segment that the model has not, or an earlier estimate of another model.
+    """
+    prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
+    if earlier is not None:
+        prior = _from_earlier(prior, earlier)
+        notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")
+    if settings.sides_correlation is not None:
+        covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
+        prior = replace(prior, covariance=covariance)
+    measured = _measured(prior, segments)
+    for (row, column), (value, sd) in measured.items():
+        k = 10 * row + column
+        name = f"{prior.mean.segments[row]} {PARAMETERS[column]}"
+        expected, own = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
+        away = (value - expected) / np.hypot(own, sd)
+        source = segments[prior.mean.segments[row]].source or "no source given"
+        notes.append(f"known: {name} {value:.4g} +- {sd:.2g} ({source}); the prior says {expected:.4g} +- {own:.2g}")
+        if abs(away) > _UNLIKE_SD:
+            warnings.append(
+                f"{name}, given as {value:.4g} +- {sd:.2g}, is {abs(away):.1f} deviations from what the prior expects, "
+                f"{expected:.4g} +- {own:.2g}; is its unit right, and the segment cut at the joint?"
+            )
+    if settings.masses_kept:
+        masses = zip(prior.mean.mass_kg.tolist(), prior.sd[:, 0].tolist(), strict=True)
+        kept = {(k, 0): (mass, _KEPT_SHARE * own) for k, (mass, own) in enumerate(masses)}
+        measured = {**kept, **measured}
+        notes.append("prior: the masses are kept")
+    return replace(ready, prior=_given(prior, measured), notes=tuple(notes), warnings=tuple(warnings))
+
+
+def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
+    """The prior with the mean and the deviations of an earlier estimate."""
+    names = prior.mean.segments
+    if missing := [name for name in names if name not in earlier.segments]:
+        raise PriorError(
+            f"{earlier.name} has no {', '.join(missing)}; it has {', '.join(earlier.segments)}: was it estimated with "
+            "another model?"
+        )
+    rows = [earlier.segments.index(name) for name in names]
+    sd = earlier.sd[rows].ravel()
+    own = prior.sd.ravel()
+    return replace(
+        prior,
+        mean=BodySegmentParameters.from_table(names, earlier.estimate[rows]),
+        covariance=prior.covariance / np.outer(own, own) * np.outer(sd, sd),
+    )
+
+
+def _measured(prior: BspPrior, segments: Mapping[str, KnownSegment]) -> dict[tuple[int, int], tuple[float, float]]:
+    """Value and deviation, SI, by row and column of the table."""
+    result = {}
+    for name, known in segments.items():
+        if name not in prior.mean.segments:
+            raise PriorError(
+                f"[segment.{name}]: the model has no such segment; it has {', '.join(prior.mean.segments)}"
+            )
+        for parameter, (value, sd) in known.parameters().items():
+            result[prior.mean.segments.index(name), PARAMETERS.index(parameter)] = value, sd
+    return result
+
+
+def _given(prior: BspPrior, measured: Mapping[tuple[int, int], tuple[float, float]]) -> BspPrior:
+    """The prior once these parameters were measured."""
+    if not measured:
+        return prior
+    at = np.array([10 * row + column for row, column in measured])
+    values, sd = np.array(list(measured.values())).T
+    table, covariance = prior.mean.table().ravel(), prior.covariance
+    gain = np.linalg.solve(covariance[np.ix_(at, at)] + np.diag(np.square(sd)), covariance[at]).T
+    left = covariance - gain @ covariance[at]
+    mean = BodySegmentParameters.from_table(prior.mean.segments, table + gain @ (values - table[at]))
+    return replace(prior, mean=mean, covariance=0.5 * (left + left.T))

@@ -1,0 +1,94 @@
+"""What a laboratory knows of a body moves the prior as a measurement does, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.errors import PriorError
+from kinertia.estimation.known_body import with_known_body
+from kinertia.estimation.prepare import Prepared
+from kinertia.estimation.prior import literature_prior
+from kinertia.io.bsp_file import BspTable
+from kinertia.model.bsp import PARAMETERS
+from kinertia.settings import KnownSegment, PriorSettings
+from kinertia.synthetic.walk import walking_subject
+
+
+@pytest.fixture
+def ready():
+    """As much of a prepared person as is looked at."""
+    literature = walking_subject().literature
+    prior = literature_prior(literature)
+    return Prepared(None, None, literature, prior, None, None, (), (), (), ())
+
+
+def informed(ready, settings=None, earlier=None, **segments):
+    return with_known_body(ready, settings or PriorSettings(), earlier, segments)
+
+
+def test_a_measured_mass_weighs_by_how_well_it_is_known(ready):
+    before = ready.prior
+    row = before.mean.segments.index("thigh_r")
+    expected, own = before.mean.mass_kg[row], before.sd[row, 0]
+    found = informed(ready, thigh_r=KnownSegment(mass_kg=f"{expected + own} +- {own}", source="DXA"))
+    assert found.prior.mean.mass_kg[row] == pytest.approx(expected + own / 2)
+    assert found.prior.sd[row, 0] == pytest.approx(own / np.sqrt(2.0))
+    assert "DXA" in found.notes[0]
+    assert not found.warnings
+    left = before.mean.segments.index("thigh_l")
+    moved = found.prior.mean.mass_kg[left] - before.mean.mass_kg[left]
+    assert moved == pytest.approx(0.9 * own / 2)
+
+
+def test_several_measurements_are_those_of_the_information_form(ready):
+    """Inverse covariances add up."""
+    known = KnownSegment(mass_kg="9 +- 0.3", com_y_mm="-180 +- 5", ixx_kgm2="0.15 +- 0.02")
+    found = informed(ready, thigh_r=known, torso=KnownSegment(mass_kg="30 +- 1"))
+    before, segments = ready.prior, ready.prior.mean.segments
+    at = [10 * segments.index("thigh_r") + PARAMETERS.index(name) for name in ("mass", "com_y", "ixx")]
+    at.append(10 * segments.index("torso"))
+    information, right = (
+        np.linalg.inv(before.covariance),
+        np.linalg.solve(before.covariance, before.mean.table().ravel()),
+    )
+    for k, value, sd in zip(at, (9.0, -0.18, 0.15, 30.0), (0.3, 0.005, 0.02, 1.0), strict=True):
+        information[k, k] += 1.0 / sd**2
+        right[k] += value / sd**2
+    covariance = np.linalg.inv(information)
+    np.testing.assert_allclose(found.prior.covariance, covariance, atol=1e-9 * np.abs(covariance).max())
+    np.testing.assert_allclose(found.prior.mean.table().ravel(), covariance @ right, atol=1e-9)
+
+
+def test_a_value_far_from_the_tables_is_warned_about(ready):
+    """Grams for kilograms."""
+    found = informed(ready, foot_r=KnownSegment(mass_kg="900 +- 10"))
+    assert "is its unit right" in found.warnings[0]
+
+
+def test_an_earlier_estimate_takes_the_place_of_the_literature(ready):
+    prior = ready.prior
+    order = tuple(reversed(prior.mean.segments))
+    rows = [prior.mean.segments.index(name) for name in order]
+    earlier = BspTable("bsp.csv", order, 1.1 * prior.mean.table()[rows], 0.5 * prior.sd[rows])
+    found = informed(ready, earlier=earlier)
+    np.testing.assert_allclose(found.prior.mean.table(), 1.1 * prior.mean.table())
+    np.testing.assert_allclose(found.prior.covariance, 0.25 * prior.covariance)
+    other = replace(earlier, segments=("femur_r", *order[1:]))
+    with pytest.raises(PriorError, match=f"has no {order[0]}.*femur_r.*another model"):
+        informed(ready, earlier=other)
+
+
+def test_sides_and_masses(ready):
+    alone = informed(ready, PriorSettings(sides_correlation=0.0))
+    right, left = (10 * ready.prior.mean.segments.index(f"shank_{side}") for side in "rl")
+    assert not alone.prior.covariance[right : right + 10, left : left + 10].any()
+    np.testing.assert_allclose(alone.prior.sd, ready.prior.sd)
+    kept = informed(ready, PriorSettings(masses_kept=True))
+    np.testing.assert_allclose(kept.prior.mean.mass_kg, ready.prior.mean.mass_kg)
+    assert (kept.prior.sd[:, 0] < 2e-3 * ready.prior.sd[:, 0]).all()
+
+
+def test_an_unknown_segment_is_told_with_those_that_there_are(ready):
+    with pytest.raises(PriorError, match=r"\[segment.femur_r\].*no such segment; it has pelvis, "):
+        informed(ready, femur_r=KnownSegment(mass_kg="9 +- 1"))

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from kinertia.errors import FileError
+from kinertia.io.bsp_file import read_bsp
+from kinertia.model.bsp import PARAMETERS, UNITS
+
+VALUES = [(name, unit, 0.1 * k, 0.01 * (k + 1)) for k, (name, unit) in enumerate(zip(PARAMETERS, UNITS, strict=True))]
+ROWS = [f"{side},{name},{unit},9,{value},{sd}\n" for side in ("thigh_r", "thigh_l") for name, unit, value, sd in VALUES]
+GOOD = "".join(["segment,parameter,unit,literature,estimate,sd\n", *ROWS])
+
+
+def test_estimates_and_deviations(tmp_path):
+    path = tmp_path / "bsp.csv"
+    path.write_text(GOOD)
+    found = read_bsp(path)
+    assert found.segments == ("thigh_r", "thigh_l")
+    np.testing.assert_allclose(found.estimate, [[0.1 * k for k in range(10)]] * 2)
+    np.testing.assert_allclose(found.sd[1], [0.01 * (k + 1) for k in range(10)])
+
+
+def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
+    path = tmp_path / "bsp.csv"
+    path.write_text("\ufeff" + GOOD.replace(",", ";").replace(".", ","), encoding="utf-8")
+    np.testing.assert_allclose(read_bsp(path).estimate[0], [0.1 * k for k in range(10)])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (",sd\n", ",other\n", r"line 1: has no column sd; expected the bsp.csv of a simultaneous fit"),
+        ("thigh_r,mass", "thigh_r,weight", r"line 2: unknown parameter 'weight'; expected one of mass, com_x"),
+        ("thigh_r,mass,kg", "thigh_r,mass,lb", r"line 2: thigh_r mass is in 'lb'; expected kg"),
+        ("thigh_l,mass,kg,9,0.0,", "thigh_l,mass,kg,9,,", r"line 12: estimate = '' is no number"),
+        ("kg,9,0.0,0.01", "kg,9,0.0,0", r"line 2: the sd of thigh_r mass must be positive"),
+        ("thigh_r,com_x", "thigh_r,mass", "is in 'm'; expected kg"),
+        ("thigh_l,com_x,m,9,0.1,0.02\n", "", "thigh_l lacks com_x"),
+        (GOOD[GOOD.index("\n") + 1 :], "", "holds no rows"),
+    ],
+)
+def test_what_cannot_be_is_told_with_its_line(tmp_path, old, new, told):
+    path = tmp_path / "bsp.csv"
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new))
+    with pytest.raises(FileError, match=told):
+        read_bsp(path)
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(FileError, match="No such file"):
+        read_bsp(tmp_path / "bsp.csv")

@@ -1,0 +1,45 @@
+"""Errors come back from other processes with their message and their data."""
+
+import pickle
+
+import pytest
+
+from kinertia.errors import (
+    FileError,
+    KinertiaError,
+    MarkerSetError,
+    OsimError,
+    PriorError,
+    SessionError,
+    SettingsError,
+    SubjectError,
+    TrialError,
+)
+
+ERRORS = [
+    KinertiaError("in words"),
+    FileError("walk.trc", "is empty", 3),
+    MarkerSetError("no set fits", ["RASI"], {"RASI": ["R.ASIS"]}),
+    TrialError("walk", "has no forces"),
+    SubjectError("mass_kg", -3.0, "is negative"),
+    PriorError("cannot be", "thigh_r.mass"),
+    SettingsError("cutoff"),
+    SessionError("plates"),
+    OsimError("model.osim", "has no bodies"),
+]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_errors_come_back_from_other_processes(error):
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is type(error)
+    assert str(back) == str(error)
+    assert vars(back) == vars(error)
+
+
+def test_every_kind_is_tried():
+    def kinds(above):
+        return {above, *(kind for below in above.__subclasses__() for kind in kinds(below))}
+
+    of_package = {kind for kind in kinds(KinertiaError) if kind.__module__ == "kinertia.errors"}
+    assert {type(error) for error in ERRORS} == of_package
