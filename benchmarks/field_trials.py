@@ -123,7 +123,8 @@ def run(arguments: list[str], folder: Path) -> dict[str, Any]:
         except SystemExit as ended:
             status = int(ended.code or 0)
     found = {"command": arguments[0], "status": status, "seconds": time.perf_counter() - started}
-    found["said"] = said.getvalue().strip()
+    # a path may be another one tomorrow
+    found["said"] = re.sub(r"(?<![\w.])/[^ :]*/", "", said.getvalue().strip())
     if (folder / "fit.json").exists():
         found |= {"fit": json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
     return found

@@ -99,7 +99,7 @@ def test_of_bodies_that_move_as_one_the_heaviest_is_estimated(rajagopal):
 def test_prior_deviations_go_by_the_names_of_bodies(rajagopal):
     prior, _ = parted(rajagopal.skeleton, rajagopal.bsp)
     share = dict(zip(prior.mean.segments, prior.sd[:, 0] / prior.mean.mass_kg, strict=True))
-    for body, kind in (("tibia_l", "shank"), ("humerus_r", "upper_arm"), ("ulna_r", "forearm"), ("torso", "torso")):
+    for body, kind in (("femur_l", "thigh"), ("calcn_r", "foot"), ("ulna_r", "forearm"), ("torso", "torso")):
         assert kind_of(body) == kind
         assert share[body] == pytest.approx(MASS_SD[kind])
     renamed = tuple(name.replace("torso", "backpack") for name in rajagopal.bsp.segments)

@@ -15,7 +15,6 @@ import numpy as np
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.force_mass import check_force_masses
-from kinertia.estimation.held_bodies import widened
 from kinertia.estimation.input_checks import check_force_directions, check_recordings, complete_subject, known
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
@@ -205,8 +204,7 @@ def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentPara
 def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
     """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others.
 
-    Of every group of bodies that move as one the heaviest is estimated, for all of them; none of a group that is light
-    altogether.
+    Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
     """
     mass = dict(zip(own.segments, own.mass_kg, strict=True))
     groups: dict[int, list[str]] = {}
@@ -216,9 +214,7 @@ def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, Bo
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
     chosen = {max(names, key=mass.__getitem__) for names in heavy}
     estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
-    prior, alone = (literature_prior(some, [kind_of(name) for name in some.segments]) for some in (estimated, own))
-    groups_of = {name: [other for other in names if other not in chosen] for names in heavy for name in names}
-    prior = widened(prior, skeleton, own, alone, groups_of)
+    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
     prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
     return prior, rest if rest.segments else None
 
