@@ -12,13 +12,18 @@ from walk_on_plates import walk
 
 LAB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Laboratory axes, z up, to ground axes."""
+AXES = np.array([np.eye(3), [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]])
+"""Rows: axes of both plates in the laboratory's; those of the second are turned, z down."""
 CORNERS_M = np.array(
     [
-        [[x + 0.4, z + 0.25, 0.0], [x - 0.4, z + 0.25, 0.0], [x - 0.4, z - 0.25, 0.0], [x + 0.4, z - 0.25, 0.0]]
-        for x, z in ((0.0, -0.1), (0.6, 0.1))
+        [
+            [x, z, 0.0] + 0.4 * (along * axes[0] + across * axes[1])
+            for along, across in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+        ]
+        for (x, z), axes in zip(((0.0, -0.1), (0.6, 0.1)), AXES, strict=True)
     ]
 )
-"""Of both plates in the laboratory's axes, in QTM's order. Their z axes point up."""
+"""Of both plates in the laboratory's axes, in QTM's order."""
 _NAMES = ("POSX_POSY", "NEGX_POSY", "NEGX_NEGY", "POSX_NEGY")
 
 
@@ -86,7 +91,7 @@ def _write_plate(path: Path, recording: Recording, p: int, corners: FloatArray, 
     middle = corners.mean(axis=0)
     moment = free + np.cross(point - middle, force)
     if local:
-        point = point - middle
+        force, moment, point = (part @ AXES[p].T for part in (force, moment, point - middle))
     axes = "local (force plate)" if local else "world (lab)"
     rate = (len(force) - 1) / np.ptp(recording.plates.time)
     lines = [

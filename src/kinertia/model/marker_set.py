@@ -95,7 +95,8 @@ def mismatch(marker_set: MarkerSet, labels: Sequence[str], what: str) -> MarkerS
     listed = ", ".join(label + _hint(nearest[label]) for label in missing)
     return MarkerSetError(
         f"{what} '{marker_set.name}', which lacks {len(missing)} of {len(marker_set.labels)} labels: {listed}; "
-        f"write a marker set of your own as TOML and name it under [model] markers",
+        f"write a marker set of your own as TOML (kinertia markers FILE -o SET.toml drafts it) and name it under "
+        f"[model] markers",
         missing,
         nearest,
     )
