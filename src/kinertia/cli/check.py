@@ -42,6 +42,7 @@ class _Files:
     forces: Path | None = None
     loads: Path | None = None
     window_s: tuple[float, float] | None = None
+    length_unit: str | None = None
 
     @property
     def title(self) -> str:
@@ -223,11 +224,15 @@ def _matched(marked: Sequence[Path], forces: Sequence[Path]) -> dict[Path, Path]
 
 def _of_subject(subject: SubjectFile) -> tuple[list[_Files], MarkerSet | None, float | None]:
     named = subject.model.markers
-    trials = [_Files(trial.markers, trial.forces, trial.loads, trial.window_s) for trial in subject.trials]
+    trials = [
+        _Files(trial.markers, trial.forces, trial.loads, trial.window_s, trial.length_unit) for trial in subject.trials
+    ]
     marker_set = None if named is None else read_marker_set(named)
     if subject.model.osim is not None:
         marker_set = markers_of_model(read_osim(subject.model.osim))
-    static = [] if subject.model.static is None else [_Files(subject.model.static)]
+    static = (
+        [] if subject.model.static is None else [_Files(subject.model.static, length_unit=subject.model.length_unit)]
+    )
     return [*static, *trials], marker_set, subject.subject.mass_kg
 
 
@@ -238,7 +243,7 @@ def _read(wanted: Sequence[_Files]) -> tuple[list[tuple[_Files, Recording]], lis
         for k, one in enumerate(wanted):
             progress("reading", k / len(wanted))
             try:
-                recordings.append((one, read_recording(one.markers, one.forces, one.loads)))
+                recordings.append((one, read_recording(one.markers, one.forces, one.loads, one.length_unit)))
             except KinertiaError as error:
                 mistakes.append(str(error))
     return recordings, mistakes

@@ -31,7 +31,7 @@ _PERSON_M = (0.3, 2.8)
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
 
 
-def read_c3d(path: str | Path) -> Recording:
+def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
     """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
 
     Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
@@ -43,6 +43,11 @@ def read_c3d(path: str | Path) -> Recording:
     `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so
     `plates` is None when none is left.
 
+    Args:
+        path: the file.
+        length_unit: of its lengths, "mm", "cm" or "m", whatever the file says; by the file, or by the size of a person
+            where it says nothing, if None.
+
     Raises:
         FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit;
             or ezc3d is not installed.
@@ -51,7 +56,7 @@ def read_c3d(path: str | Path) -> Recording:
     file, notes = _open(path)
     parameters = file["parameters"]
     labels, positions, label_notes = _markers(path, file)
-    unit_name, unit_notes = _length_unit(path, parameters, positions)
+    unit_name, unit_notes = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
     notes += unit_notes
     time = _times(file, "points")
@@ -96,13 +101,19 @@ def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
     return default
 
 
-def _length_unit(path: Path, parameters: Any, positions: FloatArray) -> tuple[str, list[str]]:
+def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[str]]:
     """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
     unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
+    if stated is not None:
+        differs = f"{path.name}: lengths were read in {stated}, as stated; POINT:UNITS says '{unit}'"
+        return stated, [] if unit == stated else [differs]
     if unit in METRES_PER_UNIT:
         return unit, []
     if unit:
-        raise FileError(path, f"POINT:UNITS is '{unit}'; expected mm, cm or m, correct the parameter")
+        raise FileError(
+            path,
+            f"POINT:UNITS is '{unit}'; expected mm, cm or m: correct it, or state length_unit in the subject file",
+        )
     whole = positions[np.isfinite(positions).all(axis=(1, 2))]
     size = float(np.median(np.ptp(whole, axis=1).max(axis=1))) if len(whole) else np.nan
     low, high = _PERSON_M
@@ -111,11 +122,11 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray) -> tuple[st
         raise FileError(
             path,
             f"POINT:UNITS is empty, and its markers, which reach {size:.3g} units, are a person's in none of mm, cm "
-            f"and m; write the unit into the parameter",
+            f"and m; write the unit into the parameter, or state it: length_unit in the subject file",
         )
     return likely[0], [
         f"{path.name}: POINT:UNITS is empty; taken as {likely[0]}, in which the markers reach "
-        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, write the unit into the parameter"
+        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, state it: length_unit in the subject file"
     ]
 
 

@@ -21,7 +21,10 @@ _FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
 
 
 def read_recording(
-    markers_path: str | Path, forces_path: str | Path | None = None, loads_path: str | Path | None = None
+    markers_path: str | Path,
+    forces_path: str | Path | None = None,
+    loads_path: str | Path | None = None,
+    length_unit: str | None = None,
 ) -> Recording:
     """Read one trial: markers, and forces where there are any.
 
@@ -31,6 +34,7 @@ def read_recording(
             file of a plate: those of the trial's other plates beside it are read, too.
         loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without
             `forces_path` its own datafile is read.
+        length_unit: of a .c3d file's lengths, "mm", "cm" or "m", whatever it says itself.
 
     Returns:
         the recording; its `plates` is None where no file holds usable force plates.
@@ -42,7 +46,7 @@ def read_recording(
     markers_path = Path(markers_path)
     _expect_kind(markers_path, MARKER_FILES, "markers")
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
-    recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None)
+    recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit)
     if tsv:
         forces_path = None
     if forces_path is not None:
@@ -59,9 +63,11 @@ def read_recording(
     return recording
 
 
-def _read_markers(path: Path, plate: Path | None) -> Recording:
+def _read_markers(path: Path, plate: Path | None, length_unit: str | None) -> Recording:
     """What a file of markers holds; readers are loaded by those who have such files."""
     kind = path.suffix.lower()
+    if length_unit is not None and kind != ".c3d":
+        raise FileError(path, "length_unit is for C3D files; this one says its own unit")
     if plate is not None:
         expect_file(plate)
         if kind != ".tsv":
@@ -69,7 +75,7 @@ def _read_markers(path: Path, plate: Path | None) -> Recording:
     if kind == ".c3d":
         from kinertia.io.c3d import read_c3d
 
-        return read_c3d(path)
+        return read_c3d(path, length_unit)
     if kind == ".tsv":
         from kinertia.io.qualisys import plates_beside, read_qualisys
 
