@@ -71,6 +71,11 @@ class Subject(Table):
     )
     mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
     height_m: float | None = Field(default=None, description="stature, m")
+    knee_width_mm: float | None = Field(
+        default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"
+    )
+    ankle_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the ankle, mm")
+    elbow_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the elbow, mm")
 
     @model_validator(mode="before")
     @classmethod

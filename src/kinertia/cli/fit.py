@@ -22,10 +22,12 @@ from kinertia.report.files import save_fit
 def fit(
     trial: Annotated[
         Path,
-        typer.Argument(help="A subject file (.toml), a folder with one, or the markers of one trial (.c3d, .trc)."),
+        typer.Argument(
+            help="A subject file (.toml), a folder with one, or markers of one trial (.c3d, .trc, .tsv, .csv)."
+        ),
     ],
     output: Output = Path("out"),
-    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
+    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc, .tsv, .csv).")] = None,
     forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
