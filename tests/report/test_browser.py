@@ -20,6 +20,13 @@ FLAGS = [
     "--disable-sync",
 ]
 DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+SWITCHED = """plot => {
+    const panel = plot.closest(".panel");
+    if (!panel) return null;
+    const siblings = [...panel.parentElement.children].filter(other => other.classList.contains("panel"));
+    return [panel.parentElement.querySelector("input").name, siblings.indexOf(panel)];
+}"""
+"""Name of the choice that shows a plot, and which of its answers; null for a plot that always shows."""
 PATIENCE_MS = 30_000
 
 pytestmark = pytest.mark.slow
@@ -47,7 +54,7 @@ class Opened:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
-        self.page.evaluate("document.querySelectorAll('details.seconds').forEach((part) => (part.open = true))")
+        self.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
         playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
 
     def picture(self, locator):
@@ -96,6 +103,8 @@ def test_every_plot_is_drawn(opened):
     assert len(plots) >= 5
     for plot in plots:
         name = plot.get_attribute("id")
+        if choice := plot.evaluate(SWITCHED):
+            opened.page.locator(f"[name={choice[0]}]").nth(choice[1]).check()
         assert plot.locator(".trace").count() > 0, name
         pixels = opened.picture(plot)
         assert ink(pixels) > 0.005, name
@@ -259,6 +268,38 @@ def test_table_sorts_by_pointer_and_keyboard(demo):
     assert heading.get_attribute("aria-sort") is None
     names = demo.page.locator("#bsp-table tbody th").all_text_contents()
     assert names == sorted(names)
+
+
+def test_table_shows_what_changed_and_products_of_inertia_when_asked(demo):
+    rows = demo.page.locator("#bsp-table tbody tr")
+
+    def seen(kind=""):
+        return rows.locator("visible=true").and_(demo.page.locator(f"tr{kind}")).count()
+
+    changed, products = (
+        demo.page.locator(f"#bsp-all [data-filter={name}]") for name in ("only-changed", "with-products")
+    )
+    assert (seen(), seen(".product")) == (84, 0)
+    products.check()
+    assert (seen(), seen(".product")) == (120, 36)
+    changed.check()
+    assert seen() == seen(".changed") == rows.and_(demo.page.locator(".changed")).count()
+    assert 0 < seen() < 120
+    for box in (changed, products):
+        box.uncheck()
+    assert seen() == 84
+
+
+def test_panels_are_switched(demo):
+    mass, information = (demo.page.locator(f"#body-{name}") for name in ("mass", "information"))
+    playwright.expect(mass).to_be_visible()
+    playwright.expect(information).not_to_be_visible()
+    demo.page.get_by_role("radio", name="what the data say").check()
+    playwright.expect(information).to_be_visible()
+    playwright.expect(mass).not_to_be_visible()
+    assert colour(demo.picture(information)) > 0.01
+    demo.page.get_by_role("radio", name="what the data say").press("ArrowLeft")
+    playwright.expect(mass).to_be_visible()
 
 
 def test_page_fits_a_phone(browser, demo_run):

@@ -21,14 +21,13 @@ from kinertia.report import style
 from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, small_multiples
-from kinertia.report.wording import start_of
+from kinertia.report.wording import INTERVAL_SD, start_of
 from kinertia.trial.data import FEET, runs
 
 MOST_STRIDES = 100
 """Of a trial and side; of more, so many are taken, evenly spread."""
 _MOST_DRAWN = 5
 """Of a side; mean and bands are of all."""
-_BAND_SD = 1.96
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY = 0.13, 0.25, 0.45
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 
@@ -139,7 +138,7 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
         yield {**_band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
     sds = [one.sd for one in curves if one.sd is not None]
     if sds:
-        half = _BAND_SD * _over_strides(np.nanmean, np.array(sds))
+        half = INTERVAL_SD * _over_strides(np.nanmean, np.array(sds))
         name = f"{word}, 95 % of the estimate"
         yield {**_band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
     if len(curves) > 1:

@@ -18,10 +18,21 @@ from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
+from kinertia.report.body_figure import body_figure
+from kinertia.report.bsp_figures import (
+    MAIN,
+    MASS_AND_COM,
+    NAMES,
+    PRODUCTS,
+    change_figure,
+    departure_figure,
+    departures,
+    information_figure,
+    segment_name,
+)
 from kinertia.report.cycle_figures import MOST_STRIDES, cycle_figures
 from kinertia.report.cycle_table import stride_rows
-from kinertia.report.figure import written
+from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
@@ -34,7 +45,7 @@ from kinertia.report.time_figures import (
     moment_figure,
     residual_figure,
 )
-from kinertia.report.wording import decimals, fixed, read_in, start_of
+from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in, start_of
 from kinertia.trial.data import runs
 from kinertia.trial.rms import rms_length
 
@@ -50,7 +61,6 @@ def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[
     `computed_by` are the versions that the fit is from, where they are not the present ones.
     """
     shown = fit.trials[:MOST_TRIALS]
-    information = information_figure(fit)
     return rendered(
         "report.html.j2",
         title=f"{fit.subject.name}: body segment parameters",
@@ -61,8 +71,19 @@ def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[
         hidden=hidden_combinations(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit),
-        bsp={"figure": written(bsp_figure(fit)), "rows": bsp_rows(fit)},
-        information=None if information is None else written(information),
+        body={
+            "mass": _written(body_figure(fit)),
+            "information": _written(body_figure(fit, "information")),
+            "changes": written(change_figure(fit, MASS_AND_COM)),
+        },
+        bsp={
+            **{
+                name: {"change": written(change_figure(fit, some)), "departure": _written(departure_figure(fit, some))}
+                for name, some in (("main", MAIN), ("products", PRODUCTS))
+            },
+            "rows": bsp_rows(fit),
+        },
+        information=_written(information_figure(fit)),
         residuals=residual_rows(fit.trials),
         trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
         settings=fit.settings.model_dump(),
@@ -73,6 +94,10 @@ def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
+
+
+def _written(figure: Figure | None) -> dict[str, Any] | None:
+    return None if figure is None else written(figure)
 
 
 def _cycle(fit: Fit) -> dict[str, Any] | None:
@@ -94,7 +119,6 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
     """Everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
     noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
-    gaps = gap_figure(trial)
     return {
         "id": f"trial{k + 1}",
         "name": trial.name,
@@ -112,7 +136,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
         ),
         "noise": noise,
-        "gaps": None if gaps is None else written(gaps),
+        "gaps": _written(gap_figure(trial)),
         "scene": Markup(json.dumps(packed(scene(fit, trial, _VIEW_FRAMES // count)))),
     }
 
@@ -142,6 +166,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
             unit, factor = read_in(k)
             values = {"before": before[i, k], "estimate": after[i, k]}
             row: dict[str, Any] = {"segment": segment_name(segment), "parameter": f"{NAMES[k]} ({unit})"}
+            row |= {"product": k in PRODUCTS, "changed": bool(after[i, k] != before[i, k])}
             # without a deviation, inertias have about three digits
             size = 0.1 * max(abs(before[i, k]), abs(after[i, k]))
             if posterior is not None and away is not None:
@@ -151,6 +176,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
                 told = float(posterior.information[i, k])
                 row |= {"away": away[i, k], "information": 0.0 if held else max(100 * told, 0.0), "held": held}
                 row["evidence"] = evidence(told)
+                row["changed"] = not held and abs(after[i, k] - before[i, k]) > INTERVAL_SD * posterior.sd[i, k]
             for name, value in values.items():
                 row[name] = {"value": value * factor, "text": fixed(value * factor, decimals(k, size))}
             rows.append(row)
