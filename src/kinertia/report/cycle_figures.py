@@ -9,12 +9,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
 from kinertia.estimation.result import Fit
+from kinertia.io.norms_file import Norm
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
@@ -33,19 +35,26 @@ _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other fo
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
 """By quantity and side."""
+Norms = Mapping[str, Norm]
+"""By quantity, for both sides."""
 
 
-def cycle_figures(fit: Fit) -> dict[Kind, Figure]:
-    """All figures over the gait cycle, by kind; none where no trial has a stride."""
+def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({})) -> dict[Kind, Figure]:
+    """All figures over the gait cycle, by kind; none where no trial has a stride. Norms are grey bands below."""
     if not any(trial.strides for trial in fit.trials):
         return {}
-    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"))
+    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"), norms)
     return {kind: drawn.figure(kind) for kind in UNITS}
 
 
-def cycle_figure(fit: Fit, kind: Kind) -> Figure | None:
+def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> Figure | None:
     """The one of this kind; None where no trial has a stride."""
-    return cycle_figures(fit).get(kind)
+    return cycle_figures(fit, norms).get(kind)
+
+
+def quantities_of(fit: Fit) -> set[str]:
+    """Names of all curves that a fit has over the gait cycle."""
+    return {quantity for quantity, _ in curves_of(fit, "estimate")}
 
 
 def curves_of(fit: Fit, stage: Stage) -> Curves:
@@ -64,6 +73,7 @@ class _Drawn:
     fit: Fit
     estimate: Curves
     usual: Curves
+    norms: Norms
 
     def figure(self, kind: Kind) -> Figure:
         panels = [
@@ -89,6 +99,9 @@ class _Drawn:
 
     def _traces(self, quantity: str) -> Iterator[dict[str, Any]]:
         values = start_of(self.fit).values
+        if norm := self.norms.get(quantity):
+            outline = _outline(norm.percent, norm.mean - norm.sd, norm.mean + norm.sd, style.faded(style.GREY, 0.3))
+            yield {**outline, "name": "norm, mean ± SD"}
         for side in FEET:
             curves, usual = (found.get((quantity, side), []) for found in (self.estimate, self.usual))
             word, colour = style.SIDES[side]
@@ -193,20 +206,26 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
 
 
 def _band(low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
+    """Around every stretch without a gap; whole percents in one byte each."""
+    band = _outline(PERCENT, low, high, colour)
+    return {**band, "x": np.asarray(band["x"]).astype(np.uint8)}
+
+
+def _outline(percent: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
     """A closed outline around every stretch without a gap."""
     x: list[np.ndarray] = []
     y: list[np.ndarray] = []
     for first, last in runs(np.isfinite(low) & np.isfinite(high)):
         part = slice(first, last + 1)
-        x += [PERCENT[part], PERCENT[part][::-1], np.zeros(1)]
+        x += [percent[part], percent[part][::-1], np.zeros(1)]
         y += [low[part], high[part][::-1], np.full(1, np.nan)]
-    outline = {"fill": "toself", "fillcolor": colour, "line": {"width": 0}, "hoverinfo": "skip"}
-    if not x:
-        return {"type": "scatter", "mode": "lines", "x": [], "y": [], **outline}
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": np.concatenate(x)[:-1].astype(np.uint8),
-        "y": compact(np.concatenate(y)[:-1]),
-        **outline,
+        "x": compact(np.concatenate(x)[:-1]) if x else [],
+        "y": compact(np.concatenate(y)[:-1]) if y else [],
+        "fill": "toself",
+        "fillcolor": colour,
+        "line": {"width": 0},
+        "hoverinfo": "skip",
     }

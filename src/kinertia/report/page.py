@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from kinertia.report.bsp_figures import (
     information_figure,
     segment_name,
 )
-from kinertia.report.cycle_figures import MOST_STRIDES, cycle_figures
+from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
@@ -55,10 +56,19 @@ _VIEW_FRAMES = 400
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
-def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[str, str] | None = None) -> str:
-    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command.
+def render(
+    fit: Fit,
+    provenance: Provenance | None = None,
+    computed_by: Mapping[str, str] | None = None,
+    norms: Norms = MappingProxyType({}),
+) -> str:
+    """The report of a fit.
 
-    `computed_by` are the versions that the fit is from, where they are not the present ones.
+    Args:
+        fit: what it is about.
+        provenance: files and command; a fit made in Python has none.
+        computed_by: the versions that the fit is from, where they are not the present ones.
+        norms: of the curves over the gait cycle, as bands behind them.
     """
     shown = fit.trials[:MOST_TRIALS]
     return rendered(
@@ -70,7 +80,7 @@ def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
-        cycle=_cycle(fit),
+        cycle=_cycle(fit, norms),
         body={
             "mass": _written(body_figure(fit)),
             "information": _written(body_figure(fit, "information")),
@@ -100,15 +110,16 @@ def _written(figure: Figure | None) -> dict[str, Any] | None:
     return None if figure is None else written(figure)
 
 
-def _cycle(fit: Fit) -> dict[str, Any] | None:
+def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
     """Everything that the templates show of the gait cycle; None where there are no strides."""
-    figures = cycle_figures(fit)
+    figures = cycle_figures(fit, norms)
     if not figures:
         return None
     strides = [stride for trial in fit.trials for stride in trial.strides]
     return {
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
+        "norms": bool(norms),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
         **{kind: written(figure) for kind, figure in figures.items()},

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinertia.estimation.cycles import Kind
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.io.norms_file import read_norms
 from kinertia.report.body_figure import Shown, body_figure
 from kinertia.report.bsp_figures import change_figure, departure_figure, information_figure
 from kinertia.report.cycle_figures import cycle_figure
@@ -60,9 +62,12 @@ class FitPlots:
         mass_kg, start = self.fit.mass_kg, start_of(self.fit)
         return as_plotly(moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start))
 
-    def cycles(self, kind: Kind = "moment") -> go.Figure | None:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides."""
-        return _plotly_if_any(cycle_figure(self.fit, kind))
+    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> go.Figure | None:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides.
+
+        `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
+        """
+        return _plotly_if_any(cycle_figure(self.fit, kind, {} if norms is None else read_norms(norms)))
 
     def markers(self, trial: str | None = None) -> go.Figure:
         """Distance between every measured and modelled marker."""
