@@ -51,7 +51,7 @@ def test_the_report_with_norms(fit, results):
     file.write_text("quantity,percent,mean,sd\nkneecap,0,0,1\n")
     told = run("report", results, "--norms", file)
     assert told.status == 2
-    assert "no quantity in it is a curve of this fit (the first is kneecap)" in told.err
+    assert "no quantity of it is among the curves of this fit (the first is kneecap)" in told.err
 
 
 def test_export_says_what_the_tables_say(fit, results):
