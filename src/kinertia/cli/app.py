@@ -87,7 +87,6 @@ def application(only: str | None = None) -> typer.Typer:
     app = typer.Typer(
         name="kinertia",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
         help=_MANUAL,
