@@ -28,7 +28,8 @@ def fit(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="A subject file (.toml) or folder with one, or several; or one trial's markers (.c3d, .trc, .tsv, .csv).",
+            help="A subject file (.toml) or a folder with one, or several; or markers of one trial (.c3d, .trc, .tsv, "
+            ".csv).",
         ),
     ],
     output: Output = Path("out"),
