@@ -6,7 +6,6 @@ They are Parquet files: columns with types, compressed, of which programs read o
 from __future__ import annotations
 
 import csv
-import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -21,6 +20,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
 from kinertia.report.cycle_figures import MOST_STRIDES
+from kinertia.report.files import summary
 from kinertia.studies.cohort_cluster import expect_extra
 from kinertia.studies.cohort_record import Place, Record
 
@@ -72,7 +72,7 @@ def write_person(folder: Path, person: str, fit: Fit) -> None:
     """Write a person's rows of the tables, into the folder of the person's results."""
     from pyarrow import parquet
 
-    for name, columns in zip(OF_A_PERSON, (_bsp(fit), _trials(fit, folder), _cycles(fit)), strict=True):
+    for name, columns in zip(OF_A_PERSON, (_bsp(fit), _trials(fit), _cycles(fit)), strict=True):
         rows = len(next(iter(columns.values())))
         parquet.write_table(_table(name, {"person": [person] * rows, **columns}), folder / f"{name}.parquet")
 
@@ -135,11 +135,10 @@ def _bsp(fit: Fit) -> dict[str, Any]:
     return {"trial": [", ".join(trial.name for trial in fit.trials)] * rows, **told}
 
 
-def _trials(fit: Fit, folder: Path) -> dict[str, Any]:
-    """What the person's `fit.json` says of every trial, and the trial's own verdicts."""
-    summaries = json.loads((folder / "fit.json").read_text(encoding="utf-8"))["trials"]
+def _trials(fit: Fit) -> dict[str, Any]:
+    """What `fit.json` says of every trial, and the trial's own verdicts."""
     rows = []
-    for told, trial in zip(summaries, fit.trials, strict=True):
+    for told, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
         row = {
             f"{key}_{stage}": one
             for key, value in told.items()

@@ -20,7 +20,7 @@ from kinertia.io.provenance import VERSION
 from kinertia.studies.cohort_record import FAILED, Record, Standing, one_line
 
 HOW = "pip install 'kinertia[cohort]'"
-_NEEDED = ("distributed", "pyarrow", "dask.dataframe")
+_NEEDED = ("dask", "distributed", "pyarrow")
 PERSON_MEMORY_BYTES = 2 * 1024**3
 """What a fit is given at least: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
 RETRIES = 2
@@ -65,10 +65,10 @@ class ClusterSize:
 
 def expect_extra() -> None:
     """Raise a KinertiaError that says what to install, unless it is there."""
-    missing = sorted({name.partition(".")[0] for name in _NEEDED if find_spec(name.partition(".")[0]) is None})
+    missing = [name for name in _NEEDED if find_spec(name) is None]
     if missing:
-        listed = " and ".join(missing)
-        raise KinertiaError(f"cohorts need {listed}, which {'are' if missing[1:] else 'is'} not installed: {HOW}")
+        verb = "are" if missing[1:] else "is"
+        raise KinertiaError(f"cohorts need {' and '.join(missing)}, which {verb} not installed; install: {HOW}")
 
 
 def local_size(people: int) -> ClusterSize:
