@@ -28,8 +28,7 @@ def fit(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="A subject file (.toml) or a folder with one, or several; or markers of one trial (.c3d, .trc, .tsv, "
-            ".csv).",
+            help="Subject files (.toml) or folders with one; or markers of one trial (.c3d, .trc, .tsv, .csv).",
         ),
     ],
     output: Output = Path("out"),

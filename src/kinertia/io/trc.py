@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,19 @@ def write_trc(path: str | Path, markers: Markers) -> None:
         "",
     ]
     write_then_rename(path, "\n".join(lines))
+
+
+def header_frames(path: Path) -> int:
+    """Frames that the header of a TRC file announces.
+
+    Raises:
+        FileError: it is none.
+    """
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        lines = list(islice(stream, _FIRST_ROW_LINE))
+    if not lines:
+        raise FileError(path, "the file is empty; export it again")
+    return _count(path, _header(path, lines), "NumFrames")
 
 
 def _header(path: Path, lines: list[str]) -> dict[str, str]:
