@@ -11,7 +11,7 @@ from kinertia.errors import FileError
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.io.toml_lines import TomlFile
-from kinertia.settings import Settings
+from kinertia.settings import Settings, Subject
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 elsewhere = pytest.mark.skipif(os.name == "nt", reason="Windows has drives")
@@ -185,7 +185,7 @@ CASES = [
     ("loads =", "load =", 13, "unknown key 'load' in [trial]; did you mean 'loads'?"),
     ('sex = "female"\n', "", 1, "[subject] lacks 'sex'"),
     ('markers = "data/walk2.c3d"\n', "", 16, "[trial] lacks 'markers'"),
-    ('sex = "female"', 'sex = "f"', 2, 'sex = "f": must be "male" or "female"'),
+    ('sex = "female"', 'sex = "x"', 2, 'sex = "x": must be "male" or "female"'),
     ('bsp = "deleva"', 'bsp = "leva"', 21, 'must be "dumas" or "deleva"'),
     ("symmetry = false", 'symmetry = "no"', 22, 'symmetry = "no"'),
     ("cutoff_hz = 6", "cutoff_hz = 0", 23, 'must be "gcv" or a positive frequency in Hz'),
@@ -499,3 +499,8 @@ def test_calibration_is_of_opensim_models(folder):
     with pytest.raises(FileError, match="calibrate goes with osim") as error:
         read(folder, changed('markers = "plug-in-gait"', "calibrate = true"))
     assert error.value.line == 8
+
+
+@pytest.mark.parametrize(("written", "meant"), [("f", "female"), ("F", "female"), ("Female", "female"), ("m", "male")])
+def test_sex_may_be_abbreviated(written, meant):
+    assert Subject(name="A", sex=written).sex == meant

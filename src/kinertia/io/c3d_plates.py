@@ -87,7 +87,7 @@ def to_ground_plates(
         return None, [f"{path.name}: no force plate that can be used"]
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
     corners = None if plates.corners is None else plates.corners @ rotation.T
-    notes, noises = [], []
+    notes, noises, idle = [], [], []
     for p, name in enumerate(plates.names):
         vertical = np.nan_to_num(force[:, p, 1])
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
@@ -104,8 +104,10 @@ def to_ground_plates(
         if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
             told = ", ".join(f"{value:.0f}" for value in offset)
             notes.append(f"{path.name}: {name} reads ({told}) N when unloaded; this was not subtracted")
-        force[:, p], moment[:, p], noise = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
-        noises.append(noise)
+        plate = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
+        force[:, p], moment[:, p] = plate.force, plate.moment
+        noises.append(plate.noise_n)
+        idle.append(plate.idle)
         if not loaded.any():
             notes.append(f"{path.name}: {name} never reaches {LOAD_THRESHOLD_N:g} N")
         elif (
@@ -116,7 +118,10 @@ def to_ground_plates(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
                 "corners; check the plate's corners, origin and units"
             )
-    return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises)), notes
+    loads = PlateLoads(
+        time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises), tuple(idle)
+    )
+    return loads, notes
 
 
 def _corner_trouble(corners: FloatArray) -> str:

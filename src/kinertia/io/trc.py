@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
 _TIME_TOLERANCE_FRAMES = 0.25
+_MOST_DECIMALS = 7
 
 
 def read_trc(path: str | Path) -> Markers:
@@ -87,6 +89,19 @@ def write_trc(path: str | Path, markers: Markers) -> None:
     write_then_rename(path, "\n".join(lines))
 
 
+def header_frames(path: Path) -> int:
+    """Frames that the header of a TRC file announces.
+
+    Raises:
+        FileError: it is none.
+    """
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        lines = list(islice(stream, _FIRST_ROW_LINE))
+    if not lines:
+        raise FileError(path, "the file is empty; export it again")
+    return _count(path, _header(path, lines), "NumFrames")
+
+
 def _header(path: Path, lines: list[str]) -> dict[str, str]:
     if not lines[0].lstrip().startswith("PathFileType"):
         raise FileError(path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1)
@@ -151,7 +166,9 @@ def _uniform_time(
     if len(time) == 1:
         return time, ()
     step = (time[-1] - time[0]) / (len(time) - 1)
-    if abs(rate_hz * step - 1) > 0.01:
+    at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
+    # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
+    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > _rounding_s(time):
         found = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
         raise FileError(path, f"{found}; correct the wrong one", 3)
     frames = np.arange(len(time))
@@ -170,6 +187,14 @@ def _uniform_time(
         f"{1 / (uniform[1] - uniform[0]):.6g} Hz were taken instead"
     )
     return uniform, ((note,) if error.max() > 1e-6 else ())
+
+
+def _rounding_s(time: FloatArray) -> float:
+    """The unit of the last decimal that the times are told to."""
+    for decimals in range(_MOST_DECIMALS):
+        if np.abs(time - time.round(decimals)).max() < 1e-9:
+            return float(10.0**-decimals)
+    return 0.0
 
 
 def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) -> None:
