@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import Motion as Motion
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
     from kinertia.motion.dynamics import residual as residual
+    from kinertia.report.cohort_tables import read_cohort as read_cohort
     from kinertia.report.files import save_fit as save_fit
     from kinertia.report.saved_fit import load_fit as load_fit
     from kinertia.settings import Instruments as Instruments
@@ -114,6 +115,7 @@ _ROOMS = {
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",
+    "report.cohort_tables": "read_cohort",
     "report.files": "save_fit",
     "report.saved_fit": "load_fit",
 }

@@ -23,8 +23,8 @@ def table():
         Draw(
             number=k,
             errors={c: Errors(*(factor * np.array(astuple(PUBLISHED[c]))).tolist()) for c in CONDITIONS},
-            parameter_errors={c: np.full(49, 0.01 * factor) for c in CONDITIONS},
-            start_errors=np.full(49, 0.1),
+            parameter_errors={c: np.outer([0.1, 0.01 * factor], np.ones(49)) for c in CONDITIONS},
+            costs={c: np.array([2.0, 1.0]) for c in CONDITIONS},
             converged=dict.fromkeys(CONDITIONS, True),
         )
         for k, factor in enumerate((2.0, 4.0))

@@ -97,6 +97,7 @@ def test_ezc3d_is_left_out_only_where_it_has_no_wheel(index, system):
 def test_tools_of_the_tests_install_on_windows(wheel):
     tools = _resolved(wheel, "win_amd64", "3.12", "--only-binary", ":all:", extra="[test]")
     assert "opensim" in tools
+    assert {"dask", "distributed", "pyarrow"} <= set(tools)
     assert "pin" not in tools
 
 

@@ -11,15 +11,14 @@ from kinertia.checks.recording import RecordingCheck, check_recording
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
-from kinertia.io.recording import read_recording
+from kinertia.io.qualisys import is_plate_file
+from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_markers import markers_of_model
 from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
-
-_MARKER_FILES, _FORCE_FILES = (".trc", ".c3d"), (".mot", ".sto")
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,7 @@ class RecordingFiles:
     forces: Path | None = None
     loads: Path | None = None
     window_s: tuple[float, float] | None = None
+    length_unit: str | None = None
 
     @property
     def title(self) -> str:
@@ -58,14 +58,17 @@ class PersonFiles:
 def files_of_subject(subject: SubjectFile) -> PersonFiles:
     """What a subject file names."""
     named = subject.model.markers
-    trials = [RecordingFiles(trial.markers, trial.forces, trial.loads, trial.window_s) for trial in subject.trials]
+    trials = [
+        RecordingFiles(trial.markers, trial.forces, trial.loads, trial.window_s, trial.length_unit)
+        for trial in subject.trials
+    ]
     marker_set = None if named is None else read_marker_set(named)
     if subject.model.osim is not None:
         marker_set = markers_of_model(read_osim(subject.model.osim))
     who = subject.subject
     if subject.model.static is None:
         return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m)
-    static = RecordingFiles(subject.model.static)
+    static = RecordingFiles(subject.model.static, length_unit=subject.model.length_unit)
     return PersonFiles((static, *trials), marker_set, who.mass_kg, who.height_m, static)
 
 
@@ -78,17 +81,17 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
     for path in files:
         if path.is_dir():
             raise FileError(path, "is a folder; give the files in it, or its subject file (kinertia init drafts one)")
-        if path.suffix.lower() not in (*_MARKER_FILES, *_FORCE_FILES):
-            known = ", ".join((*_MARKER_FILES, *_FORCE_FILES, ".toml", ".osim"))
+        if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
+            known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
             hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
             raise FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
-    marked = [path for path in files if path.suffix.lower() in _MARKER_FILES]
+    marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
     forces = [path for path in files if path not in marked]
     pairs = _matched(marked, forces)
     alone = [path for path in forces if path not in pairs.values()]
     if alone:
         goes = "goes with none of the marker files by its name" if marked else "holds forces only"
-        raise FileError(alone[0], f"{goes}; check it together with its markers (.trc, .c3d)")
+        raise FileError(alone[0], f"{goes}; check it together with its markers ({', '.join(MARKER_FILES)})")
     wanted = [RecordingFiles(path, pairs.get(path)) for path in marked]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
@@ -148,7 +151,7 @@ def _read(
     for k, one in enumerate(wanted):
         progress(k / len(wanted))
         try:
-            recordings.append((one, read_recording(one.markers, one.forces, one.loads)))
+            recordings.append((one, read_recording(one.markers, one.forces, one.loads, one.length_unit)))
         except KinertiaError as error:
             mistakes.append(str(error))
     return recordings, mistakes

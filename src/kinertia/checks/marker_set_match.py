@@ -75,6 +75,6 @@ def judged_labels(match: MarkerSetMatch) -> list[Verdict]:
         Verdict(
             "fail",
             f"no marker set fits ({nearest}), so it is unknown which markers are on which foot; write a marker set as "
-            f"TOML and name it with --markers",
+            f"TOML (kinertia markers FILE -o SET.toml drafts it) and name it with --markers",
         )
     ]

@@ -30,6 +30,7 @@ kinertia demo                 see it work, on a synthetic person
 kinertia demo --measured      see it work, on a measured walk
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
+kinertia markers FILE         which marker set is it? draft one of your own
 kinertia fit subject.toml     estimate; the results go to the folder out
 kinertia report out           write the report of a fit again
 kinertia compare out1 out2    what differs between fits, and by how much
@@ -37,6 +38,7 @@ kinertia export out --csv     all tables of a fit, for other programs
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
 kinertia instruments A.toml B.toml   plates and clock, from a whole session
+kinertia cohort STUDY -o out  fit hundreds of people, resumable, one table
 kinertia warm-up              compile now what the first fit would compile
 
 Every command says more with --help, and has an example there.
@@ -44,7 +46,8 @@ Every command says more with --help, and has an example there.
 [bold]What it needs[/]
 
 A static trial (the person standing; C3D or TRC), one or more gait trials with
-force plates (C3D, or TRC with MOT or STO), body mass, stature and sex.
+force plates (C3D, or TRC with MOT or STO; Qualisys' TSV, Vicon's CSV), body
+mass, stature and sex.
 Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 
 [bold]Exit status[/]
@@ -55,6 +58,7 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
      beyond OpenSim's guideline (markers 20 mm RMS; force 10 N RMS, 25 N peak,
      5 % of the largest external force; moment 50 N m RMS, 75 N m peak).
      In check: something that a fit or a simulation cannot rest on.
+     In cohort: any of these for somebody, or somebody could not be fitted.
   2  an error in files or options, reported in one line
  70  Kinertia itself failed; the line says where its log file is
 130  interrupted; nothing half-written is left
@@ -66,6 +70,7 @@ _MODULES = {
     "demo": "demo",
     "init": "init",
     "check": "check",
+    "markers": "markers",
     "fit": "fit",
     "report": "report",
     "compare": "compare",
@@ -73,6 +78,7 @@ _MODULES = {
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",
+    "cohort": "cohort",
     "study": "study",
     "warm-up": "warm_up",
 }
@@ -84,7 +90,6 @@ def application(only: str | None = None) -> typer.Typer:
     app = typer.Typer(
         name="kinertia",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
         help=_MANUAL,

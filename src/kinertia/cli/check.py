@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -14,7 +15,7 @@ from kinertia.checks.files import PersonFiles, check_files, files_by_name, files
 from kinertia.checks.model import ModelCheck, check_model
 from kinertia.checks.recording import RecordingCheck
 from kinertia.checks.verdict import stands_against
-from kinertia.cli.options import Force, Quiet, Verbose, results_folder
+from kinertia.cli.options import AsJson, Force, Quiet, Sex, Verbose, number, results_folder
 from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
@@ -32,22 +33,29 @@ def check(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Markers (.trc, .c3d), each with its forces (.mot, .sto; matched by name); or a subject file (.toml); "
-            "or models (.osim).",
+            help="Markers (.trc, .c3d, .tsv, .csv), each with its forces (.mot, .sto, .tsv; matched by name); or a "
+            "subject file (.toml); or models (.osim).",
         ),
     ],
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
     ] = None,
-    mass: Annotated[float | None, typer.Option(help="Body mass, kg, to compare forces and models with.")] = None,
-    height: Annotated[float | None, typer.Option(help="Stature, m, to compare models with the literature.")] = None,
-    sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="KG", help="Body mass, kg, to compare forces and models with."),
+    ] = None,
+    height: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="M", help="Stature, m, to compare models with the literature."),
+    ] = None,
+    sex: Sex = None,
     markers: Annotated[
         str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -94,14 +102,31 @@ def check(
         recordings, more = check_files(wanted, lambda share: progress("reading", share))
     mistakes += more
     page = None if output is None else save_check_page(recordings, models, mistakes, output)
-    with suppress(SystemExit):  # rich's, where nobody reads on (| head)
-        _show(recordings, models, page, verbose)
+    if as_json:
+        typer.echo(json.dumps(_told(recordings, models, mistakes), indent=2))
+    else:
+        with suppress(SystemExit):  # rich's, where nobody reads on (| head)
+            _show(recordings, models, page, verbose)
     for mistake in mistakes:
         show_error(mistake)
     if mistakes:
         raise typer.Exit(2)
     judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
     raise typer.Exit(int(any(map(stands_against, judged))))
+
+
+def _told(
+    recordings: Sequence[tuple[str, RecordingCheck]], models: Sequence[tuple[str, ModelCheck]], mistakes: Sequence[str]
+) -> dict[str, Any]:
+    """The same for scripts."""
+
+    def each(found: Sequence[tuple[str, RecordingCheck | ModelCheck]]) -> list[dict[str, Any]]:
+        return [
+            {"name": name, "verdicts": [verdict._asdict() for verdict in one.verdicts], "facts": dict(one.facts())}
+            for name, one in found
+        ]
+
+    return {"recordings": each(recordings), "models": each(models), "errors": list(mistakes)}
 
 
 def _show(

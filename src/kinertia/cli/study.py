@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -25,7 +25,7 @@ from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.faults import run_faults, synthetic_walk
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
-from kinertia.studies.table1_variants import VariantResult, run_variants
+from kinertia.studies.table1_variants import run_variants
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
@@ -38,7 +38,7 @@ def table1(
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")] = 1,
     trial: Annotated[
         Path | None,
-        typer.Option(help="Subject file of a measured trial to start from; the package's walk if left out."),
+        typer.Option(help="Subject file of a measured trial to start from, or to have among the variants."),
     ] = None,
     variants: Annotated[
         bool,
@@ -56,20 +56,19 @@ def table1(
 
     kinertia study table1 --repeats 3 --trial subject.toml -o out
 
-    kinertia study table1 --variants -o out
+    kinertia study table1 --variants --trial subject.toml -o out
     """
     results_folder(output, force)
     with shown_progress() as progress:
-        if trial is None:
-            source, name = study_trial(), "synthetic walk"
-        else:
-            source, name = measured_trial(read_subject(trial), progress)
+        measured = None if trial is None else measured_trial(read_subject(trial), progress)
         if variants:
-            found = run_variants(source, repeats=repeats, seed=seed, progress=lambda share: progress("variants", share))
+            walk = None if measured is None else measured[0]
+            found = run_variants(walk, repeats=repeats, seed=seed, progress=lambda share: progress("variants", share))
         else:
+            source, name = measured or (study_trial(), "synthetic walk")
             table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     if variants:
-        _report_variants(found, name, seed)
+        _report_variants(found, seed)
         save_variants(found, output)
         _say_where(output, ("variants.md", "variants.csv"), "variants.png")
         return
@@ -78,8 +77,8 @@ def table1(
     _say_where(output, ("report.html", "table1.json", "table1.csv"), "table1.png")
 
 
-def _report_variants(found: Sequence[VariantResult], trial: str, seed: int) -> None:
-    out.print(f"\n{trial}; seed {seed}. RMS error without / with correction, both with noise: mean over the draws.\n")
+def _report_variants(found: Mapping[str, Table1], seed: int) -> None:
+    out.print(f"\nseed {seed}. RMS error without / with correction, both with noise: mean over the draws.\n")
     # forces and torques are in the files: a terminal is not as wide
     wanted = [k for k, heading in enumerate(VARIANT_HEADINGS) if "pelvis" not in heading and "without" not in heading]
     shown = plain_table(*(VARIANT_HEADINGS[k] for k in wanted))

@@ -16,6 +16,7 @@ from kinertia.estimation.input_checks import (
     complete_subject,
     known,
 )
+from kinertia.estimation.joint_widths import with_widths
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.io.marker_set_file import choose_marker_set
@@ -149,6 +150,7 @@ def prepare(
     else:
         check_marker_set(marker_set, static.markers.labels)
 
+    static, marker_set, width_notes = with_widths(static, recordings, marker_set, subject)
     progress("calibration", 0.0)
     started = time.perf_counter()
     warnings += warnings_of(static.name, static_doubts(static, marker_set, subject.height_m))
@@ -171,7 +173,7 @@ def prepare(
         ik_s = time.perf_counter() - started
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
 
-    notes = [f"marker set: {marker_set.name}", *static.notes, *notes]
+    notes = [f"marker set: {marker_set.name}", *static.notes, *width_notes, *notes]
     for trial, _ in turned:
         absent = [label for label in skeleton.labels if label not in trial.markers.labels]
         if absent:

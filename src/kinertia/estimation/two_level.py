@@ -130,7 +130,7 @@ class TwoLevelResult:
 
 def correct_pelvis(skeleton: Skeleton, bsp: BodySegmentParameters, window: Window) -> Motion:
     """Inner level: the motion with the pelvis that equation (2) asks for, nearest to the measured pelvis."""
-    acceleration = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
+    acceleration, _ = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
     position, velocity = window.integration.track(acceleration, window.motion.q[:, :6])
     return window.motion.with_root(position, velocity, acceleration)
 
@@ -250,7 +250,7 @@ def radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: 
     """Of the body about the pelvis in the first frame, m; moments divided by it add up with forces."""
     first = windows[0]
     one = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
-    mass = root_derivatives(skeleton, bsp, one, first.wrench[:1]).qdd[0]
+    _, (mass,) = consistent_root_acceleration(skeleton, bsp, one, first.wrench[:1])
     about_axes = skeleton.root.axes(one.q)[0].T @ mass[3:, 3:]
     return float(np.sqrt(np.trace(about_axes) / 3 / np.linalg.norm(mass[:3, 0])))
 
@@ -283,20 +283,24 @@ class TwoLevelProblem:
         """Derivative of `residuals` with respect to theta."""
         bsp = self.vector.bsp(theta)
         change = self.vector.jacobian(theta)
-        parts = [self._jacobian(bsp, change, window) for window in self.windows]
+        if self.correct:
+            parts = [self._corrected_jacobian(bsp, change, window) for window in self.windows]
+        else:
+            parts = [regressor @ change for regressor in self._measured_regressors]
         return np.concatenate([(part * self._scale[:, None]).reshape(-1, len(theta)) for part in parts])
 
-    def _jacobian(self, bsp: BodySegmentParameters, change: np.ndarray, window: Window) -> np.ndarray:
-        """(n, 6, k) dP / dtheta: Y dphi, and with correction also what the moved pelvis adds."""
-        if not self.correct:
-            uncorrected: np.ndarray = root_regressor(self.skeleton, bsp.segments, window.motion) @ change
-            return uncorrected
-        acceleration = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
+    @cached_property
+    def _measured_regressors(self) -> list[np.ndarray]:
+        segments = self.vector.reference.segments
+        return [root_regressor(self.skeleton, segments, window.motion) for window in self.windows]
+
+    def _corrected_jacobian(self, bsp: BodySegmentParameters, change: np.ndarray, window: Window) -> np.ndarray:
+        """(n, 6, k) dP / dtheta: Y dphi, and what the moved pelvis adds."""
+        acceleration, mass = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
         measured = window.motion
         balanced = measured.with_root(measured.q[:, :6], measured.qd[:, :6], acceleration)
-        at_balance = root_derivatives(self.skeleton, bsp, balanced, window.wrench)
         shown = root_regressor(self.skeleton, bsp.segments, balanced) @ change
-        d_acceleration = -np.linalg.solve(at_balance.qdd, shown)
+        d_acceleration = -np.linalg.solve(mass, shown)
         d_position, d_velocity = window.integration.track(d_acceleration)
         position, velocity = window.integration.track(acceleration, measured.q[:, :6])
         moved = measured.with_root(position, velocity, acceleration)

@@ -32,13 +32,13 @@ class LabPlates:
         names: (p) `plate 1`, ... by the file's order.
         force: (k, p, 3) N as in the file, on the person or on the plate.
         moment: (k, p, 3) N m about the lab origin.
-        corners: (p, 4, 3) m.
+        corners: (p, 4, 3) m, or None where the file does not tell.
     """
 
     names: tuple[str, ...]
     force: FloatArray
     moment: FloatArray
-    corners: FloatArray
+    corners: FloatArray | None
 
     def loaded_direction(self) -> FloatArray:
         """Mean direction (3,) of the loaded samples, each without its sign; zero when nothing is loaded."""
@@ -86,7 +86,7 @@ def to_ground_plates(
     if plates is None:
         return None, [f"{path.name}: no force plate that can be used"]
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
-    corners = plates.corners @ rotation.T
+    corners = None if plates.corners is None else plates.corners @ rotation.T
     notes, noises, idle = [], [], []
     for p, name in enumerate(plates.names):
         vertical = np.nan_to_num(force[:, p, 1])
@@ -110,7 +110,10 @@ def to_ground_plates(
         idle.append(plate.idle)
         if not loaded.any():
             notes.append(f"{path.name}: {name} never reaches {LOAD_THRESHOLD_N:g} N")
-        elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
+        elif (
+            corners is not None
+            and (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M
+        ):
             notes.append(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
                 "corners; check the plate's corners, origin and units"

@@ -107,6 +107,18 @@ def doubts_about(path: Path) -> str:
     return doubt or _header_doubt(header, start + _BLOCK * section[2]) or _doubt(header, parameters)
 
 
+def header_frames(path: Path) -> int:
+    """Frames by the header of a C3D file; 0 where it does not say."""
+    with path.open("rb") as stream:
+        block = stream.read(_BLOCK)
+        stream.seek(_BLOCK * (block[0] - 1) + 3 if block[:1] > b"\0" else 0)
+        processor = stream.read(1)
+    if len(block) < _BLOCK or not processor:
+        return 0
+    order, _ = _BYTE_ORDERS.get(processor[0], ("<", 15))
+    return _header(block, order).frames
+
+
 def _header(block: bytes, order: str) -> _Header:
     points, analogs, first, last = struct.unpack_from(f"{order}4H", block, 2)
     (scale,) = struct.unpack_from(f"{order}f", block, 12)

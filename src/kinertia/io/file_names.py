@@ -24,8 +24,12 @@ def fits_everywhere(name: str) -> bool:
 
 def same_folder(one: str, other: str) -> bool:
     """Whether two names are one folder's on some system: Windows and macOS do not tell capitals from small letters."""
-    first, second = (unicodedata.normalize("NFC", name).casefold() for name in (one, other))
-    return first == second
+    return same_name_key(one) == same_name_key(other)
+
+
+def same_name_key(name: str) -> str:
+    """What names have in common that are one folder's on some system."""
+    return unicodedata.normalize("NFC", name).casefold()
 
 
 def path_from(folder: Path, written: str) -> Path:

@@ -39,13 +39,13 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
     names = names_from_common_folder(paths)
-    return Provenance(command, {name: _sha256(path) for name, path in zip(names, paths, strict=True)})
+    return Provenance(command, {name: sha256(path) for name, path in zip(names, paths, strict=True)})
 
 
 def recordings(wanted: SubjectFile) -> tuple[str, ...]:
     """SHA-256 of the person's static trial or model, and of the gait trials: those of no other person."""
     paths = [wanted.model.static, wanted.model.osim, *(trial.markers for trial in wanted.trials)]
-    return tuple(_sha256(path) for path in paths if path is not None)
+    return tuple(sha256(path) for path in paths if path is not None)
 
 
 def names_from_common_folder(paths: Sequence[PurePath]) -> list[str]:
@@ -59,7 +59,8 @@ def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
     return subprocess.list2cmdline(words) if windows else shlex.join(words)
 
 
-def _sha256(path: Path) -> str:
+def sha256(path: Path) -> str:
+    """Of a file's content."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 

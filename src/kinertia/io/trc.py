@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,7 @@ def read_trc_recording(path: str | Path) -> Recording:
     counted = f"{path.name}: its header announces {frames} frames, the file has {len(values)}: all of them were read"
     count_notes = () if len(values) == frames else (counted,)
     time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
-    positions, position_notes = _positions(path, values[:, 2:], labels, line_numbers)
+    positions, position_notes = seen_positions(path, values[:, 2:], labels, line_numbers)
     unit = header["Units"].lower()
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
@@ -86,6 +87,19 @@ def write_trc(path: str | Path, markers: Markers) -> None:
         "",
     ]
     write_then_rename(path, "\n".join(lines))
+
+
+def header_frames(path: Path) -> int:
+    """Frames that the header of a TRC file announces.
+
+    Raises:
+        FileError: it is none.
+    """
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        lines = list(islice(stream, _FIRST_ROW_LINE))
+    if not lines:
+        raise FileError(path, "the file is empty; export it again")
+    return _count(path, _header(path, lines), "NumFrames")
 
 
 def _header(path: Path, lines: list[str]) -> dict[str, str]:
@@ -197,9 +211,10 @@ def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) ->
         raise FileError(path, f"{found}; expected every frame, export gaps as empty cells", line_numbers[row])
 
 
-def _positions(
+def seen_positions(
     path: Path, values: FloatArray, labels: tuple[str, ...], line_numbers: list[int]
 ) -> tuple[FloatArray, tuple[str, ...]]:
+    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where all are missing or zero, and notes on zeros."""
     positions = values.reshape(len(values), len(labels), 3)
     absent = np.isnan(positions)
     partly = np.argwhere(absent.any(axis=2) & ~absent.all(axis=2))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,11 +14,7 @@ from typing import BinaryIO
 from uuid import uuid4
 
 from kinertia.errors import FileError
-
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
+from kinertia.io.file_lock import locked
 
 _PREFIX, _LOCK = ".kinertia.", "lock"
 BEFORE = "before"
@@ -43,7 +38,7 @@ def working_folder(within: Path) -> Iterator[Path]:
 def sweep(within: Path) -> None:
     """Remove what processes left that were killed, and put back what one of them had moved out of the way."""
     for folder in within.glob(f"{_PREFIX}*"):
-        lock = _locked(folder) if folder.is_dir() else None
+        lock = locked(folder / _LOCK) if folder.is_dir() else None
         if lock is None:
             continue
         for kept in (folder / BEFORE).glob("*"):
@@ -60,26 +55,9 @@ def _new(within: Path) -> tuple[Path, BinaryIO]:
         except OSError as error:
             problem = f"cannot be written to ({error.strerror}); give another folder for the results"
             raise FileError(within, problem) from error
-        lock = _locked(folder)
+        lock = locked(folder / _LOCK)
         if lock is not None and (folder / _LOCK).is_file():  # else another process swept it just now
             return folder, lock
-
-
-def _locked(folder: Path) -> BinaryIO | None:
-    """The folder's lock, held until it is closed; None where another process has it, or the folder is gone."""
-    try:
-        file = (folder / _LOCK).open("ab")
-    except OSError:
-        return None
-    try:
-        if sys.platform == "win32":
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # also where a network drive knows no locks: what is there stays
-        file.close()
-        return None
-    return file
 
 
 def _remove(folder: Path, lock: BinaryIO) -> None:

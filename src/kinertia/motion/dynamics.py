@@ -20,7 +20,7 @@ import numpy as np
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.regressor import regressor
-from kinertia.motion.rigid_body import axis_forces, root_load
+from kinertia.motion.rigid_body import axis_forces, root_balance, root_load
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,17 @@ def residual_terms(
 
 def consistent_root_acceleration(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
-) -> np.ndarray:
-    """Root acceleration (n, 6) that zeroes P at the given state, equation (2)."""
-    left, by = residual_terms(skeleton, bsp, motion, wrench)
-    result: np.ndarray = motion.qdd[:, :6] - np.linalg.solve(by.qdd[:, :, :6], left[..., None])[..., 0]
-    return result
+) -> tuple[np.ndarray, np.ndarray]:
+    """Root acceleration (n, 6) that zeroes P at the given state, equation (2), and its factor M_f (n, 6, 6)."""
+    load, mass = root_balance(
+        skeleton.tree,
+        skeleton.gravity_m_s2,
+        skeleton.bodies(bsp),
+        *axis_motion(skeleton, motion),
+        np.ascontiguousarray(skeleton.root.centre(motion.q)),
+    )
+    left = skeleton.root.about_centre(motion.q, load - wrench)
+    return motion.qdd[:, :6] - np.linalg.solve(mass, left[..., None])[..., 0], mass
 
 
 def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) -> np.ndarray:
@@ -114,7 +120,7 @@ def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) 
     about = skeleton.root.centre(motion.q)
     every = regressor(skeleton.tree, skeleton.gravity_m_s2, *axis_motion(skeleton, motion), about)
     rows = [skeleton.segments.index(segment) for segment in segments]
-    chosen = every if rows == list(range(len(skeleton.segments))) else every[:, :, rows]
+    chosen = every if rows == list(range(len(skeleton.segments))) else np.take(every, rows, axis=2)
     return chosen.reshape(len(chosen), 6, 10 * len(rows))
 
 

@@ -277,16 +277,45 @@ def root_load(
     column = frame.column
     for k in range(n):
         _fill(tree, bodies, x[k], v[k], a[k], frame, True)
-        ax, ay, az = about[k, 0], about[k, 1], about[k, 2]
         for j in range(count):
             for order in range(3):
-                fx, fy, fz = column[order, j, 0], column[order, j, 1], column[order, j, 2]
-                by[order, k, 0, j], by[order, k, 1, j], by[order, k, 2, j] = fx, fy, fz
-                by[order, k, 3, j] = column[order, j, 3] - (ay * fz - az * fy)
-                by[order, k, 4, j] = column[order, j, 4] - (az * fx - ax * fz)
-                by[order, k, 5, j] = column[order, j, 5] - (ax * fy - ay * fx)
+                _taken_about(column[order, j], about[k], by[order, k, :, j])
         _whole(tree.parent, frame.force, load, k)
     return load, by
+
+
+@compiled
+def root_balance(
+    tree: KinematicTree,
+    gravity_m_s2: float,
+    bodies: np.ndarray,
+    x: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    about: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 6) load as `root_load`, and (n, 6, 6) its derivatives by a of the first six axes, the root's, only."""
+    n, count = x.shape
+    load, by = np.zeros((n, 6)), np.empty((n, 6, 6))
+    frame = empty_frame(count, gravity_m_s2)
+    inertia, column = frame.inertia, np.empty((1, 6))
+    for k in range(n):
+        inertia[:] = 0.0
+        _fill(tree, bodies, x[k], v[k], a[k], frame, False)
+        hand_down(tree.parent, inertia)
+        for j in range(6):
+            _inertia_times(inertia, j, frame.axes, j, column, 0)
+            _taken_about(column[0], about[k], by[k, :, j])
+        _whole(tree.parent, frame.force, load, k)
+    return load, by
+
+
+@inlined
+def _taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
+    """out = (6,) a force, and its moment about another point than the ground origin."""
+    fx, fy, fz, x, y, z = force[0], force[1], force[2], about[0], about[1], about[2]
+    out[0], out[1], out[2] = fx, fy, fz
+    out[3], out[4], out[5] = force[3] - (y * fz - z * fy), force[4] - (z * fx - x * fz), force[5] - (x * fy - y * fx)
 
 
 @compiled

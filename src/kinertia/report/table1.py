@@ -65,11 +65,12 @@ def table1_rows(table: Table1) -> list[list[str]]:
             ("  published", PUBLISHED.__getitem__, 3),
         ):
             values = [asdict(source(condition)) for condition in CONDITIONS]
-            rows.append([label, *(" / ".join(_short(value[name], digits) for name in names) for value in values)])
+            rows.append([label, *(" / ".join(short(value[name], digits) for name in names) for value in values)])
     return rows
 
 
-def _short(value: float, digits: int) -> str:
+def short(value: float, digits: int) -> str:
+    """The number as the tables print it."""
     return f"{value:.{digits}g}".replace("e-0", "e-")
 
 
@@ -81,7 +82,7 @@ def table1_figure(table: Table1) -> Figure:
     axes = figure.subplots(1, len(_CLASSES))
     segments = list(dict.fromkeys(name.partition(".")[0] for name in table.parameters))
     errors = {"start": np.array([draw.start_errors for draw in table.draws])}
-    errors |= {c: np.array([draw.parameter_errors[c] for draw in table.draws]) for c in CONDITIONS}
+    errors |= {c: np.array([draw.parameter_errors[c][-1] for draw in table.draws]) for c in CONDITIONS}
     for axis, (heading, members) in zip(axes, _CLASSES.items(), strict=True):
         for key, values in errors.items():
             heights = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,9 +12,10 @@ import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.report.extras import has_matplotlib
-from kinertia.report.table1 import QUANTITIES
-from kinertia.studies.table1 import PUBLISHED, Errors
-from kinertia.studies.table1_variants import BASE, CLASSES, GROUND, NOISY, VariantResult
+from kinertia.report.table1 import QUANTITIES, short
+from kinertia.studies.table1 import PUBLISHED, Errors, Table1
+from kinertia.studies.table1_variants import CLASSES, LONG, LONG_GROUND, NOISY, distance, helped, stopped_by
+from kinertia.trial.rms import rms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,81 +28,91 @@ HEADINGS = (
     "inertia without noise (kg m2)",
     "factor from published",
 )
-CLEAN = ("no_correction_no_noise", "correction_no_noise")
-_MARKS = {1e-2: "v", 1e-4: "s"}
+_CLEAN = ("no_correction_no_noise", "correction_no_noise")
+_MARKS = {1e-2: "v", 1e-4: "s", 1e-6: "o"}
 """Relative change of the cost, and what marks the iteration that falls below it first."""
-_SHOWN = {BASE.title: ("moments about the pelvis", "#0072B2"), GROUND.title: ("moments about the ground", "#D55E00")}
+_SHOWN = {LONG: ("moments about the pelvis", "#0072B2"), LONG_GROUND: ("moments about the ground", "#D55E00")}
 
 
-def variants_frame(results: Sequence[VariantResult]) -> pd.DataFrame:
-    """One row per variant, draw and condition, those without noise too: iterations and errors."""
-    rows = []
-    for result in results:
-        for number, courses in [(0, result.clean), *enumerate(result.draws)]:
-            conditions = CLEAN if courses is result.clean else NOISY
-            for condition, course in zip(conditions, courses, strict=True):
-                told = {"variant": result.variant.title, "draw": number, "condition": condition}
-                rows.append({**told, "iterations": len(course.costs) - 1, **asdict(course.errors)})
-    return pd.DataFrame(rows)
+def variants_frame(tables: Mapping[str, Table1]) -> pd.DataFrame:
+    """One row per variant, draw and condition (without noise in the first draw only): iterations and errors."""
+    return pd.DataFrame(
+        {
+            "variant": title,
+            "draw": draw.number,
+            "condition": condition,
+            "iterations": len(draw.costs[condition]) - 1,
+            **asdict(errors),
+        }
+        for title, table in tables.items()
+        for draw in table.draws
+        for condition, errors in draw.errors.items()
+    )
 
 
-def variants_rows(results: Sequence[VariantResult]) -> list[list[str]]:
+def variants_rows(tables: Mapping[str, Table1]) -> list[list[str]]:
     """The table as text, RMS errors "without / with correction"; the published values come first."""
-    rows = [["published", "1", *_pairs([PUBLISHED[c] for c in NOISY]), "100, 100, 100"]]
-    rows[0] += [_pairs([PUBLISHED[c] for c in CLEAN])[0], "1"]
-    for result in results:
-        helped = ", ".join(f"{100 * share:.0f}" for share in result.helped.values())
-        means = _pairs([result.mean(False), result.mean(True)])
-        clean, factor = _pairs([course.errors for course in result.clean])[0], f"{result.distance:.2f}"
-        rows.append([result.variant.title, str(len(result.draws)), *means, helped, clean, factor])
+    rows = [_row("published", 1, PUBLISHED.__getitem__, (1.0, 1.0, 1.0), 1.0)]
+    for title, table in tables.items():
+        rows.append(_row(title, len(table.draws), table.mean, helped(table).values(), distance(table)))
     return rows
 
 
-def _pairs(errors: Sequence[Errors]) -> list[str]:
-    return [_pair([asdict(each)[name] for each in errors]) for _, name, _ in QUANTITIES.values()]
+def _row(title: str, draws: int, errors: Callable[[str], Errors], shares: Iterable[float], factor: float) -> list[str]:
+    noisy, clean = ([asdict(errors(condition)) for condition in conditions] for conditions in (NOISY, _CLEAN))
+    pairs = [[each[name] for each in noisy] for _, name, _ in QUANTITIES.values()]
+    pairs.append([each["inertia_rms_kgm2"] for each in clean])
+    *with_noise, exact = (" / ".join(short(value, 2) for value in pair) for pair in pairs)
+    return [title, str(draws), *with_noise, ", ".join(f"{100 * s:.0f}" for s in shares), exact, f"{factor:.2f}"]
 
 
-def _pair(values: Sequence[float]) -> str:
-    return " / ".join(f"{value:.2g}".replace("e-0", "e-") for value in values)
-
-
-def variants_figure(results: Sequence[VariantResult]) -> Figure:
-    """Error along the iterations, geometric mean over the draws, of the base and with moments about the ground."""
+def variants_figure(tables: Mapping[str, Table1]) -> Figure:
+    """Error along the iterations, geometric mean over the draws, with moments about the pelvis and about the ground."""
     from matplotlib.figure import Figure  # half a second, which the other commands need not wait
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, len(CLASSES))
-    for column, (axis, (name, field)) in enumerate(zip(axes, CLASSES.items(), strict=True)):
-        for result in (result for result in results if result.variant.title in _SHOWN):
-            named, colour = _SHOWN[result.variant.title]
-            for corrected, condition in enumerate(NOISY):
-                courses = [draw[corrected] for draw in result.draws]
-                longest = max(len(course.along) for course in courses)
-                # what has stopped stays where it is
-                held = [np.pad(c.along[:, column], (0, longest - len(c.along)), "edge") for c in courses]
-                mean = np.exp(np.log(held).mean(axis=0))
-                line, kind = ("-", "corrected") if corrected else ("--", "uncorrected")
-                axis.plot(mean, line, color=colour, label=f"{named}, {kind}")
+    for axis, (name, (field, columns)) in zip(axes, CLASSES.items(), strict=True):
+        for title, (named, colour) in _SHOWN.items():
+            for line, kind, condition in zip(("--", "-"), ("uncorrected", "corrected"), NOISY, strict=True):
+                draws = tables[title].draws
+                mean = _along([draw.parameter_errors[condition] for draw in draws], columns)
+                axis.plot(np.arange(1, len(mean) + 1), mean, line, color=colour, label=f"{named}, {kind}")
                 for tolerance, mark in _MARKS.items():
-                    stop = round(float(np.median([course.stopped_by(tolerance) for course in courses])))
-                    axis.plot(stop, mean[stop], mark, color=colour, markersize=7)
-                value = asdict(PUBLISHED[condition])[field]
-                axis.axhline(value, color="#999999", linestyle=line, linewidth=1, label=f"published, {kind}")
+                    stop = round(float(np.median([stopped_by(draw.costs[condition], tolerance) for draw in draws])))
+                    axis.plot(stop + 1, mean[stop], mark, color=colour, markersize=7)
+        for line, kind, condition in zip(("--", "-"), ("uncorrected", "corrected"), NOISY, strict=True):
+            value = asdict(PUBLISHED[condition])[field]
+            axis.axhline(value, color="#999999", linestyle=line, linewidth=1, label=f"published, {kind}")
+        axis.set_xscale("log")
         axis.set_yscale("log")
+        for formatter in (
+            axis.xaxis.set_major_formatter,
+            axis.yaxis.set_major_formatter,
+            axis.yaxis.set_minor_formatter,
+        ):
+            formatter("{x:g}")
         axis.set_title(f"{QUANTITIES[name.lower()][0]}, RMS error")
-        axis.set_xlabel("iteration")
+        axis.set_xlabel("iteration, the start being the first")
         axis.grid(True, axis="y", alpha=0.3)
-    handles = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
-def save_variants(results: Sequence[VariantResult], folder: str | Path) -> Path:
+def _along(paths: Sequence[np.ndarray], columns: slice) -> np.ndarray:
+    """Geometric mean (k,) over paths of errors (k, 49) of the RMS over a class; what has stopped stays where it is."""
+    errors = [[rms(wrong.reshape(-1, 7)[:, columns]) for wrong in path] for path in paths]
+    longest = max(len(each) for each in errors)
+    mean: np.ndarray = np.exp(np.log([np.pad(each, (0, longest - len(each)), "edge") for each in errors]).mean(axis=0))
+    return mean
+
+
+def save_variants(tables: Mapping[str, Table1], folder: str | Path) -> Path:
     """Write `variants.csv`, `variants.md` and, with matplotlib, `variants.png` into a folder; returns it."""
-    table = [list(HEADINGS), ["---"] * len(HEADINGS), *variants_rows(results)]
+    table = [list(HEADINGS), ["---"] * len(HEADINGS), *variants_rows(tables)]
     with complete_folder(folder, "variants") as work:
-        variants_frame(results).to_csv(work / "variants.csv", index=False, lineterminator="\n")
+        variants_frame(tables).to_csv(work / "variants.csv", index=False, lineterminator="\n")
         (work / "variants.md").write_text("".join(f"| {' | '.join(row)} |\n" for row in table), encoding="utf-8")
         if has_matplotlib():
-            variants_figure(results).savefig(work / "variants.png", dpi=150)
+            variants_figure(tables).savefig(work / "variants.png", dpi=150)
     return Path(folder)

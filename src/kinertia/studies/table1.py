@@ -2,12 +2,13 @@
 
 Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the
 study's marker noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The
-two-level estimator never sees the truth.
+two-level estimator never sees the truth. `Setup` has these steps, each of which may be another one
+(`kinertia.studies.table1_variants`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 
@@ -16,10 +17,11 @@ import numpy as np
 from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import Progress, prepare
 from kinertia.estimation.study_parameters import ParameterVector
-from kinertia.estimation.two_level import Window, estimate_two_level
+from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.motion.dynamics import Motion
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, residual
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, smooth
@@ -38,7 +40,7 @@ CONDITIONS = {
 """Key and heading of the four conditions, in the order of the published table."""
 START_SHARE = 0.5
 MARGIN_S = 0.1
-"""Frames this near the ends of the trial are smoothed but not used: splines are poor at their ends."""
+"""Splines are poor at their ends."""
 _STRIDE_S = 1.24
 
 
@@ -82,16 +84,23 @@ class Draw:
     Attributes:
         number: of the draw; with the seed it determines everything.
         errors: per condition.
-        parameter_errors: per condition, estimate minus truth (49; kg, m, kg m2).
-        start_errors: start minus truth (49).
+        parameter_errors: per condition (k, 49), what was estimated minus the truth (kg, m, kg m2) on the way from the
+            start, first, to the estimate, last.
+        costs: per condition (k,), what was minimised, at the same places.
         converged: per condition.
     """
 
     number: int
     errors: Mapping[str, Errors]
     parameter_errors: Mapping[str, np.ndarray]
-    start_errors: np.ndarray
+    costs: Mapping[str, np.ndarray]
     converged: Mapping[str, bool]
+
+    @property
+    def start_errors(self) -> np.ndarray:
+        """Start minus truth (49)."""
+        start: np.ndarray = next(iter(self.parameter_errors.values()))[0]
+        return start
 
 
 @dataclass(frozen=True)
@@ -113,7 +122,7 @@ class Table1:
     trial: str
 
     def mean(self, condition: str) -> Errors:
-        """Mean of the errors over the draws."""
+        """Mean of the errors over the draws that have this condition."""
         return Errors(*np.mean(self._values(condition), axis=0).tolist())
 
     def spread(self, condition: str) -> Errors:
@@ -121,7 +130,55 @@ class Table1:
         return Errors(*np.std(self._values(condition), axis=0, ddof=min(1, len(self.draws) - 1)).tolist())
 
     def _values(self, condition: str) -> np.ndarray:
-        return np.array([list(asdict(draw.errors[condition]).values()) for draw in self.draws])
+        found = [draw.errors[condition] for draw in self.draws if condition in draw.errors]
+        return np.array([list(asdict(errors).values()) for errors in found])
+
+
+def two_level(
+    skeleton: Skeleton, start: BodySegmentParameters, window: Window, correct: bool
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """`estimate_two_level`: parameters (2, 49) and cost (2,) at start and end, and whether it converged."""
+    result, vector = estimate_two_level(skeleton, start, [window], correct=correct), ParameterVector(start, True)
+    return np.array([vector.values(start), vector.values(result.bsp)]), np.array(result.cost), result.converged
+
+
+def random_start(vector: ParameterVector, rng: np.random.Generator) -> np.ndarray:
+    """Every parameter of the vector's reference off by uniform +/-50 %."""
+    truth = vector.values(vector.reference)
+    return truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))
+
+
+def noise_per_coordinate(trial: SyntheticTrial, rng: np.random.Generator) -> Markers:
+    """The markers with the study's noise."""
+    return study_noise(trial.markers, rng)
+
+
+def coordinates(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
+    """Coordinates of the markers: inverse kinematics with the true skeleton, then GCV."""
+    ik = solve_ik(trial.skeleton, markers)
+    return smooth(ik.time, ik.q, "gcv")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is done in a draw, step by step.
+
+    Attributes:
+        start: parameters (49) that the estimate starts from; the vector's reference is the truth.
+        noise: noisy markers of a trial.
+        spline: smooth coordinates of noisy markers.
+        margin_s: frames this near the ends of the trial are smoothed but not used.
+        estimate: as `two_level`, perhaps with more on the way from the start to the end.
+    """
+
+    start: Callable[[ParameterVector, np.random.Generator], np.ndarray] = random_start
+    noise: Callable[[SyntheticTrial, np.random.Generator], Markers] = noise_per_coordinate
+    spline: Callable[[SyntheticTrial, Markers], SmoothedSpline] = coordinates
+    margin_s: float = MARGIN_S
+    estimate: Callable[..., tuple[np.ndarray, np.ndarray, bool]] = two_level
+
+
+TODAY = Setup()
 
 
 def symmetric_truth(bsp: BodySegmentParameters) -> BodySegmentParameters:
@@ -130,10 +187,18 @@ def symmetric_truth(bsp: BodySegmentParameters) -> BodySegmentParameters:
     return vector.bsp(vector.values(bsp))
 
 
-def study_trial(pace: float = 1.0) -> SyntheticTrial:
-    """One stride of the package's walk, this many times as fast, with margins; left mirrors right exactly."""
+def study_trial(pace: float = 1.0, on_axes: bool = False) -> SyntheticTrial:
+    """One stride of the package's walk, with margins; left mirrors right exactly.
+
+    Args:
+        pace: this many times as fast.
+        on_axes: with all CoMs moved onto the long axes of the segments.
+    """
     subject = walking_subject()
-    return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), _STRIDE_S / pace + 2 * MARGIN_S, pace=pace)
+    truth = symmetric_truth(subject.bsp)
+    if on_axes:
+        truth = replace(truth, com_m=truth.com_m * [0.0, 1.0, 0.0])
+    return walk(replace(subject, bsp=truth), _STRIDE_S / pace + 2 * MARGIN_S, pace=pace)
 
 
 @one_blas_thread
@@ -190,51 +255,35 @@ def run_table1(
     return Table1(vector.names, vector.values(trial.bsp), tuple(draws), seed, name)
 
 
-def run_draw(trial: SyntheticTrial, seed: int, number: int) -> Draw:
-    """One draw: the four conditions from the same start, the noisy ones with the same noise."""
+def run_draw(
+    trial: SyntheticTrial,
+    seed: int,
+    number: int,
+    setup: Setup = TODAY,
+    conditions: Iterable[str] = CONDITIONS,
+) -> Draw:
+    """One draw: these conditions from the same start, the noisy ones with the same noise."""
     rng = np.random.default_rng([seed, number])
     vector = ParameterVector(trial.bsp, symmetric=True)
-    truth = vector.values(trial.bsp)
-    theta = random_start(truth, rng)
-    start = vector.bsp(theta)
-    inner = inner_frames(trial.time, MARGIN_S)
+    truth, start = vector.values(trial.bsp), vector.bsp(setup.start(vector, rng))
+    margin = round(setup.margin_s / (trial.time[1] - trial.time[0]))
+    inner = slice(margin, len(trial.time) - margin)
+    time, wrench = trial.time[inner], trial.window.wrench[inner]
+    spline = setup.spline(trial, setup.noise(trial, rng))
     windows = {
-        "no_noise": Window(trial.time[inner], trial.motion.cut(inner), trial.window.wrench[inner]),
-        "noise": smoothed_window(trial, inner, coordinates(trial, study_noise(trial.markers, rng))),
+        "no_noise": Window(time, trial.motion.cut(inner), wrench),
+        "noise": Window(time, Motion(*(spline(time, order) for order in range(3))), wrench),
     }
-    errors, found, converged = {}, {}, {}
-    for condition in CONDITIONS:
+    errors, wrong, costs, converged = {}, {}, {}, {}
+    for condition in conditions:
         correct = condition.startswith("correction")
         window = windows["no_noise" if condition.endswith("no_noise") else "noise"]
-        result = estimate_two_level(trial.skeleton, start, [window], correct=correct)
-        found[condition] = vector.values(result.bsp) - truth
-        errors[condition] = errors_by_class(found[condition], result.residuals[0])
-        converged[condition] = result.converged
-    return Draw(number, errors, found, theta - truth, converged)
-
-
-def random_start(truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Every parameter off by uniform +/-50 %."""
-    return truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))
-
-
-def inner_frames(time: np.ndarray, margin_s: float) -> slice:
-    """The frames of a uniform time base that are not within this margin (s) of its ends."""
-    margin = round(margin_s / (time[1] - time[0]))
-    return slice(margin, len(time) - margin)
-
-
-def coordinates(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
-    """Coordinates of the markers: inverse kinematics with the true skeleton, then GCV."""
-    ik = solve_ik(trial.skeleton, markers)
-    return smooth(ik.time, ik.q, "gcv")
-
-
-def smoothed_window(trial: SyntheticTrial, inner: slice, spline: SmoothedSpline) -> Window:
-    """The splines at these frames, with the exact ground reactions."""
-    time = trial.time[inner]
-    motion = Motion(*(spline(time, order) for order in range(3)))
-    return Window(time, motion, trial.window.wrench[inner])
+        path, costs[condition], converged[condition] = setup.estimate(trial.skeleton, start, window, correct)
+        bsp = vector.bsp(path[-1])
+        motion = correct_pelvis(trial.skeleton, bsp, window) if correct else window.motion
+        wrong[condition] = path - truth
+        errors[condition] = errors_by_class(path[-1] - truth, residual(trial.skeleton, bsp, motion, wrench))
+    return Draw(number, errors, wrong, costs, converged)
 
 
 def errors_by_class(parameters: np.ndarray, residual: np.ndarray) -> Errors:
@@ -264,7 +313,7 @@ def table1_json(table: Table1) -> dict[str, object]:
                     condition: {
                         **asdict(draw.errors[condition]),
                         "converged": draw.converged[condition],
-                        "parameter_errors": draw.parameter_errors[condition].tolist(),
+                        "parameter_errors": draw.parameter_errors[condition][-1].tolist(),
                     }
                     for condition in CONDITIONS
                 },

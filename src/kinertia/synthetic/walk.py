@@ -210,7 +210,7 @@ def consistent_trial(
     wrench = foot_loads.sum(axis=1)
     start, integration, current = motion.q[:, :6], Integration(time), motion
     for _ in range(_MAX_ITERATIONS):
-        acceleration = consistent_root_acceleration(skeleton, bsp, current, wrench)
+        acceleration, _ = consistent_root_acceleration(skeleton, bsp, current, wrench)
         position, velocity = integration.track(acceleration, start)
         current = motion.with_root(position, velocity, acceleration)
         left = np.abs(residual(skeleton, bsp, current, wrench)).max()

@@ -1,0 +1,75 @@
+"""What a worker does with one person of a cohort: fit, results, and the person's rows of the cohort's tables."""
+
+from __future__ import annotations
+
+import time
+import traceback
+
+from kinertia.checks.verdict import verdicts
+from kinertia.errors import KinertiaError
+from kinertia.estimation.from_files import fit_subject
+from kinertia.estimation.result import Fit
+from kinertia.io.output_folder import complete_folder, write_then_rename
+from kinertia.io.provenance import VERSION, command_line, provenance_of
+from kinertia.io.subject_file import SubjectFile, read_subject
+from kinertia.report.cohort_tables import write_person
+from kinertia.report.files import save_fit
+from kinertia.studies.cohort_cluster import Job
+from kinertia.studies.cohort_record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
+
+
+def fit_person(job: Job) -> Record:
+    """Fit one person, and put the results into their place, complete or not at all; says how it ended.
+
+    Nothing is raised: an error in the person's files, or a failure, is what the record says.
+    """
+    started = time.perf_counter()
+    if job.kinertia != VERSION:
+        versions = f"the worker has Kinertia {VERSION}, the command {job.kinertia}: install the same on both"
+        return job.record(FAILED, versions, settled=False)
+    try:
+        wanted = read_subject(job.subject)
+        try:
+            fit = fit_subject(wanted)
+        except KinertiaError as error:
+            return job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
+        judged = verdicts(fit)
+        against = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
+        record = job.record(AGAINST if against else PASSED, against, True, time.perf_counter() - started)
+        _save(fit, wanted, job, record)
+        return record
+    except KinertiaError as error:  # of files that changed in between, or of the folder for the results
+        return job.record(BAD_INPUT, str(error), settled=False)
+    except OSError as error:
+        where = "" if error.filename is None else f"{error.filename}: "
+        told = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
+        return job.record(BAD_INPUT, told, settled=False)
+    except Exception as error:
+        return _failed(job, error)
+
+
+def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
+    """Results, rows of the tables and the record, in one folder that appears at once."""
+    folder = Place(job.cohort, job.person).results
+    command = command_line(["kinertia", "fit", str(job.subject), "-o", str(folder)])
+    with complete_folder(folder, "cohort") as work:
+        save_fit(fit, work, provenance_of(wanted, command))
+        write_person(work, job.person, fit)
+        (work / RECORD).write_text(record.text(), encoding="utf-8")
+
+
+def _unchanged(job: Job) -> bool:
+    """Whether the files are still there as they were: an error of a drive that was away is none of theirs."""
+    try:
+        return inputs_of(read_subject(job.subject)) == job.inputs
+    except (KinertiaError, OSError):
+        return False
+
+
+def _failed(job: Job, error: Exception) -> Record:
+    """Kinertia's own failure, with a log beside its record."""
+    log = Place(job.cohort, job.person).failure.with_suffix(".log")
+    told = traceback.format_exception_only(error)[-1].strip()
+    sentence = f"Kinertia failed, which it should not on any input ({told}); please send {log} to its developers"
+    write_then_rename(log, "".join(traceback.format_exception(error)))
+    return job.record(FAILED, sentence, settled=not isinstance(error, MemoryError))

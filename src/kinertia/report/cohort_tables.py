@@ -1,0 +1,226 @@
+"""The tables of a cohort: a person's rows beside the person's results, and everybody's gathered from there.
+
+They are Parquet files: columns with types, compressed, of which programs read only what they ask for.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinertia.checks.verdict import residual_verdicts, verdict_of_markers, worst_level
+from kinertia.errors import FileError
+from kinertia.estimation.cycles import cycle_columns
+from kinertia.estimation.result import Fit
+from kinertia.io.spreadsheet import inert
+from kinertia.io.working_folder import working_folder
+from kinertia.report.cycle_figures import MOST_STRIDES
+from kinertia.report.files import summary
+from kinertia.studies.cohort_cluster import expect_extra
+from kinertia.studies.cohort_record import Place, Record
+
+if TYPE_CHECKING:
+    import pyarrow
+
+_SIZES = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
+_STAGES = ("literature", "corrected", "estimate")
+_RESIDUALS = [
+    f"{kind}_{size}_{stage}" for kind in ("residual", "full_residual") for size in _SIZES for stage in _STAGES
+]
+_NUMBERS = ("cutoff_hz", "motion_hz", "force_cutoff_hz", "impact_force_rms_N", "mass_from_force_kg")
+_COLUMNS: Mapping[str, Mapping[str, str]] = {
+    "cohort": {
+        **dict.fromkeys(("person", "trial", "segment", "parameter", "unit"), "string"),
+        **dict.fromkeys(("literature", "estimate", "sd", "information"), "double"),
+    },
+    "trials": {
+        **dict.fromkeys(("person", "trial"), "string"),
+        **dict.fromkeys(("n_frames", "n_dynamic_frames"), "int64"),
+        **dict.fromkeys(("window_start_s", "window_end_s", *_NUMBERS, "seconds"), "double"),
+        **dict.fromkeys(("marker_rms_m_ik", "marker_rms_m_final", *_RESIDUALS), "double"),
+        **dict.fromkeys(("verdict", "against"), "string"),
+    },
+    "cycles": {
+        **dict.fromkeys(("person", "trial", "side"), "string"),
+        **dict.fromkeys(("stride", "percent"), "int64"),
+        "quantity": "string",
+        **dict.fromkeys(("value", "sd"), "double"),
+    },
+    "people": {
+        "person": "string",
+        "status": "int64",
+        "sentence": "string",
+        "inputs": "string",
+        "kinertia": "string",
+        "trials": "int64",
+        "seconds": "double",
+    },
+}
+"""Columns of every table with their types, as pyarrow names them."""
+OF_A_PERSON = ("cohort", "trials", "cycles")
+_ROWS_AT_ONCE = 50_000
+"""Rows of one piece of a table, or of one person if these are more: a file keeps a line on each column of each piece,
+which for ten thousand people with a piece each would be more than the numbers."""
+
+
+def write_person(folder: Path, person: str, fit: Fit) -> None:
+    """Write a person's rows of the tables, into the folder of the person's results."""
+    from pyarrow import parquet
+
+    for name, columns in zip(OF_A_PERSON, (_bsp(fit), _trials(fit), _cycles(fit)), strict=True):
+        rows = len(next(iter(columns.values())))
+        parquet.write_table(_table(name, {"person": [person] * rows, **columns}), folder / f"{name}.parquet")
+
+
+def write_tables(cohort: Path, records: Iterable[Record], with_csv: bool) -> None:
+    """Write everybody's rows, in the order of the records, into the folder of the cohort; each table at once.
+
+    In memory is one piece at a time, however many people there are. The list of people is a CSV file, too, always.
+    """
+    from pyarrow import parquet
+
+    with _tables_in(cohort, with_csv) as tables:
+        for record in records:
+            tables["people"].add(_table("people", {name: [value] for name, value in asdict(record).items()}))
+            if record.fitted:
+                folder = Place(cohort, record.person).results
+                for name in OF_A_PERSON:
+                    tables[name].add(parquet.read_table(folder / f"{name}.parquet"))
+
+
+def read_cohort(folder: str | Path) -> dict[str, Any]:
+    """The tables of a cohort, as lazy frames: nothing is in memory before it is asked for.
+
+    They are Dask's data frames: what pandas users write works on them, `compute()` makes a pandas table of the result,
+    and a filter reads of the files what it needs. DuckDB and pyarrow read the same Parquet files as well; Dask is what
+    cohorts are fitted with, so that it is there already, and with a `Client` of a cluster it computes there.
+
+    Args:
+        folder: that `kinertia cohort` has written.
+
+    Returns:
+        by name: "cohort" (body segment parameters), "trials", "cycles" and "people", who is in it and how it ended.
+
+    Raises:
+        FileError: no cohort is there.
+        KinertiaError: dask or pyarrow is not installed.
+
+    Examples:
+        >>> tables = kinertia.read_cohort("out")  # doctest: +SKIP
+        >>> bsp = tables["cohort"]  # doctest: +SKIP
+        >>> bsp[bsp.parameter == "mass"].groupby("segment")["estimate"].mean().compute()  # doctest: +SKIP
+    """
+    expect_extra()
+    from dask import dataframe
+
+    found = {}
+    for name in _COLUMNS:
+        path = Path(folder) / f"{name}.parquet"
+        if not path.is_file():
+            raise FileError(path, "no such file; give a folder that kinertia cohort has written")
+        found[name] = dataframe.read_parquet(path)
+    return found
+
+
+def _bsp(fit: Fit) -> dict[str, Any]:
+    """Body segment parameters; the trials are all that they were estimated from."""
+    columns = fit.bsp_columns()
+    rows = len(columns["segment"])
+    told = {name: columns.get(name, [None] * rows) for name in _COLUMNS["cohort"] if name not in ("person", "trial")}
+    return {"trial": [", ".join(trial.name for trial in fit.trials)] * rows, **told}
+
+
+def _trials(fit: Fit) -> dict[str, Any]:
+    """What `fit.json` says of every trial, and the trial's own verdicts."""
+    rows = []
+    for told, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
+        row = {
+            f"{key}_{stage}": one
+            for key, value in told.items()
+            if isinstance(value, dict)
+            for stage, one in value.items()
+        }
+        judged = [*residual_verdicts(trial), verdict_of_markers(fit, trial)]
+        row |= {key: value for key, value in told.items() if not isinstance(value, dict)}
+        row |= {"trial": trial.name, "seconds": row["seconds_total"], "verdict": worst_level(judged)}
+        row |= dict(zip(("window_start_s", "window_end_s"), told["window_s"], strict=True))
+        row["against"] = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
+        rows.append(row)
+    return {name: [row[name] for row in rows] for name in _COLUMNS["trials"] if name != "person"}
+
+
+def _cycles(fit: Fit) -> dict[str, Any]:
+    """The rows of the person's `cycles.csv`."""
+    return cycle_columns(fit.trials, fit.mass_kg, "estimate", MOST_STRIDES)
+
+
+def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:
+    """A table with its types; what is not known is null."""
+    import pyarrow
+
+    schema = pyarrow.schema(list(_COLUMNS[name].items()))
+    return pyarrow.table(
+        {
+            key: pyarrow.array(columns[key], field.type, from_pandas=True)
+            for key, field in zip(schema.names, schema, strict=True)
+        },
+        schema,
+    )
+
+
+class _GrowingTable:
+    """A table that is written in pieces."""
+
+    def __init__(self, path: Path, name: str, csv_path: Path | None, open_files: ExitStack) -> None:
+        from pyarrow import parquet
+
+        self._waiting: list[pyarrow.Table] = []
+        self._schema = _table(name, {key: [] for key in _COLUMNS[name]}).schema
+        self._parquet = open_files.enter_context(parquet.ParquetWriter(path, self._schema))
+        self._csv = None
+        if csv_path is not None:
+            file = open_files.enter_context(csv_path.open("w", encoding="utf-8", newline=""))
+            self._csv = csv.writer(file, lineterminator="\n")
+            self._csv.writerow(self._schema.names)
+
+    def add(self, rows: pyarrow.Table) -> None:
+        """Add rows; a full piece is written."""
+        self._waiting.append(rows)
+        if sum(table.num_rows for table in self._waiting) >= _ROWS_AT_ONCE:
+            self.write()
+
+    def write(self) -> None:
+        """Write what waits."""
+        import pyarrow
+
+        piece = pyarrow.concat_tables([self._schema.empty_table(), *self._waiting])
+        self._waiting = []
+        if not piece.num_rows:
+            return
+        self._parquet.write_table(piece, row_group_size=piece.num_rows)
+        if self._csv is not None:
+            columns = [column.to_pylist() for column in piece.columns]
+            self._csv.writerows([inert(cell) for cell in row] for row in zip(*columns, strict=True))
+
+
+@contextmanager
+def _tables_in(folder: Path, with_csv: bool) -> Iterator[dict[str, _GrowingTable]]:
+    """Tables to add to; their files take the place of older ones when the block ends without an error."""
+    with working_folder(folder) as work:
+        with ExitStack() as open_files:
+            tables = {}
+            for name in _COLUMNS:
+                # a CSV file of an earlier run is not left to be of other people
+                wanted = with_csv or name == "people" or (folder / f"{name}.csv").exists()
+                csv_path = work / f"{name}.csv" if wanted else None
+                tables[name] = _GrowingTable(work / f"{name}.parquet", name, csv_path, open_files)
+            yield tables
+            for table in tables.values():
+                table.write()
+        for path in [*work.glob("*.parquet"), *work.glob("*.csv")]:
+            os.replace(path, folder / path.name)

@@ -1,0 +1,184 @@
+"""The processes that fit a cohort: Dask's, on this computer or on a cluster that runs already.
+
+What is to be done where, and again where a process was killed, is Dask's to say. One process works on one person at a
+time, with one thread of the linear algebra library, as Dask sets it for its workers.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from kinertia.errors import KinertiaError, SettingsError
+from kinertia.io.provenance import VERSION
+from kinertia.studies.cohort_record import FAILED, Record, Standing, one_line
+
+HOW = "pip install 'kinertia[cohort]'"
+_NEEDED = ("dask", "distributed", "pyarrow")
+PERSON_MEMORY_BYTES = 2 * 1024**3
+"""What a fit is given at least: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
+RETRIES = 2
+"""How often a person is tried again whose process was killed."""
+_SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
+"""Of one processor, for a rough guess before anything was measured: see `docs/long-trials.md`."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One person to fit.
+
+    Attributes:
+        person: name.
+        subject: the subject file.
+        cohort: folder of the cohort's results, as workers see it.
+        inputs: SHA-256 of what goes into the fit.
+        trials: how many.
+        kinertia: version of the command, which has to be the worker's.
+    """
+
+    person: str
+    subject: Path
+    cohort: Path
+    inputs: str
+    trials: int
+    kinertia: str = VERSION
+
+    def record(self, status: int, sentence: str, settled: bool, seconds: float = 0.0) -> Record:
+        """How it ended; `settled` where the same input always ends so."""
+        inputs = self.inputs if settled else ""
+        return Record(self.person, status, one_line(sentence), inputs, self.kinertia, self.trials, round(seconds, 1))
+
+
+@dataclass(frozen=True)
+class ClusterSize:
+    """Processes on this computer, and the memory that each may take, bytes."""
+
+    workers: int
+    memory_bytes: int
+
+
+def expect_extra() -> None:
+    """Raise a KinertiaError that says what to install, unless it is there."""
+    missing = [name for name in _NEEDED if find_spec(name) is None]
+    if missing:
+        verb = "are" if missing[1:] else "is"
+        raise KinertiaError(f"cohorts need {' and '.join(missing)}, which {verb} not installed; install: {HOW}")
+
+
+def local_size(people: int) -> ClusterSize:
+    """One process per core, fewer where memory or people do not suffice for so many."""
+    from dask.system import CPU_COUNT
+    from distributed.system import MEMORY_LIMIT
+
+    workers = max(1, min(CPU_COUNT, MEMORY_LIMIT // PERSON_MEMORY_BYTES, people))
+    return ClusterSize(workers, MEMORY_LIMIT // workers)
+
+
+def guessed_seconds(due: Sequence[Standing], workers: int) -> float:
+    """Roughly how long fits take; of one processor for each process."""
+    each = [_SECONDS_PER_PERSON + _SECONDS_PER_FRAME * one.frames for one in due]
+    return max(sum(each) / workers, max(each, default=0.0))
+
+
+@contextmanager
+def local_cluster(size: ClusterSize) -> Iterator[Any]:
+    """A client of processes on this computer, which end with the block."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    settings = {
+        "distributed.scheduler.allowed-failures": RETRIES,
+        # a process that is killed takes with it what waits there, too: let it wait with the scheduler
+        "distributed.scheduler.worker-saturation": 1.0,
+        "logging": {"distributed": "critical"},
+    }
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=size.workers,
+            threads_per_worker=1,
+            memory_limit=size.memory_bytes,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        client.register_plugin(_undisturbed())
+        yield client
+
+
+@contextmanager
+def running_cluster(address: str) -> Iterator[Any]:
+    """A client of a scheduler that runs already.
+
+    Raises:
+        SettingsError: nothing answers there.
+    """
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        told = one_line(str(error))
+        raise SettingsError(
+            f"--scheduler {address}: no Dask scheduler answers there ({told}); start it, or check the "
+            "address that it shows, like tcp://node7:8786"
+        ) from None
+    with client:
+        yield client
+
+
+def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Job]) -> Iterator[Record]:
+    """How each job ended, as they end.
+
+    Args:
+        client: of the cluster.
+        fit_person: a function of a module, which workers import by its name; what it raises is the person's failure.
+        jobs: each a person.
+
+    Raises:
+        KinertiaError: the scheduler is gone.
+    """
+    from distributed import as_completed
+
+    of_key = {f"kinertia-{k}-{job.inputs}": job for k, job in enumerate(jobs)}
+    futures = [client.submit(fit_person, job, key=key, pure=False) for key, job in of_key.items()]
+    for future in as_completed(futures):
+        job = of_key[future.key]
+        if future.status == "finished":
+            yield future.result()
+        elif future.status == "error":
+            yield job.record(FAILED, _told(future.exception()), settled=False)
+        else:
+            raise KinertiaError("the Dask scheduler is gone; what is finished is kept: run the command again")
+        future.release()
+
+
+def _told(error: BaseException) -> str:
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        times = error.allowed_failures + 1
+        return (
+            f"the process that fitted it was killed {times} times, mostly for lack of memory; the next run tries "
+            "again: close other programs, or use a computer with more memory"
+        )
+    return f"its fit could not be run on the cluster ({type(error).__name__}: {error}); the next run tries again"
+
+
+def _undisturbed() -> Any:
+    """A plugin: Ctrl-C is for the process that waits, which ends the others in order."""
+    from distributed import WorkerPlugin
+
+    class Undisturbed(WorkerPlugin):  # type: ignore[misc]
+        def setup(self, worker: Any) -> None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Undisturbed()

@@ -1,0 +1,115 @@
+"""Who is in a study: a folder with a folder per person, or a CSV file with a row per person."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from kinertia.errors import FileError
+from kinertia.io.file_names import fits_everywhere, path_from, same_name_key
+from kinertia.io.subject_file import subject_file_in
+
+_RECORDINGS = (".c3d", ".trc")
+_SEPARATORS = ",;\t"
+
+
+@dataclass(frozen=True)
+class Person:
+    """One person of a study.
+
+    Attributes:
+        name: in tables, and of the folder of results.
+        subject: the subject file; None where there is none.
+        problem: why there is none, in one line; empty otherwise.
+    """
+
+    name: str
+    subject: Path | None
+    problem: str = ""
+
+
+def people_of(study: Path, output: Path) -> list[Person]:
+    """Everybody in a study, by name (folders) or in the order of the rows (CSV).
+
+    Args:
+        study: a folder with one folder per person, each with a subject file; or a CSV file with the columns `subject`
+            (path of a subject file, from the CSV file's folder) and, if wanted, `name`.
+        output: folder for the results, which may be inside the study and is nobody's.
+
+    Raises:
+        FileError: no such study, nobody in it, columns missing, or names that cannot be folders side by side.
+    """
+    if study.is_dir():
+        found = list(_of_folders(study, output.resolve()))
+        lack = "none of its folders holds a subject file or recordings; give the folder that holds the people's folders"
+        _check_names(study, [(None, person.name) for person in found])
+    elif study.is_file():
+        rows = list(_of_rows(study))
+        found = [person for _, person in rows]
+        lack = "has a heading and no rows; give one row per person"
+        _check_names(study, [(line, person.name) for line, person in rows])
+    else:
+        raise FileError(study, "no such folder or file; give a folder with a folder per person, or a CSV file")
+    if not found:
+        raise FileError(study, lack)
+    return found
+
+
+def _of_folders(study: Path, output: Path) -> Iterator[Person]:
+    """Folders with a subject file, or with recordings that want one; others are nobody's."""
+    for folder in sorted(study.iterdir()):
+        if not folder.is_dir() or folder.name.startswith(".") or folder.resolve() == output:
+            continue
+        kinds = {path.suffix.lower() for path in folder.iterdir()}
+        if ".toml" in kinds:
+            try:
+                yield Person(folder.name, subject_file_in(folder))
+            except FileError as error:
+                yield Person(folder.name, None, str(error))
+        elif kinds.intersection(_RECORDINGS):
+            yield Person(folder.name, None, f"no subject file; kinertia init {folder} drafts one")
+
+
+def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
+    """Line number and person of every row."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise FileError(path, "is not UTF-8 text; save it as CSV UTF-8 (Excel: 'CSV UTF-8')") from None
+    heading = lines[0] if lines else ""
+    reader = csv.DictReader(lines, delimiter=max(_SEPARATORS, key=heading.count))
+    columns = [column.strip() for column in reader.fieldnames or ()]
+    if "subject" not in columns:
+        listed = ", ".join(columns) or "none"
+        raise FileError(path, f"has no column 'subject' (the path of each person's subject file); found: {listed}", 1)
+    reader.fieldnames = columns
+    for row in reader:
+        written = (row["subject"] or "").strip()
+        if not written:
+            raise FileError(path, "the column 'subject' is empty; give the path of a subject file", reader.line_num)
+        subject = path_from(path.parent, written)
+        yield reader.line_num, Person((row.get("name") or "").strip() or _name_of(subject), subject)
+
+
+def _name_of(subject: Path) -> str:
+    """What tells a subject file from others: its own name, or that of its folder."""
+    return subject.resolve().parent.name if subject.stem.lower() == "subject" else subject.stem
+
+
+def _check_names(study: Path, named: Sequence[tuple[int | None, str]]) -> None:
+    seen: dict[str, str] = {}
+    for line, name in named:
+        if not fits_everywhere(name):
+            raise FileError(
+                study,
+                f"'{name}' cannot be the name of a folder on every system (none of < > : \" / \\ | ? *, no dot or "
+                "blank at the end, no device of Windows); give the person another name",
+                line,
+            )
+        key = same_name_key(name)
+        if key in seen:
+            both = "twice" if seen[key] == name else f"and so is '{seen[key]}': one folder on Windows and macOS"
+            raise FileError(study, f"'{name}' is there {both}; give every person a name of their own", line)
+        seen[key] = name

@@ -1,0 +1,187 @@
+"""What is known of each person of a cohort from earlier runs, and who has to be fitted again.
+
+A person's results and the record of what they are from appear in one folder at once (`people/NAME/person.json`); of a
+person who cannot be fitted there is only the record (`failed/NAME.json`). A record says by one SHA-256 what went into
+the fit: every entry of the subject file, with the content of the files in place of their names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from kinertia.errors import KinertiaError
+from kinertia.io.frame_count import frame_count
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.provenance import VERSION, sha256
+from kinertia.io.subject_file import SubjectFile, read_subject
+from kinertia.io.working_folder import sweep
+from kinertia.studies.cohort_people import Person
+
+RECORD = "person.json"
+PASSED, AGAINST, BAD_INPUT, FAILED = 0, 1, 2, 70
+"""Statuses of people, as of commands."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """How the fit of one person ended.
+
+    Attributes:
+        person: name.
+        status: 0 passed, 1 a check failed, 2 an error in the person's files, 70 Kinertia or its process failed.
+        sentence: what failed; empty where nothing did.
+        inputs: SHA-256 of all that went in; empty where the same input may end otherwise.
+        kinertia: version that did it.
+        trials: how many.
+        seconds: of computing.
+    """
+
+    person: str
+    status: int
+    sentence: str
+    inputs: str
+    kinertia: str
+    trials: int
+    seconds: float
+
+    @property
+    def fitted(self) -> bool:
+        """Whether there are results."""
+        return self.status in (PASSED, AGAINST)
+
+    def text(self) -> str:
+        """As it is written."""
+        return json.dumps(asdict(self), indent=1) + "\n"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the results of one person go in the folder of a cohort."""
+
+    cohort: Path
+    person: str
+
+    @property
+    def results(self) -> Path:
+        """The folder of the results."""
+        return self.cohort / "people" / self.person
+
+    @property
+    def failure(self) -> Path:
+        """The record of a person without results."""
+        return self.cohort / "failed" / f"{self.person}.json"
+
+    def record(self, inputs: str) -> Record | None:
+        """What an earlier run of this version said of these inputs; None where none did.
+
+        Results of other inputs stay until others take their place: an entry that is changed and changed back costs
+        nothing.
+        """
+        found = (_read(self.results / RECORD), _read(self.failure))
+        return next((one for one in found if one and (one.inputs, one.kinertia) == (inputs, VERSION)), None)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One person before a run.
+
+    Attributes:
+        person: who.
+        trials: how many the subject file names.
+        frames: of all of them, by their headers.
+        inputs: SHA-256 of all that goes into the fit.
+        record: what an earlier run said of these inputs.
+        problem: why nobody can be fitted, in one line; empty otherwise.
+    """
+
+    person: Person
+    trials: int
+    frames: int
+    inputs: str
+    record: Record | None
+    problem: str
+
+    def outcome(self, record: Record | None, cohort: Path) -> Record:
+        """What the list of people says: the record of this run or an earlier one, or why nothing could be fitted."""
+        known = (
+            record or self.record or Record(self.person.name, BAD_INPUT, self.problem, "", VERSION, self.trials, 0.0)
+        )
+        if known.fitted or not Place(cohort, known.person).results.is_dir():
+            return known
+        return replace(known, sentence=f"{known.sentence} (results of other files are in people/{known.person})")
+
+    @property
+    def due(self) -> bool:
+        """Whether there is something to fit."""
+        return not self.problem and self.record is None
+
+
+def prepare_folder(cohort: Path) -> None:
+    """Make the folders that results and records go to, and sweep up what a killed run left there."""
+    for folder in (cohort, cohort / "people", cohort / "failed"):
+        folder.mkdir(parents=True, exist_ok=True)
+        sweep(folder)
+    write_then_rename(cohort / "cohort.json", json.dumps({"kinertia": VERSION, "results": "cohort"}) + "\n")
+
+
+def keep(cohort: Path, record: Record) -> None:
+    """Note how the fit of a person ended who has no results; results bring their own record, and end the other."""
+    failure = Place(cohort, record.person).failure
+    if not record.fitted:
+        write_then_rename(failure, record.text())
+        return
+    for path in (failure, failure.with_suffix(".log")):
+        path.unlink(missing_ok=True)
+
+
+def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
+    """Everybody, one after the other: all files are read for their hashes."""
+    for person in people:
+        try:
+            wanted = None if person.subject is None else read_subject(person.subject)
+            inputs = "" if wanted is None else inputs_of(wanted)
+        except (KinertiaError, OSError) as error:
+            yield Standing(person, 0, 0, "", None, one_line(str(error)))
+            continue
+        trials = () if wanted is None else wanted.trials
+        frames = sum(frame_count(trial.markers) for trial in trials)
+        record = Place(cohort, person.name).record(inputs) if inputs else None
+        yield Standing(person, len(trials), frames, inputs, record, person.problem)
+
+
+def inputs_of(wanted: SubjectFile) -> str:
+    """SHA-256 of every entry of a subject file, defaults included, with the content of the files that it names.
+
+    Where the files are and what they are called changes nothing, nor do comments.
+    """
+    content = json.dumps(_contents(wanted.model_dump()), sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _contents(value: Any) -> Any:
+    """The same with SHA-256 in place of paths."""
+    if isinstance(value, Path):
+        return sha256(value)
+    if isinstance(value, Mapping):
+        return {key: _contents(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_contents(each) for each in value]
+    return value
+
+
+def one_line(text: str) -> str:
+    """The text without line ends."""
+    return " ".join(text.split())
+
+
+def _read(path: Path) -> Record | None:
+    """A record; None where there is none, or none of this form: that person is fitted again."""
+    try:
+        return Record(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None

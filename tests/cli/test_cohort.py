@@ -1,0 +1,157 @@
+"""`kinertia cohort`: from a study to one folder per person and one table for all, whatever happens on the way."""
+
+import contextlib
+import hashlib
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import psutil
+import pytest
+
+from command_line import run
+from kinertia.cli.cohort import _LOCK
+from kinertia.io.file_lock import sole_use
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
+from kinertia.synthetic.walk import walk, walking_subject
+
+
+@pytest.fixture
+def lacking(tmp_path, measured_walk):
+    """A study in which nobody can be fitted: one person without a subject file, one whose file has an error."""
+    study = tmp_path / "study"
+    shutil.copytree(measured_walk, study / "Anna")
+    (study / "Anna" / "subject.toml").unlink()
+    shutil.copytree(measured_walk, study / "Ben")
+    subject = study / "Ben" / "subject.toml"
+    subject.write_text(subject.read_text(encoding="utf-8").replace("mass_kg", "mas_kg"), encoding="utf-8")
+    return study
+
+
+def hashes(folder):
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk, tmp_path):
+    shutil.copytree(measured_walk, lacking / "Clara")
+    outcome = run("cohort", lacking, "-o", tmp_path / "out", "--dry-run")
+    assert outcome.status == 1
+    told = " ".join(outcome.out.split())
+    assert "no subject file; kinertia init" in told
+    assert "did you mean 'mass_kg'" in told
+    assert "Clara to fit 1" in told
+    assert "3 people: 1 to fit, 0 as before, 2 without what a fit needs" in told
+    assert "On this computer, in 1 processes" in told
+    assert "very roughly 1 min" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_who_cannot_be_fitted_is_in_the_list_of_people(lacking, tmp_path):
+    out = tmp_path / "out"
+    outcome = run("cohort", lacking, "-o", out)
+    assert outcome.status == 1, outcome.err
+    people = pd.read_csv(out / "people.csv")
+    assert people.person.tolist() == ["Anna", "Ben"]
+    assert people.status.tolist() == [2, 2]
+    assert "not fitted: Ben: " in outcome.out
+    assert len(pd.read_parquet(out / "cohort.parquet")) == 0
+    before = hashes(out)
+    assert run("cohort", lacking, "-o", out).status == 1
+    assert hashes(out) == before
+
+
+def test_two_runs_on_one_folder_refuse_each_other(lacking, tmp_path):
+    out = tmp_path / "out"
+    assert run("cohort", lacking, "-o", out).status == 1
+    before = hashes(out)
+    with sole_use(out / _LOCK, "the folder"):
+        outcome = run("cohort", lacking, "-o", out)
+    assert outcome.status == 2
+    assert "in use by process" in outcome.err
+    assert hashes(out) == before
+
+
+def test_bad_input_is_one_line(tmp_path, monkeypatch):
+    (tmp_path / "people.csv").write_text("file\na.toml\n", encoding="utf-8")
+    outcome = run("cohort", tmp_path / "people.csv", "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "no column 'subject'" in outcome.err
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setattr("kinertia.studies.cohort_cluster.find_spec", lambda name: None if name == "pyarrow" else name)
+    outcome = run("cohort", tmp_path, "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "cohorts need pyarrow, which is not installed; install: pip install 'kinertia[cohort]'" in outcome.err
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Two people who can be fitted, and one without forces."""
+    subject = walking_subject()
+    for k, name in enumerate(("Anna", "Ben")):
+        write_lab(tmp_path / "study" / name, record(subject, walk(subject, 1.6), LabNoise(), np.random.default_rng(k)))
+    shutil.copytree(tmp_path / "study" / "Anna", tmp_path / "study" / "Clara")
+    path = tmp_path / "study" / "Clara" / "subject.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace('forces = "walk_grf.mot"', ""), encoding="utf-8")
+    return tmp_path / "study"
+
+
+@pytest.mark.slow
+def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(study, tmp_path):
+    out = tmp_path / "out"
+    command = [
+        sys.executable,
+        "-c",
+        "from kinertia.cli.start import main; main()",
+        "cohort",
+        str(study),
+        "-o",
+        str(out),
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while process.stderr.readline().strip() != "people":
+            assert process.poll() is None
+        time.sleep(1.0)
+        children = psutil.Process(process.pid).children(recursive=True)
+        workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        assert workers
+        for worker in workers:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                worker.kill()
+        told, errors = process.communicate()
+    assert process.returncode == 1, errors
+    assert "not fitted: Clara: trial 'walk': no force plates" in told
+    people = pd.read_csv(out / "people.csv").set_index("person")
+    assert people.status["Clara"] == 2
+    assert set(people.status[["Anna", "Ben"]]) <= {0, 1}
+    bsp = pd.read_parquet(out / "cohort.parquet")
+    for name in ("Anna", "Ben"):
+        own = pd.read_csv(out / "people" / name / "bsp.csv")
+        rows = bsp[bsp.person == name]
+        for column in ("literature", "estimate", "sd", "information"):
+            np.testing.assert_array_equal(rows[column], own[column])
+    assert not (out / "people" / "Clara").exists()
+    before = hashes(out)
+    again = run("cohort", study, "-o", out)
+    assert again.status == 1
+    assert "3 people: 0 to fit, 3 as before" in again.out
+    assert hashes(out) == before
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_runs_already_is_used(study, tmp_path):
+    from distributed import LocalCluster
+
+    shutil.rmtree(study / "Anna")
+    shutil.rmtree(study / "Ben")
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+        outcome = run("cohort", study, "-o", tmp_path / "out", "--scheduler", cluster.scheduler_address)
+    assert outcome.status == 1, outcome.err
+    assert "not fitted: Clara: trial 'walk': no force plates" in outcome.out
+    assert (tmp_path / "out" / "failed" / "Clara.json").is_file()

@@ -1,0 +1,60 @@
+"""What a worker says of a person who cannot be fitted: nothing is raised, and what may end otherwise is not kept."""
+
+import shutil
+from dataclasses import replace
+from unittest import mock
+
+import pytest
+
+from kinertia.io.subject_file import read_subject
+from kinertia.report.cohort_person import fit_person
+from kinertia.studies.cohort_cluster import Job
+from kinertia.studies.cohort_record import inputs_of, prepare_folder
+
+
+@pytest.fixture
+def job(measured_walk, tmp_path):
+    """A person whose gait trial is the static trial, which no fit can use."""
+    shutil.copytree(measured_walk, tmp_path / "A")
+    subject = tmp_path / "A" / "subject.toml"
+    text = subject.read_text(encoding="utf-8").replace('markers = "walk.c3d"', 'markers = "static.c3d"')
+    subject.write_text(text, encoding="utf-8")
+    prepare_folder(tmp_path / "out")
+    return Job("A", subject, tmp_path / "out", inputs_of(read_subject(subject)), 1)
+
+
+def test_an_error_in_the_files_is_their_record(job):
+    record = fit_person(job)
+    assert (record.status, record.inputs, record.fitted) == (2, job.inputs, False)
+    assert "static" in record.sentence
+    assert not (job.cohort / "people" / "A").exists()
+
+
+def test_an_error_in_files_that_changed_meanwhile_is_not_kept(job):
+    assert fit_person(replace(job, inputs="of other files")).inputs == ""
+    job.subject.unlink()
+    gone = fit_person(job)
+    assert (gone.status, gone.inputs) == (2, "")
+    assert "no such file" in gone.sentence
+
+
+def test_a_worker_of_another_version_fits_nobody(job):
+    record = fit_person(replace(job, kinertia="0.0.1"))
+    assert (record.status, record.inputs) == (70, "")
+    assert "install the same on both" in record.sentence
+
+
+def test_a_failure_of_kinertia_leaves_a_log(job):
+    with mock.patch("kinertia.report.cohort_person.fit_subject", side_effect=ZeroDivisionError("0 / 0")):
+        record = fit_person(job)
+    assert (record.status, record.inputs) == (70, job.inputs)
+    log = job.cohort / "failed" / "A.log"
+    assert str(log) in record.sentence
+    assert "ZeroDivisionError: 0 / 0" in log.read_text(encoding="utf-8")
+
+
+def test_a_full_disk_is_told_and_tried_again(job):
+    with mock.patch("kinertia.report.cohort_person.fit_subject", side_effect=OSError(28, "No space left", "out/x")):
+        record = fit_person(job)
+    assert (record.status, record.inputs) == (2, "")
+    assert record.sentence.startswith("out/x: No space left; ")

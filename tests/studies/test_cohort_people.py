@@ -1,0 +1,77 @@
+"""Who is in a study: folders, and rows of a CSV file."""
+
+import pytest
+
+from kinertia.errors import FileError
+from kinertia.studies.cohort_people import Person, people_of
+
+
+def person(folder, *files):
+    folder.mkdir(parents=True)
+    for name in files:
+        (folder / name).touch()
+    return folder
+
+
+def test_every_folder_with_a_subject_file_is_a_person(tmp_path):
+    anna = person(tmp_path / "Anna", "subject.toml", "walk.c3d")
+    ben = person(tmp_path / "Ben", "ben.toml")
+    person(tmp_path / "notes", "read me.txt")
+    person(tmp_path / ".git", "subject.toml")
+    person(tmp_path / "out", "subject.toml")
+    found = people_of(tmp_path, tmp_path / "out")
+    assert found == [Person("Anna", anna / "subject.toml"), Person("Ben", ben / "ben.toml")]
+
+
+def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
+    clara = person(tmp_path / "Clara", "static.c3d", "walk.C3D")
+    person(tmp_path / "Dora", "one.toml", "two.toml")
+    one, two = people_of(tmp_path, tmp_path / "out")
+    assert one == Person("Clara", None, f"no subject file; kinertia init {clara} drafts one")
+    assert two.subject is None
+    assert "one.toml" in two.problem
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_rows_name_subject_files_from_where_the_table_is(separator, tmp_path):
+    rows = [
+        ("name", "subject", "age"),
+        ("", "a/subject.toml", "7"),
+        ("", "b/S02.toml", ""),
+        ("Zoë", "c\\subject.toml", ""),
+    ]
+    person(tmp_path / "c", "subject.toml")
+    table = tmp_path / "people.csv"
+    table.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8-sig")
+    expected = [Person("a", tmp_path / "a" / "subject.toml"), Person("S02", tmp_path / "b" / "S02.toml")]
+    assert people_of(table, tmp_path / "out") == [*expected, Person("Zoë", tmp_path / "c" / "subject.toml")]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "told"),
+    [
+        ("file,name\na.toml,A\n", 1, "no column 'subject' .*found: file, name"),
+        ("", 1, "no column 'subject'"),
+        ("subject\n", None, "no rows"),
+        ("subject,name\na.toml,A\n,B\n", 3, "'subject' is empty"),
+        ("subject,name\na.toml,A\nb.toml,B\nc.toml,a\n", 4, "'a' is there and so is 'A'"),
+        ("subject\nx/s.toml\ny/s.toml\n", 3, "'s' is there twice"),
+        ("subject,name\na.toml,a:b\n", 2, "'a:b' cannot be the name of a folder"),
+    ],
+)
+def test_a_table_that_cannot_be_says_where(text, line, told, tmp_path):
+    table = tmp_path / "people.csv"
+    table.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=told) as caught:
+        people_of(table, tmp_path / "out")
+    assert caught.value.line == line
+
+
+def test_no_study_and_nobody_in_it_are_errors(tmp_path):
+    with pytest.raises(FileError, match="no such folder or file"):
+        people_of(tmp_path / "nowhere", tmp_path / "out")
+    with pytest.raises(FileError, match="none of its folders"):
+        people_of(tmp_path, tmp_path / "out")
+    (tmp_path / "latin.csv").write_bytes("subject\nZo\xeb.toml\n".encode("latin-1"))
+    with pytest.raises(FileError, match="not UTF-8"):
+        people_of(tmp_path / "latin.csv", tmp_path / "out")

@@ -1,0 +1,97 @@
+"""Who has to be fitted again: whose files, settings or version changed, and nobody else."""
+
+import shutil
+from dataclasses import replace
+
+import pytest
+
+from kinertia.io.provenance import VERSION
+from kinertia.studies.cohort_people import Person
+from kinertia.studies.cohort_record import RECORD, Place, Record, keep, prepare_folder, standings
+
+
+@pytest.fixture
+def subject(measured_walk, tmp_path):
+    """A subject file of one's own to change."""
+    shutil.copytree(measured_walk, tmp_path / "Anna")
+    return tmp_path / "Anna" / "subject.toml"
+
+
+def standing(subject, cohort):
+    (found,) = standings([Person("Anna", subject)], cohort)
+    return found
+
+
+def record_of(found, **changes):
+    whole = Record("Anna", 0, "", found.inputs, VERSION, found.trials, 1.5)
+    return replace(whole, **changes)
+
+
+def put(cohort, record):
+    folder = Place(cohort, record.person).results
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / RECORD).write_text(record.text(), encoding="utf-8")
+
+
+def changed(path, before, after):
+    text = path.read_text(encoding="utf-8")
+    assert before in text
+    path.write_text(text.replace(before, after), encoding="utf-8")
+
+
+def test_only_what_changes_a_fit_is_a_change(subject, tmp_path):
+    cohort = tmp_path / "out"
+    first = standing(subject, cohort)
+    assert (first.due, first.trials, first.problem) == (True, 1, "")
+    assert first.frames > 100
+    put(cohort, record_of(first))
+    assert not standing(subject, cohort).due
+    subject.write_text(subject.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
+    moved = shutil.move(subject.parent, tmp_path / "elsewhere") / "subject.toml"
+    assert not standing(moved, cohort).due
+    changed(moved, "[model]", "[settings]\ncutoff_hz = 6.0\n[model]")
+    assert standing(moved, cohort).due
+    changed(moved, "[settings]\ncutoff_hz = 6.0\n", "")
+    assert not standing(moved, cohort).due
+    with (moved.parent / "walk.c3d").open("ab") as file:
+        file.write(b"\0")
+    assert standing(moved, cohort).due
+
+
+def test_results_of_another_version_are_fitted_again(subject, tmp_path):
+    found = standing(subject, tmp_path / "out")
+    put(tmp_path / "out", record_of(found, kinertia="0.0.1"))
+    assert standing(subject, tmp_path / "out").due
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"person": "Anna"}'])
+def test_a_record_that_cannot_be_read_is_none(text, subject, tmp_path):
+    put(tmp_path, record_of(standing(subject, tmp_path)))
+    (Place(tmp_path, "Anna").results / RECORD).write_text(text)
+    assert standing(subject, tmp_path).due
+
+
+def test_failures_of_the_input_are_kept_until_it_changes_and_others_are_tried_again(subject, tmp_path):
+    prepare_folder(tmp_path)
+    found = standing(subject, tmp_path)
+    keep(tmp_path, record_of(found, status=2, sentence="no plates"))
+    again = standing(subject, tmp_path)
+    assert not again.due
+    assert again.outcome(None, tmp_path).sentence == "no plates"
+    keep(tmp_path, record_of(found, status=70, sentence="killed", inputs=""))
+    assert standing(subject, tmp_path).due
+    put(tmp_path, record_of(found))
+    keep(tmp_path, record_of(found))
+    assert not Place(tmp_path, "Anna").failure.exists()
+    assert standing(subject, tmp_path).outcome(None, tmp_path).fitted
+
+
+def test_results_that_stay_of_other_files_are_told(subject, tmp_path):
+    put(tmp_path, record_of(standing(subject, tmp_path)))
+    changed(subject, "mass_kg", "mas_kg")
+    found = standing(subject, tmp_path)
+    assert not found.due
+    outcome = found.outcome(None, tmp_path)
+    assert (outcome.status, outcome.fitted) == (2, False)
+    assert "did you mean 'mass_kg'" in outcome.sentence
+    assert outcome.sentence.endswith("(results of other files are in people/Anna)")
