@@ -45,9 +45,9 @@ def test_each_side_is_drawn_from_its_own_side_and_from_the_front(fit):
         segment_name(name): 3 if name in ("pelvis", "torso") else 2 for name in fit.estimate.segments
     }
     assert [note["text"] for note in body_figure(fit).layout["annotations"]] == [
-        "<b>from the right</b>",
-        "<b>from the front</b>",
-        "<b>from the left</b>",
+        "<b>right side</b>",
+        "<b>front</b>",
+        "<b>left side</b>",
     ]
     knees = [body["shank, right"][0] - body["pelvis"][0] for body in centres(body_figure(fit), "CoM, literature")[:2]]
     assert knees[1] < -0.05, "the right leg is on the left of a person who faces us"

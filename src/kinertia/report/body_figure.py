@@ -53,9 +53,9 @@ class _View:
 
 
 _VIEWS = (
-    _View("from the right", 0, 1.0, "_r"),
-    _View("from the front", 2, -1.0, ""),
-    _View("from the left", 0, -1.0, "_l"),
+    _View("right side", 0, 1.0, "_r"),
+    _View("front", 2, -1.0, ""),
+    _View("left side", 0, -1.0, "_l"),
 )
 
 
