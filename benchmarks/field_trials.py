@@ -1,6 +1,8 @@
-"""What `kinertia fit` says of trials from laboratories that nothing was built with: regenerates docs/field-trials.md.
+"""What Kinertia says of trials from laboratories that nothing was built with: regenerates docs/field-trials.md.
 
-python benchmarks/field_trials.py
+python benchmarks/field_trials.py FOLDER
+
+FOLDER has the measured trials, one laboratory's in each folder.
 """
 
 from __future__ import annotations
@@ -8,6 +10,8 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import re
+import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -19,7 +23,7 @@ import pandas as pd
 from kinertia.cli.app import main as kinertia
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
 from measured_trials import farthest, table
-from walks import data_folder
+from walks import WALKS, fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
 _LAI_ARNOLD = "LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
@@ -101,15 +105,26 @@ CASES = (
 )
 
 
-def run(case: Case, folder: Path) -> dict[str, Any]:
+def commands(data: Path) -> dict[str, list[str]]:
+    """Title of every trial -> arguments of the command."""
+    fits = {case.title: case.arguments(data) for case in CASES}
+    walks = {f"{title}, built-in model": ["fit", *fit_arguments(data, name)] for name, title in WALKS.items()}
+    files = sorted((data / "c3d_variety").glob("*.c3d"))
+    return {**fits, **walks, **{f"{file.name}": ["check", str(file)] for file in files}}
+
+
+def run(arguments: list[str], folder: Path) -> dict[str, Any]:
     """Exit status, seconds, last words and, where there is an estimate, fit.json with the BSP table under "bsp"."""
     said, status, started = io.StringIO(), 0, time.perf_counter()
+    more = ["-o", str(folder), "--quiet"] if arguments[0] == "fit" else []
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         try:
-            kinertia([*case.arguments(data_folder()), "-o", str(folder), "--quiet"])
+            kinertia([*arguments, *more])
         except SystemExit as ended:
             status = int(ended.code or 0)
-    found = {"status": status, "seconds": time.perf_counter() - started, "said": said.getvalue().strip()}
+    found = {"command": arguments[0], "status": status, "seconds": time.perf_counter() - started}
+    # a path may be another one tomorrow
+    found["said"] = re.sub(r"(?<![\w.])/[^ :]*/", "", said.getvalue().strip())
     if (folder / "fit.json").exists():
         found |= {"fit": json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
     return found
@@ -117,9 +132,12 @@ def run(case: Case, folder: Path) -> dict[str, Any]:
 
 def document(runs: dict[str, dict[str, Any]]) -> str:
     """The text of docs/field-trials.md."""
-    rows, warnings = [], []
+    rows, warnings, files = [], [], []
     for title, found in runs.items():
         begin = [title, str(found["status"])]
+        if found["command"] == "check":
+            files.append([*begin, conclusion(found["said"])])
+            continue
         if "fit" not in found:
             rows.append([*begin, *["-"] * 7, f"{found['seconds']:.0f}"])
             warnings.append(f"- {title}: {' '.join(found['said'].split())}")
@@ -147,14 +165,22 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
     heads = ["trial", "exit status", "cutoff before (Hz)"]
     heads += [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("before", "after")]
     heads += ["markers, before / after (mm)", "converged, parameters beyond 3 sd (farthest)", "s"]
-    return TEXT.format(results=table(heads, rows), warnings="\n".join(warnings))
+    checked = table(["file", "exit status", "what stands against it"], files)
+    return TEXT.format(results=table(heads, rows), warnings="\n".join(warnings), files=checked)
+
+
+def conclusion(said: str) -> str:
+    """What stands against a file by the words of `kinertia check`, on one line."""
+    findings = re.split(r"\s(?=(?:pass|fail|caution|assumed|error): )", " ".join(said.split()))
+    against = [one for one in findings if one.startswith(("fail:", "error:"))]
+    return "; ".join(against).replace("|", "\\|") or "nothing stands against it"
 
 
 TEXT = """# Field trials
 
-What `kinertia fit` says of recordings that nothing here was built with: runs, a drop jump, a walk and squats from other
-laboratories, with their own models or static trials, files as they were published. This page is written by
-`python benchmarks/field_trials.py`; do not edit it by hand.
+What Kinertia says of recordings from other laboratories: walks, runs, a drop jump and squats, with their own models or
+static trials, files as they were published. This page is written by `python benchmarks/field_trials.py FOLDER`; do not
+edit it by hand.
 
 Exit status 0: every check passed; 1: there is an estimate, and a check of it failed; 2: refused. *Before*: the model's
 or the literature's body segment parameters on the measured motion, both smoothed at the cutoff in the table, as a
@@ -166,13 +192,23 @@ are this machine's.
 ## Warnings given
 
 {warnings}
+
+## Other files
+
+C3D files of other makers, which hold no gait or lack what a fit needs: what `kinertia check` says of each.
+
+{files}
 """
 
 
 def main() -> None:
     """Write the page."""
+    data = Path(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
-        runs = {case.title: run(case, Path(folder) / str(k)) for k, case in enumerate(CASES)}
+        runs = {}
+        for k, (title, arguments) in enumerate(commands(data).items()):
+            runs[title] = run(arguments, Path(folder) / str(k))
+            print(f"{title}: status {runs[title]['status']}, {runs[title]['seconds']:.0f} s", flush=True)
     DOCUMENT.write_text(document(runs), encoding="utf-8")
 
 

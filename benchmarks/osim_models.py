@@ -123,8 +123,9 @@ What `kinertia fit --model` gives with three models as their users have them: ga
 OpenSim, and subject4's, scaled by AddBiomechanics (two walks and a series of squats pooled). This page is written by
 `python benchmarks/osim_models.py`; do not edit it by hand.
 
-*As it is*: markers and joints stay where the model has them. *Calibrated* (`--calibrate`): markers, and the centres of
-joints that turn about three axes (hips, back, shoulders), may move. Plates and clock are calibrated in both.
+*As it is*: markers and joints stay where the model has them; the estimate knows how far off they are. *Calibrated*
+(`--calibrate`): markers, and the centres of joints that turn about three axes (hips, back, shoulders), may move. Plates
+and clock are calibrated in both.
 
 ## Residual at the root, and markers
 

@@ -45,12 +45,21 @@ def _stated(value: object) -> tuple[float, float]:
 
 
 Stated = Annotated[tuple[float, float], BeforeValidator(_stated)]
+
+
+def sex_of(value: object) -> object:
+    """ "male" or "female", of which one letter is enough; anything else as it is."""
+    known = ("male", "female")
+    word = value.strip().lower() if isinstance(value, str) else ""
+    return next((sex for sex in known if word and word in (sex, sex[0])), value)
+
+
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
 ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_cutoff)]
 
 
 class Table(BaseModel):
-    """A table of the subject file: unknown keys are errors, values are never converted, nothing changes afterwards."""
+    """A table of the subject file: unknown keys are errors, types are never converted, nothing changes afterwards."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -66,11 +75,16 @@ class Subject(Table):
     """
 
     name: str = Field(min_length=1, description="name in files and report; left out: the folder's name")
-    sex: Literal["male", "female"] | None = Field(
+    sex: Annotated[Literal["male", "female"] | None, BeforeValidator(sex_of)] = Field(
         default=None, description='"male" or "female": which table of the literature'
     )
     mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
     height_m: float | None = Field(default=None, description="stature, m")
+    knee_width_mm: float | None = Field(
+        default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"
+    )
+    ankle_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the ankle, mm")
+    elbow_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the elbow, mm")
 
     @model_validator(mode="before")
     @classmethod

@@ -158,11 +158,11 @@ def fit_at_once(monkeypatch, short_fit, person):
     """`kinertia fit` with these options on a fit that is there already and did not converge; counts its runs."""
     done = []
 
-    def run_fit(_):
+    def run_fit(wanted, progress):
         done.append(1)
         return replace(short_fit, converged=False)
 
-    monkeypatch.setattr("kinertia.cli.fit._run", run_fit)
+    monkeypatch.setattr("kinertia.cli.fit.fit_subject", run_fit)
 
     def fit(*options):
         return run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", *options)

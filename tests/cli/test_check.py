@@ -83,7 +83,7 @@ def test_a_verdict_against_is_status_1(lab, options, words):
         (["walk.trc", "static.trc", "walk_grf.mot", "more_grf.mot"], "goes with none of the marker files"),
         (["walk.trc", "--mass", "-5"], "mass_kg = -5"),
         (["walk.trc", "--mass", "0"], "mass_kg = 0"),
-        (["walk.csv"], "a '.csv' file cannot be checked"),
+        (["walk.xlsx"], "a '.xlsx' file cannot be checked"),
         (["loads.xml"], "give ExternalLoads with --loads"),
         (["subject.toml", "walk.trc"], "give it alone"),
         (["subject.toml", "--mass", "70"], "give it alone"),

@@ -33,6 +33,27 @@ def test_the_report_is_written_again_as_it_was(results):
     assert "<code>kinertia " in before  # command and files stay known
 
 
+def test_the_report_with_norms(fit, results):
+    """Norms as the docs make them: mean and spread of what `cycles.csv` has."""
+    grouped = fit.cycles().groupby(["quantity", "percent"])["value"].agg(mean="mean", sd="std").dropna()
+    assert len(grouped) > 500
+    file = results.parent / "adults.csv"
+    grouped.reset_index().to_csv(file, index=False)
+    told = run("report", results, "--norms", file)
+    assert told.status == 0, told.err
+    assert "note" not in told.out
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert page.count("norm, mean ") > 20
+    file.write_text("quantity,percent,mean,sd\nknee_angle_moment,0,0,1\nkneecap,0,0,1\n")
+    told = run("report", results, "--norms", file)
+    assert told.status == 0
+    assert "note: norms that this fit has no curve for: kneecap" in told.out
+    file.write_text("quantity,percent,mean,sd\nkneecap,0,0,1\n")
+    told = run("report", results, "--norms", file)
+    assert told.status == 2
+    assert "no quantity of it is among the curves of this fit (the first is kneecap)" in told.err
+
+
 def test_export_says_what_the_tables_say(fit, results):
     folder = results.parent / "export"
     for _ in range(2):  # its own results are replaced

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import TrialError
-from kinertia.estimation.force_mass import check_force_masses, check_masses, force_mass
+from kinertia.estimation.force_mass import check_force_masses, check_masses, force_mass, unit_hint
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
 
@@ -82,3 +82,20 @@ def test_trials_of_different_masses_are_not_pooled(made):
 def test_too_short_a_window_says_nothing(made):
     short = replace(trial(made), measured=np.arange(len(made.time)) < 8)
     assert force_mass(made.skeleton, short) is None
+
+
+@pytest.mark.parametrize(
+    ("by_force", "stated", "words"),
+    [
+        (72.6 / 9.81, 72.6, "the forces look to be in kg"),
+        (72.0, 72.6 / 0.4536, "the stated mass looks to be in pounds"),
+        (0.0726, 72.6, "in kN"),
+        (72.6 * 0.2248, 72.6, "in pounds-force"),
+        (66.0, 72.6, ""),
+        (50.0, 72.6, ""),
+        (100.0, 72.6, ""),
+    ],
+)
+def test_units_are_told_from_people(by_force, stated, words):
+    assert words in unit_hint(by_force, stated)
+    assert bool(unit_hint(by_force, stated)) == bool(words)

@@ -4,6 +4,7 @@ import pytest
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.errors import FileError
 from kinertia.io.c3d import read_c3d
+from kinertia.io.recording import read_recording
 
 GRAVITY = 9.80665
 CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)  # mm, type 2: z down
@@ -365,6 +366,17 @@ def test_real_file_cut_anywhere(shared_data, tmp_path):
         (tmp_path / "x.c3d").write_bytes(whole[:size])
         with pytest.raises(FileError, match="truncated"):
             read_c3d(tmp_path / "x.c3d")
+
+
+@pytest.mark.parametrize("told", ["", "m", "inch"])
+def test_a_stated_length_unit_goes_before_what_the_file_says(tmp_path, told):
+    person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (0.6, 0.5, 1.8), (4, 9, 3))
+    file = write_c3d(tmp_path / "x.c3d", 100.0 * person, [f"M{k}" for k in range(9)], unit=told)
+    found = read_recording(file, length_unit="cm")
+    assert found.length_unit == "cm"
+    extents = np.ptp(found.markers.positions[..., 1], axis=1)
+    np.testing.assert_allclose(extents, np.ptp(person[..., 2], axis=1), atol=1e-6)
+    assert f"read in cm, as stated; POINT:UNITS says '{told}'" in " ".join(found.notes)
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 0.001), ("cm", 0.01), ("m", 1.0)])

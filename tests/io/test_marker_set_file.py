@@ -27,7 +27,8 @@ def test_each_preset_finds_its_own_files(shared_data, path, name):
 
 
 def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(shared_data):
-    labels = read_recording(shared_data / "subject4/static1.trc").markers.labels
+    known = read_recording(shared_data / "subject4/static1.trc").markers.labels
+    labels = [label.replace("_", "").lower() for label in known]
     with pytest.raises(MarkerSetError, match=r"no marker-set preset fits.*nearest: ") as caught:
         choose_marker_set(labels)
     assert caught.value.missing
@@ -39,6 +40,8 @@ def test_presets_refuse_each_others_labels(name):
     preset = read_marker_set(name)
     for other in preset_names():
         labels = read_marker_set(other).labels
+        if {other, name} == {"cgm2", "plug-in-gait"}:
+            continue  # the former has the latter's markers, and more
         if other == name:
             check_marker_set(preset, labels)
             assert choose_marker_set(labels) == preset
@@ -112,5 +115,8 @@ def test_the_same_key_in_two_tables_is_told_apart(tmp_path):
 
 
 def test_an_unknown_preset_lists_those_that_exist():
-    with pytest.raises(FileError, match=r"no such marker set.*cleveland-clinic, plug-in-gait, rajagopal, rajagopal-"):
+    with pytest.raises(
+        FileError,
+        match=r"no such marker set.*cgm2, cleveland-clinic, opencap, opencap-mocap, plug-in-gait, rajagopal, r",
+    ):
         read_marker_set("helen-hayes")

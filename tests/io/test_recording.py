@@ -61,9 +61,9 @@ def test_strings_will_do(files):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("walk_grf.mot",), "cannot read markers from a '.mot' file; expected .trc or .c3d"),
-        (("walk.csv",), "cannot read markers from a '.csv' file; expected .trc or .c3d"),
-        (("walk.trc", "walk.c3d"), "cannot read forces from a '.c3d' file; expected .mot or .sto"),
+        (("walk_grf.mot",), "cannot read markers from a '.mot' file; expected .trc, .c3d, .tsv or .csv"),
+        (("walk.xlsx",), "cannot read markers from a '.xlsx' file; expected .trc, .c3d, .tsv or .csv"),
+        (("walk.trc", "walk.c3d"), "cannot read forces from a '.c3d' file; expected .mot, .sto or .tsv"),
         (("walk.trc", "walk_grf.mot", "walk.trc"), "cannot read external loads from a '.trc' file; expected .xml"),
         (("wlak.trc",), "no such file; looked in {folder}, the nearest names there are walk.trc"),
         (("walk.trc", "walk_grff.mot"), "nearest names there are walk_grf.mot"),

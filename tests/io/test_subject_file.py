@@ -1,5 +1,6 @@
 import os
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from kinertia.errors import FileError
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.io.toml_lines import TomlFile
-from kinertia.settings import Settings
+from kinertia.settings import Settings, Subject
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 elsewhere = pytest.mark.skipif(os.name == "nt", reason="Windows has drives")
@@ -184,7 +185,7 @@ CASES = [
     ("loads =", "load =", 13, "unknown key 'load' in [trial]; did you mean 'loads'?"),
     ('sex = "female"\n', "", 1, "[subject] lacks 'sex'"),
     ('markers = "data/walk2.c3d"\n', "", 16, "[trial] lacks 'markers'"),
-    ('sex = "female"', 'sex = "f"', 2, 'sex = "f": must be "male" or "female"'),
+    ('sex = "female"', 'sex = "x"', 2, 'sex = "x": must be "male" or "female"'),
     ('bsp = "deleva"', 'bsp = "leva"', 21, 'must be "dumas" or "deleva"'),
     ("symmetry = false", 'symmetry = "no"', 22, 'symmetry = "no"'),
     ("cutoff_hz = 6", "cutoff_hz = 0", 23, 'must be "gcv" or a positive frequency in Hz'),
@@ -386,6 +387,44 @@ def test_init_matches_one_force_file_to_each_trial(tmp_path):
     assert found == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
 
 
+def laboratory(tmp_path, force_folder):
+    """Markers of a person in a folder, forces in another one."""
+    person = tmp_path / "person"
+    for name in ("MarkerData", force_folder):
+        (person / name).mkdir(parents=True)
+    data = DATA / "gait2354"
+    for name in ("subject01_static.trc", "subject01_walk1.trc"):
+        shutil.copy(data / name, person / "MarkerData")
+    for name in ("subject01_walk1_grf.mot", "subject01_walk1_grf.xml"):
+        shutil.copy(data / name, person / force_folder)
+    return person
+
+
+@needs_data
+@pytest.mark.parametrize("force_folder", ["ID", "MarkerData/forces"])
+def test_init_finds_forces_in_folders_beside_and_within(tmp_path, force_folder):
+    person = laboratory(tmp_path, force_folder)
+    path = person / "MarkerData" / "subject.toml"
+    text = init_subject(path.parent)
+    beside = "../ID" if force_folder == "ID" else "forces"
+    assert f'forces = "{beside}/subject01_walk1_grf.mot"' in text
+    assert f'loads = "{beside}/subject01_walk1_grf.xml"' in text
+    assert "No forces" not in text
+    (trial,) = draft(path.parent, completed(text)).trials
+    assert trial.forces.samefile(person / force_folder / "subject01_walk1_grf.mot")
+
+
+@needs_data
+def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path):
+    person = laboratory(tmp_path, "ID")
+    shutil.copy(DATA / "gait2354" / "subject01_walk1.trc", person / "ID" / "subject02_walk1.trc")
+    text = init_subject(person / "MarkerData")
+    assert "# No forces were found for subject01_walk1.trc" in text
+    assert "# forces = " in text
+    with pytest.raises(FileError, match="holds no file of markers, but its folder ID does"):
+        init_subject(person)
+
+
 def test_init_prefers_c3d_to_its_export_and_says_so(tmp_path):
     for name in ("static.trc", "walk.c3d", "walk.trc"):
         (tmp_path / name).touch()
@@ -412,7 +451,7 @@ def test_init_explains_every_setting(tmp_path):
 
 
 def test_init_without_recordings(tmp_path):
-    with pytest.raises(FileError, match=r"no \.c3d or \.trc"):
+    with pytest.raises(FileError, match=r"holds no file of markers \(\.trc"):
         init_subject(tmp_path)
     with pytest.raises(FileError, match="no such folder"):
         init_subject(tmp_path / "nowhere")
@@ -460,3 +499,8 @@ def test_calibration_is_of_opensim_models(folder):
     with pytest.raises(FileError, match="calibrate goes with osim") as error:
         read(folder, changed('markers = "plug-in-gait"', "calibrate = true"))
     assert error.value.line == 8
+
+
+@pytest.mark.parametrize(("written", "meant"), [("f", "female"), ("F", "female"), ("Female", "female"), ("m", "male")])
+def test_sex_may_be_abbreviated(written, meant):
+    assert Subject(name="A", sex=written).sex == meant

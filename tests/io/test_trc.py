@@ -85,6 +85,13 @@ def test_rounded_times_are_put_back_on_their_grid(shared_data):
     assert "rounded by up to 0.33 ms" in notes[0]
 
 
+@pytest.mark.parametrize(("rate", "decimals", "frames"), [(60, 3, 3), (60, 2, 3), (120, 3, 4), (59.94, 3, 10)])
+def test_few_frames_whose_times_are_rounded(write, rate, decimals, frames):
+    rows = "".join(f"{k}\t{k / rate:.{decimals}f}\t1\t2\t3\t4\t5\t6\n" for k in range(frames))
+    header = HEADER.replace("\t3\t2\t", f"\t{frames}\t2\t").replace("\n100\t", f"\n{rate}\t")
+    np.testing.assert_allclose(read_trc(write(header + rows)).time, np.arange(frames) / rate, atol=1e-9)
+
+
 @pytest.mark.parametrize(("rate", "decimals"), [(240, 3), (59.94, 3), (100, 2), (1000, 3)])
 def test_rates_whose_times_are_rounded(write, rate, decimals):
     rows = "".join(f"{k}\t{k / rate:.{decimals}f}\t1\t2\t3\t4\t5\t6\n" for k in range(500))

@@ -1,9 +1,10 @@
 """A static trial of another person is told by its lengths; the person's own never is."""
 
+import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.model.same_body import body_trouble
+from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.trial.data import Markers
 
 PEOPLE = [
@@ -23,6 +24,7 @@ def person(request, measured_recording):
 
 def test_the_own_static_trial(person):
     assert body_trouble(*person) == ""
+    assert session_doubts(*person) == []
 
 
 @pytest.mark.parametrize("size", [0.9, 1.1])
@@ -32,3 +34,34 @@ def test_the_static_trial_of_a_person_of_another_size(person, size):
     told = body_trouble(other, walk, marker_set)
     assert ("longer" if size < 1 else "shorter") in told
     assert "another person" in told
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_markers_put_on_anew(person, seed):
+    static, walk, marker_set = person
+    offsets = np.random.default_rng(seed).normal(0.0, 0.012, (len(static.labels), 3))
+    (told,) = session_doubts(Markers(static.time, static.labels, static.positions + offsets), walk, marker_set)
+    assert "of another session" in told
+
+
+def test_one_marker_that_was_moved(person):
+    static, walk, marker_set = person
+    label = marker_set.landmarks["heel_r"][0]
+    mates = [one for one in marker_set.segments["foot_r"] if one != label and one in walk.labels]
+    places = walk.positions.copy()
+    away = places[:, walk.labels.index(label)] - places[:, [walk.labels.index(one) for one in mates]].mean(axis=1)
+    places[:, walk.labels.index(label)] += 0.06 * away / np.linalg.norm(away, axis=1, keepdims=True)
+    (told,) = session_doubts(static, Markers(walk.time, walk.labels, places), marker_set)
+    assert f"the marker {label}" in told
+    assert "elsewhere" in told
+
+
+def test_labels_that_were_exchanged(person):
+    static, walk, marker_set = person
+    knee, ankle = (marker_set.landmarks[f"{name}_lateral_l"][0] for name in ("knee", "ankle"))
+    if knee not in walk.labels or ankle not in walk.labels:
+        pytest.skip("the walk has no such markers")
+    other = {knee: ankle, ankle: knee}
+    labels = tuple(other.get(label, label) for label in walk.labels)
+    told = body_trouble(static, Markers(walk.time, labels, walk.positions), marker_set)
+    assert f"{knee} and {ankle} look swapped" in told or f"{ankle} and {knee} look swapped" in told

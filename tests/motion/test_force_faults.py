@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
+from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import Markers
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.trial.plate_faults import loads_trouble
 
 WALKS = {
     "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
@@ -39,11 +41,14 @@ def told(walk):
     """What is said of the forces of a walk."""
     if trouble := loads_trouble(walk.plates):
         return trouble
-    marker_set = choose_marker_set(walk.markers.labels)
-    present = set(walk.markers.labels)
-    feet = {side: [one for one in labels if one in present] for side, labels in marker_set.foot_labels().items()}
-    trial, pelvis = build_trial(walk, feet), marker_set.segments["pelvis"]
+    trial, pelvis = sorted_by_foot(walk), choose_marker_set(walk.markers.labels).segments["pelvis"]
     return direction_trouble(trial, pelvis) or offset_trouble(trial, pelvis)
+
+
+def sorted_by_foot(walk):
+    present = set(walk.markers.labels)
+    feet = choose_marker_set(walk.markers.labels).foot_labels()
+    return build_trial(walk, {side: [one for one in labels if one in present] for side, labels in feet.items()})
 
 
 def test_sound_walks_are_not_doubted(walk):
@@ -87,3 +92,26 @@ def test_forces_with_another_axis_up(walk):
     plates = walk.plates
     up = replace(walk, plates=replace(plates, force=plates.force @ turn.T, moment=plates.moment @ turn.T))
     assert "the largest forces point along Z" in told(up)
+
+
+@pytest.mark.parametrize("angle", [90, -90])
+def test_forces_turned(walk, angle):
+    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    assert told(with_force(walk, lambda force: force @ turn.T)).startswith(f"the forces are turned by {angle} degrees")
+
+
+@pytest.mark.parametrize(("factor", "words"), [(2.0, "less than their true rate"), (0.5, "more than their true rate")])
+def test_a_file_at_another_rate(walk, factor, words):
+    """Markers and forces of one file, which has one clock."""
+
+    def stretched(time):
+        return time[0] + factor * (time - time[0])
+
+    markers, plates = walk.markers, replace(walk.plates, time=stretched(walk.plates.time))
+    slow = replace(walk, markers=Markers(stretched(markers.time), markers.labels, markers.positions), plates=plates)
+    found = told(slow)
+    if factor < 1 and np.ptp(sorted_by_foot(slow).windows()[0]) < 0.45:
+        pytest.skip("too short at twice the rate")
+    assert words in found
+    assert float(found.partition("a factor of about ")[2].split(";")[0]) == pytest.approx(2.0, rel=0.2)

@@ -1,11 +1,16 @@
-"""The report in a browser: headless Chromium opens it as a user does, from a file."""
+"""Report and comparison in a browser: headless Chromium opens it as a user does, from a file."""
 
 import io
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.report.comparison import render_comparison
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (pip install -e '.[test]')")
 
@@ -20,6 +25,13 @@ FLAGS = [
     "--disable-sync",
 ]
 DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+SWITCHED = """plot => {
+    const panel = plot.closest(".panel");
+    if (!panel) return null;
+    const siblings = [...panel.parentElement.children].filter(other => other.classList.contains("panel"));
+    return [panel.parentElement.querySelector("input").name, siblings.indexOf(panel)];
+}"""
+"""Name of the choice that shows a plot, and which of its answers; null for a plot that always shows."""
 PATIENCE_MS = 30_000
 
 pytestmark = pytest.mark.slow
@@ -38,8 +50,8 @@ def browser():
 class Opened:
     """A report in a tab, with what it said and asked for."""
 
-    def __init__(self, browser, path, viewport=None):
-        self.page = browser.new_page(viewport=viewport or DESKTOP)
+    def __init__(self, browser, path, viewport=None, scheme="light"):
+        self.page = browser.new_page(viewport=viewport or DESKTOP, color_scheme=scheme)
         self.errors, self.requests = [], []
         self.page.on(
             "console", lambda message: message.type in ("error", "warning") and self.errors.append(message.text)
@@ -47,7 +59,7 @@ class Opened:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
-        self.page.evaluate("document.querySelectorAll('details.seconds').forEach((part) => (part.open = true))")
+        self.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
         playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
 
     def picture(self, locator):
@@ -96,6 +108,8 @@ def test_every_plot_is_drawn(opened):
     assert len(plots) >= 5
     for plot in plots:
         name = plot.get_attribute("id")
+        if choice := plot.evaluate(SWITCHED):
+            opened.page.locator(f"[name={choice[0]}]").nth(choice[1]).check()
         assert plot.locator(".trace").count() > 0, name
         pixels = opened.picture(plot)
         assert ink(pixels) > 0.005, name
@@ -261,6 +275,38 @@ def test_table_sorts_by_pointer_and_keyboard(demo):
     assert names == sorted(names)
 
 
+def test_table_shows_what_changed_and_products_of_inertia_when_asked(demo):
+    rows = demo.page.locator("#bsp-table tbody tr")
+
+    def seen(kind=""):
+        return rows.locator("visible=true").and_(demo.page.locator(f"tr{kind}")).count()
+
+    changed, products = (
+        demo.page.locator(f"#bsp-all [data-filter={name}]") for name in ("only-changed", "with-products")
+    )
+    assert (seen(), seen(".product")) == (84, 0)
+    products.check()
+    assert (seen(), seen(".product")) == (120, 36)
+    changed.check()
+    assert seen() == seen(".changed") == rows.and_(demo.page.locator(".changed")).count()
+    assert 0 < seen() < 120
+    for box in (changed, products):
+        box.uncheck()
+    assert seen() == 84
+
+
+def test_panels_are_switched(demo):
+    mass, information = (demo.page.locator(f"#body-{name}") for name in ("mass", "information"))
+    playwright.expect(mass).to_be_visible()
+    playwright.expect(information).not_to_be_visible()
+    demo.page.get_by_role("radio", name="what the data say").check()
+    playwright.expect(information).to_be_visible()
+    playwright.expect(mass).not_to_be_visible()
+    assert colour(demo.picture(information)) > 0.01
+    demo.page.get_by_role("radio", name="what the data say").press("ArrowLeft")
+    playwright.expect(mass).to_be_visible()
+
+
 def test_page_fits_a_phone(browser, demo_run):
     report = Opened(browser, demo_run[1] / "report.html", PHONE)
     assert report.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
@@ -278,7 +324,7 @@ def test_page_fits_a_phone(browser, demo_run):
     report.page.close()
 
 
-@pytest.fixture(scope="module", params=[390, 1200])
+@pytest.fixture(scope="module", params=[390, 1400])
 def of_width(request, browser, demo_run):
     """A report in a window of a phone's width and of a desktop's, and the width."""
     report = Opened(browser, demo_run[1] / "report.html", {"width": request.param, "height": 844})
@@ -288,7 +334,7 @@ def of_width(request, browser, demo_run):
 
 def test_table_shows_its_first_columns_on_a_phone_and_all_on_a_desktop(of_width):
     report, width = of_width
-    columns = {390: 4, 1200: 9}[width]
+    columns = {390: 4, 1400: 9}[width]
     rights = report.page.locator("#bsp-table thead th").evaluate_all(
         "cells => cells.map(cell => cell.getBoundingClientRect().right"
         " - cell.closest('.scroll').getBoundingClientRect().right)"
@@ -329,6 +375,35 @@ def test_print_draws_everything_in_the_width_of_the_paper(demo, tmp_path):
     assert len(demo.page.pdf(format="A4")) > 100_000
 
 
+def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
+    page = demo.page
+    page.evaluate("window.print = () => {}")
+    page.locator("details.print").evaluate("part => (part.open = true)")
+    page.get_by_label("Laboratory").fill("Ward <5>")
+    page.get_by_role("button", name="Summary, two pages").click()
+    page.emulate_media(media="print")
+    shown = page.locator("h2:visible, h3:visible").all_text_contents()
+    told = page.locator(".ident:visible").all_inner_texts()
+    page.emulate_media(media="screen")
+    assert shown == [
+        "Verdict",
+        "What may be used",
+        "What the estimate changed",
+        "Gait cycle",
+        "Strides",
+        "Joint moments",
+    ]
+    assert len(told) == 2
+    assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in told)
+    assert pages(page) == 2
+    assert page.locator("body.summary").count() == 0, "once it is printed, everything is there again"
+    assert pages(page) > 8
+
+
+def pages(page):
+    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
+
+
 @pytest.mark.parametrize("form", ["svg", "png", "csv"])
 def test_figures_are_saved_by_a_button(demo, fit, form):
     with demo.page.expect_download() as saving:
@@ -354,3 +429,74 @@ def assert_same_moments(table, cycles):
         rows = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == side)]
         assert own.x.tolist() == list(range(101))
         np.testing.assert_allclose(own.y, rows.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
+
+
+# --- comparison, dark mode
+
+
+@pytest.fixture(scope="module")
+def comparison(fit, tmp_path_factory):
+    """The page that compares the demo's fit with itself, but for a heavier trunk."""
+    table = fit.estimate.table().copy()
+    table[1, 0] += 5.0 * fit.posterior.sd[1, 0]
+    other = replace(fit, estimate=BodySegmentParameters.from_table(fit.estimate.segments, table))
+    path = tmp_path_factory.mktemp("comparison") / "compare.html"
+    path.write_text(render_comparison({"before": fit, "after": other}), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+def test_comparison_is_drawn_fits_the_window_and_sorts(browser, comparison, width):
+    opened = Opened(browser, comparison, {"width": width, "height": 900})
+    page = opened.page
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("#compare-moments .js-line").count() > 10
+    assert colour(opened.picture(page.locator("#compare-moments"))) > 0.0005
+    changed = page.locator("details", has_text="Changed").first
+    assert changed.locator("tbody tr").all_inner_texts()[0].startswith("torso\tmass (kg)")
+    everything = page.locator("details", has_text="All parameters").first
+    heading = everything.locator("thead th", has_text="change").first
+    heading.locator("button").click()
+    assert heading.get_attribute("aria-sort") == "ascending"
+    cells = everything.locator("tbody td:nth-child(5)").evaluate_all("cells => cells.map(cell => +cell.dataset.sort)")
+    assert cells == sorted(cells)
+    assert len(cells) == 120
+    assert opened.errors == []
+    assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [page.url]
+    page.close()
+
+
+CONTRAST = """() => {
+    const channels = colour => colour.match(/[\\d.]+/g).map(Number);
+    const light = colour => {
+        const linear = c => c <= .03928 ? c / 12.92 : ((c + .055) / 1.055) ** 2.4;
+        const [r, g, b] = channels(colour).map(c => linear(c / 255));
+        return .2126 * r + .7152 * g + .0722 * b;
+    };
+    const ground = element => {
+        for (let one = element; one; one = one.parentElement) {
+            const colour = getComputedStyle(one).backgroundColor;
+            if (channels(colour).length === 3 || channels(colour)[3] > 0) return colour;
+        }
+        return "rgb(255, 255, 255)";
+    };
+    const worded = element => [...element.childNodes].some(node => node.nodeType === 3 && node.textContent.trim());
+    const judged = element => worded(element) && element.checkVisibility() && !element.closest(".plot, script, button");
+    return [...document.querySelectorAll("main *, header *, footer")].filter(judged)
+        .map(element => {
+            const [a, b] = [light(getComputedStyle(element).color), light(ground(element))].sort((x, y) => y - x);
+            return [(a + .05) / (b + .05), element.tagName + " " + element.textContent.slice(0, 40)];
+        }).sort((one, other) => one[0] - other[0]).slice(0, 3);
+}"""
+"""The three texts that stand out least from their ground, by WCAG's ratio."""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("which", ["report", "comparison"])
+def test_texts_stand_out_in_light_and_dark(browser, demo_run, comparison, scheme, which):
+    path = comparison if which == "comparison" else demo_run[1] / "report.html"
+    opened = Opened(browser, path, scheme=scheme)
+    ground = opened.picture(opened.page.locator("main")).mean(axis=(0, 1)).mean()
+    assert (ground < 0.3) == (scheme == "dark")
+    assert opened.page.evaluate(CONTRAST)[0][0] >= 4.5, opened.page.evaluate(CONTRAST)
+    opened.page.close()

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from kinertia.io.norms_file import Norm
 from kinertia.report.cycle_figures import cycle_figure, cycle_figures
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.files import save_fit
@@ -153,3 +154,18 @@ def test_a_motion_without_strides_stays_over_time(fit):
     assert page.count('<details class="seconds" open>') == 2
     walking = Elements(render(fit))
     assert "cycle-moment" in str(walking.__dict__)
+
+
+def test_norms_are_bands_behind_the_curves(fit):
+    norm = Norm(np.array([0.0, 50.0, 100.0]), np.array([0.1, 0.5, 0.2]), np.array([0.1, 0.2, 0.1]))
+    plain, figure = (cycle_figures(fit, norms)["moment"] for norms in ({}, {"knee_angle_moment": norm}))
+    titles = [note["text"] for note in figure.layout["annotations"]]
+    knee = next(k for k, title in enumerate(titles) if title.startswith("<b>Knee moment"))
+    (band,) = [trace for trace in figure.data if trace["name"] == "norm, mean ± SD"]
+    assert band["xaxis"] == f"x{knee + 1}"
+    assert band is next(trace for trace in figure.data if trace["xaxis"] == band["xaxis"]), "below all curves"
+    np.testing.assert_allclose(band["x"], [0, 50, 100, 100, 50, 0])
+    np.testing.assert_allclose(band["y"], [0.0, 0.3, 0.1, 0.3, 0.7, 0.2], atol=1e-7)
+    assert len(figure.data) == len(plain.data) + 1
+    assert "norms that were given" in render(fit, norms={"knee_angle_moment": norm})
+    assert "norms that were given" not in render(fit)

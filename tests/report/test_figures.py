@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinertia.report.bsp_figures import bsp_figure, departures, information_figure
+from kinertia.report.body_figure import body_figure
+from kinertia.report.bsp_figures import change_figure, departure_figure, departures, information_figure
 from kinertia.report.coordinate_titles import panels_of, title_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
@@ -49,10 +50,15 @@ def test_names_of_bodies_are_shown_as_they_are(fit):
     name = '<b>=cmd|</b><a href="http://x.y">'
     named = tuple(name if one == "pelvis" else one for one in fit.estimate.segments)
     bodies = {kind: replace(getattr(fit, kind), segments=named) for kind in ("literature", "estimate")}
-    evil = replace(fit, **bodies)
-    figures = [bsp_figure(evil), information_figure(evil)]
+    joints = [
+        replace(joint, **{end: name for end in ("parent", "child") if getattr(joint, end) == "pelvis"})
+        for joint in fit.skeleton.joints
+    ]
+    worn = [replace(one, segment=name) if one.segment == "pelvis" else one for one in fit.skeleton.markers]
+    evil = replace(fit, **bodies, skeleton=replace(fit.skeleton, joints=tuple(joints), markers=tuple(worn)))
+    figures = [change_figure(evil), departure_figure(evil), information_figure(evil), body_figure(evil)]
     for figure in figures:
-        told = figure.to_json()
+        told = Figure(figure.data, {**figure.layout, "meta": {}}).to_json()  # plotly shows nothing of meta
         assert "&lt;b&gt;" in told
         assert "<b>=cmd" not in told
         assert "<a href" not in told
@@ -135,21 +141,57 @@ def test_frames_outside_the_window_are_shaded(fit):
     assert any(abs(first - end) < 1e-3 for first, _ in spans)
 
 
+def estimates(figure):
+    """Dots and halves of their bars by panel ("x", "x2", ...) and row."""
+    return {
+        (trace.xaxis, int(row)): (x, half)
+        for trace in figure.data
+        if (trace.name or "").startswith("estimate")
+        for x, row, half in zip(trace.x, trace.y, trace.error_x.array, strict=True)
+    }
+
+
 def test_intervals_are_those_of_the_posterior(fit):
-    figure = as_plotly(bsp_figure(fit))
+    figure = as_plotly(departure_figure(fit, range(10)))
     away, posterior = departures(fit), fit.posterior
-    assert away is not None
-    found = {}
-    for trace in figure.data:
-        if (trace.name or "").startswith("estimate"):
-            for x, row, half in zip(trace.x, trace.y, trace.error_x.array, strict=True):
-                found[trace.yaxis, int(row)] = (x, half)
+    found = estimates(figure)
     assert len(found) == away.size
     np.testing.assert_allclose(
-        found["y", 3], (away[3, 0], 1.96 * posterior.sd[3, 0] / posterior.prior_sd[3, 0]), rtol=1e-5
+        found["x", 3], (away[3, 0], 1.96 * posterior.sd[3, 0] / posterior.prior_sd[3, 0]), rtol=1e-5
     )
     lowest, highest = figure.layout.xaxis.range
     assert all(lowest < x - half and x + half < highest for x, half in found.values())
+
+
+def test_changes_are_in_kg_mm_and_kg_m2(fit, two_level):
+    figure = as_plotly(change_figure(fit))
+    assert [note.text for note in figure.layout.annotations][:5] == [
+        "<b>mass (kg)</b>",
+        *(f"<b>CoM {way} (mm)</b>" for way in ("forward", "upward", "to the right")),
+        "<b>Ixx (kg m2)</b>",
+    ]
+    change, sd, found = fit.estimate.table() - fit.literature.table(), fit.posterior.sd, estimates(figure)
+    assert len(found) == 12 * 7
+    for place, k, factor in (("x", 0, 1.0), ("x3", 2, 1e3), ("x7", 6, 1.0)):
+        for row in range(12):
+            expected = np.array([change[row, k], 1.96 * sd[row, k]]) * factor
+            np.testing.assert_allclose(found[place, row], expected, rtol=1e-5)
+    prior = next(trace for trace in figure.data if trace.xaxis == "x2" and trace.name == "literature, 95 %")
+    np.testing.assert_allclose(prior.error_x.array, 1960 * fit.posterior.prior_sd[:, 1], rtol=1e-5)
+    plain = as_plotly(change_figure(two_level))
+    assert len(plain.data) == 7
+    change = two_level.estimate.table() - two_level.literature.table()
+    np.testing.assert_allclose(plain.data[1].x, 1e3 * change[:, 1], rtol=1e-5, atol=1e-9)
+
+
+def test_a_parameter_that_was_held_has_no_dot(fit):
+    posterior = fit.posterior
+    prior_sd, sd = posterior.prior_sd.copy(), posterior.sd.copy()
+    prior_sd[2, 1] = sd[2, 1] = 0.0
+    held = replace(fit, posterior=replace(posterior, prior_sd=prior_sd, sd=sd))
+    for figure in (change_figure(held), departure_figure(held)):
+        rows = {row for place, row in estimates(as_plotly(figure)) if place == "x2"}
+        assert rows == set(range(12)) - {2}
 
 
 def test_information_map_is_in_percent(fit, two_level):
@@ -161,7 +203,8 @@ def test_information_map_is_in_percent(fit, two_level):
         assert text == f"{colour:.0f}"
     np.testing.assert_allclose(shown, expected, rtol=1e-5)
     assert information_figure(two_level) is None
-    assert not any(trace.error_x.array is not None for trace in as_plotly(bsp_figure(two_level)).data)
+    assert departure_figure(two_level) is None
+    assert not any(trace.error_x.array is not None for trace in as_plotly(change_figure(two_level)).data)
 
 
 def test_markers_are_sorted_and_gaps_drawn(fit):

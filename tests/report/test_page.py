@@ -108,8 +108,9 @@ def test_held_segments_are_named_and_not_counted(of_model):
     assert not any("forearm" in sentence for sentence in told if sentence.startswith("masses"))
     page = render(of_model)
     figures = figures_of(page)
-    for axis in ("yaxis", "yaxis2"):
-        assert not any("forearm" in name for name in figures["bsp-intervals"]["layout"][axis]["ticktext"])
+    for figure in ("changes", "bsp-change", "bsp-departure", "products-change"):
+        for axis in ("yaxis", "yaxis2"):
+            assert not any("forearm" in name for name in figures[figure]["layout"][axis]["ticktext"])
     assert len(figures["bsp-information"]["layout"]["yaxis"]["ticktext"]) == 10
     assert "Kept as the model has them" in Elements(page).text
     held = [row for row in bsp_rows(of_model) if row["segment"].startswith("forearm")]
@@ -137,6 +138,25 @@ def test_numbers_in_the_table_have_the_digits_of_their_unit(fit):
     assert fixed(-0.04, 1) == fixed(-0.04, 1, sign=True) == "0.0"
     assert (fixed(0.06, 1, sign=True), fixed(-0.06, 1)) == ("+0.1", "-0.1")
     assert not re.search(r"(?<![\d.])[-+]0\.0+(?!\d)", Elements(render(fit)).text)
+
+
+def test_rows_changed_beyond_their_error_bars_are_marked(fit, two_level, of_model):
+    """And those of products of inertia, so that the page can leave them out."""
+    table = fit.literature.table().copy()
+    table[2, 0] += 2.0 * fit.posterior.sd[2, 0]
+    table[5, 8] -= 1.9 * fit.posterior.sd[5, 8]
+    moved = replace(fit, estimate=BodySegmentParameters.from_table(fit.literature.segments, table))
+    (row,) = [row for row in bsp_rows(moved) if row["changed"]]
+    assert (row["segment"], row["parameter"]) == ("thigh, right", "mass (kg)")
+    assert [row["parameter"] for row in bsp_rows(fit)[:10] if row["product"]] == [
+        f"I{k} (kg m2)" for k in ("xy", "xz", "yz")
+    ]
+    page = render(moved)
+    assert (page.count('<tr class="changed'), page.count('<tr class="unchanged')) == (1, 119)
+    assert len(re.findall(r'<tr class="\w+ product', page)) == 36
+    assert not any(row["changed"] for row in bsp_rows(of_model) if row["held"])
+    same = two_level.estimate.table() == two_level.literature.table()
+    assert [row["changed"] for row in bsp_rows(two_level)] == (~same).ravel().tolist()
 
 
 def test_the_change_of_motion_is_told_against_inverse_kinematics(fit):
@@ -379,7 +399,10 @@ def test_pictures_are_those_of_the_report(fit, page):
         ("trial1-coordinates", plot.coordinates()),
         ("trial1-moments", plot.moments()),
         ("trial1-markers", plot.markers()),
-        ("bsp-intervals", plot.bsp()),
+        ("bsp-change", plot.bsp()),
+        ("bsp-departure", plot.departures()),
+        ("body-mass", plot.body()),
+        ("body-information", plot.body("information")),
         ("bsp-information", plot.information()),
     ):
         assert figure.to_json() == go.Figure(**written[name]).to_json(), name

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gait_loads import MASS_KG, gait_loads
-from kinertia.checks.marker_set_match import markers_of_model
 from kinertia.checks.recording import check_recording
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.marker_set import MarkerSet
+from kinertia.model.model_markers import markers_of_model
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, PlateLoads, Recording
 from kinertia.trial.free_moment import TURNING_LEVER_M, mean_turning

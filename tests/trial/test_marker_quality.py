@@ -1,12 +1,10 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kinertia.trial.data import Markers
-from kinertia.trial.marker_quality import axes_trouble, extent_m, spikes_trouble, travel, visibility
+from kinertia.trial.marker_quality import axes_trouble, extent_m, travel, visibility
 
 RATE_HZ, FRAMES = 50.0, 100
 BODY_M = np.array([[0.1, 0.05, 0.1], [0.0, 0.9, -0.1], [0.0, 1.6, 0.0]])
@@ -75,23 +73,3 @@ def test_axes_and_unit(turned, words):
     trouble = axes_trouble(extent_m(Markers(walk.time, walk.labels, walk.positions @ np.transpose(turned))))
     assert words in trouble
     assert bool(trouble) == bool(words)
-
-
-def _walking(frames=200):
-    time = np.arange(frames) / 100
-    places = np.stack([np.sin(6 * time) * 0.4, 0.1 + 0.05 * np.cos(12 * time), 0.1 + 0 * time], axis=1)
-    return Markers(time, ("A", "B"), np.stack([places, places + 0.3], axis=1))
-
-
-def test_spikes_are_named_and_a_gap_or_two_bad_frames_are_not():
-    markers = _walking()
-    assert spikes_trouble(markers) == ""
-    spiked = markers.positions.copy()
-    spiked[10:30, 0] = np.nan
-    spiked[[50, 90], 0, 1] += 0.3
-    assert spikes_trouble(replace(markers, positions=spiked)) == ""
-    spiked[40::20, 1, 1] += 0.3
-    told = spikes_trouble(replace(markers, positions=spiked))
-    assert "B (8 times); the first at 0.400 s" in told
-    assert "up to 300 mm" in told
-    assert "A (" not in told

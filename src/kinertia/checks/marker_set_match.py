@@ -7,10 +7,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from kinertia.checks.verdict import Verdict
-from kinertia.errors import MarkerSetError, OsimError
+from kinertia.errors import MarkerSetError
 from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
-from kinertia.model.anatomy import segment_of
-from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet, check_marker_set, nearest_labels
 from kinertia.trial.data import Recording
 
@@ -42,21 +40,6 @@ def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
         with suppress(MarkerSetError):
             return choose_marker_set(recording.markers.labels)
     return None
-
-
-def markers_of_model(model: OsimModel) -> MarkerSet:
-    """The markers of an OpenSim model by segment, without landmarks: no model is built from them.
-
-    Raises:
-        OsimError: there are none.
-    """
-    markers = model.skeleton.markers
-    if not markers:
-        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
-    owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
-    names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
-    segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}
-    return MarkerSet(model.path.name, {}, segments, {})
 
 
 def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:
@@ -92,6 +75,6 @@ def judged_labels(match: MarkerSetMatch) -> list[Verdict]:
         Verdict(
             "fail",
             f"no marker set fits ({nearest}), so it is unknown which markers are on which foot; write a marker set as "
-            f"TOML and name it with --markers",
+            f"TOML (kinertia markers FILE -o SET.toml drafts it) and name it with --markers",
         )
     ]

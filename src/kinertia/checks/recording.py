@@ -11,13 +11,11 @@ from kinertia.checks.marker_set_match import MarkerSetMatch, judged_labels, matc
 from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
 from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, TrialError
-from kinertia.estimation.force_mass import CONTRADICTING_MASS
+from kinertia.estimation.doubts import Doubt, motion_doubts, static_doubts, trial_doubts
+from kinertia.estimation.force_mass import CONTRADICTING_MASS, unit_hint
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
-from kinertia.model.body_sides import sides_trouble
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.same_body import body_trouble
-from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.free_moment import mean_turning
@@ -25,9 +23,6 @@ from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import (
     Travel,
     Visibility,
-    axes_trouble,
-    extent_m,
-    spikes_trouble,
     travel,
     visibility,
 )
@@ -118,6 +113,7 @@ def check_recording(
     mass_kg: float | None = None,
     window_s: tuple[float, float] | None = None,
     static: Recording | None = None,
+    height_m: float | None = None,
 ) -> RecordingCheck:
     """Look at one recording as a fit would, up to the first model.
 
@@ -127,6 +123,7 @@ def check_recording(
         mass_kg: by the scale; the file's own if None.
         window_s: the stretch that the user vouches for.
         static: the static trial that goes with it, if there is one.
+        height_m: stature; the file's own if None.
     """
     match, used = match_labels(recording.markers.labels, marker_set)
     own = recording.markers
@@ -134,26 +131,31 @@ def check_recording(
         own = own.select([label for label in used.labels if label in own.labels])
     moves, seen = travel(own), visibility(own)
     standing = moves.kind == "stands still"
-    found, feet = [*_axes(own), *judged_labels(match)], None
+    found, feet = judged_labels(match), None
     if used is not None:
         feet, trouble = _feet(recording.markers.labels, used)
         found += trouble
         if used.landmarks:
-            found += _labelled(recording.markers, used, static)
             found += _facing(recording.markers, used, moves)
             found += _static(recording, used) if standing else []
-    found += _failed(spikes_trouble(own))
-    found += [] if recording.plates is None else _failed(loads_trouble(recording.plates))
+    doubts = (
+        static_doubts(recording, used, recording.height_m if height_m is None else height_m)
+        if standing
+        else trial_doubts(recording, used, static, feet)
+    )
+    found = [*_verdicts(doubts), *found]
     plates = check_plates(recording, feet)
     trial, notes, told = _trial(recording, feet, window_s, standing)
     windows = () if trial is None else tuple(trial.windows())
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
-    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates), *_weight(mass, scale)]
+    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates)]
     if trial is not None and used is not None:
         found += _turning(trial, used)
-        found += _moving(trial, used)
+        refused = any(one.refused for one in doubts)
+        found += [] if refused else _verdicts(motion_doubts(recording, trial, used))
+    found += _weight(mass, scale)
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
         recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)
@@ -163,11 +165,6 @@ def check_recording(
 def _telling(markers: Markers, marker_set: MarkerSet) -> TellingMovements | None:
     pelvis, torso = (marker_set.segments.get(name, ()) for name in ("pelvis", "torso"))
     return TellingMovements.of(markers, pelvis, torso)
-
-
-def _axes(markers: Markers) -> list[Verdict]:
-    trouble = axes_trouble(extent_m(markers))
-    return [Verdict("fail", trouble)] if trouble else []
 
 
 def _never(seen: Sequence[Visibility]) -> list[Verdict]:
@@ -218,22 +215,8 @@ def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | N
     return (feet if all(feet.values()) else None), found
 
 
-def _failed(trouble: str) -> list[Verdict]:
-    return [Verdict("fail", trouble)] if trouble else []
-
-
-def _labelled(markers: Markers, marker_set: MarkerSet, static: Recording | None) -> list[Verdict]:
-    """Whether the labels make a body, and the one of the static trial."""
-    found = _failed(sides_trouble(markers, marker_set))
-    return found if static is None else found + _failed(body_trouble(static.markers, markers, marker_set))
-
-
-def _moving(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
-    """Whether the forces move the body as the markers show it."""
-    pelvis = marker_set.segments.get("pelvis", ())
-    found = _failed(direction_trouble(trial, pelvis))
-    offset = "" if found else offset_trouble(trial, pelvis)
-    return [*found, Verdict("caution", offset)] if offset else found
+def _verdicts(doubts: Sequence[Doubt]) -> list[Verdict]:
+    return [Verdict("fail" if refused else "caution", sentence) for sentence, refused in doubts]
 
 
 def _facing(markers: Markers, marker_set: MarkerSet, moves: Travel) -> list[Verdict]:
@@ -327,6 +310,8 @@ def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
     )
     if abs(off) <= FORCE_MASS_TOLERANCE:
         return [Verdict("pass", told)]
+    if hint := unit_hint(mass.mass_kg, scale_kg):
+        return [Verdict("fail", f"{hint}: {told}")]
     return [
         Verdict(
             "fail" if abs(off) > CONTRADICTING_MASS else "caution",

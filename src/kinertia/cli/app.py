@@ -30,6 +30,7 @@ kinertia demo                 see it work, on a synthetic person
 kinertia demo --measured      see it work, on a measured walk
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
+kinertia markers FILE         which marker set is it? draft one of your own
 kinertia fit subject.toml     estimate; the results go to the folder out
 kinertia report out           write the report of a fit again
 kinertia compare out1 out2    what differs between fits, and by how much
@@ -45,7 +46,8 @@ Every command says more with --help, and has an example there.
 [bold]What it needs[/]
 
 A static trial (the person standing; C3D or TRC), one or more gait trials with
-force plates (C3D, or TRC with MOT or STO), body mass, stature and sex.
+force plates (C3D, or TRC with MOT or STO; Qualisys' TSV, Vicon's CSV), body
+mass, stature and sex.
 Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 
 [bold]Exit status[/]
@@ -68,6 +70,7 @@ _MODULES = {
     "demo": "demo",
     "init": "init",
     "check": "check",
+    "markers": "markers",
     "fit": "fit",
     "report": "report",
     "compare": "compare",
@@ -87,7 +90,6 @@ def application(only: str | None = None) -> typer.Typer:
     app = typer.Typer(
         name="kinertia",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
         help=_MANUAL,

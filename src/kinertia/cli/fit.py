@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,30 +12,38 @@ import typer
 
 from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.fit_report import report_fit, report_verdicts
-from kinertia.cli.options import Force, Output, Quiet, Verbose, results_folder
-from kinertia.cli.terminal import out, shown_progress
-from kinertia.errors import FileError
+from kinertia.cli.options import AsJson, Force, Output, Quiet, Sex, Verbose, number, results_folder
+from kinertia.cli.terminal import out, show_error, shown_progress
+from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
+from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
-from kinertia.report.files import save_fit
+from kinertia.report.files import save_fit, summary
 
 
 def fit(
-    trial: Annotated[
-        Path,
-        typer.Argument(help="A subject file (.toml), a folder with one, or the markers of one trial (.c3d, .trc)."),
+    trials: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="Subject files (.toml) or folders with one; or markers of one trial (.c3d, .trc, .tsv, .csv).",
+        ),
     ],
     output: Output = Path("out"),
-    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc).")] = None,
+    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc, .tsv, .csv).")] = None,
     forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
     loads: Annotated[
         Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
     ] = None,
-    mass: Annotated[float | None, typer.Option(help="Body mass, kg; a C3D file may contain it.")] = None,
-    height: Annotated[float | None, typer.Option(help="Stature, m; a C3D file may contain it.")] = None,
-    sex: Annotated[str | None, typer.Option(help="male or female: which table of the literature.")] = None,
+    mass: Annotated[
+        float | None, typer.Option(parser=number, metavar="KG", help="Body mass, kg; a C3D file may contain it.")
+    ] = None,
+    height: Annotated[
+        float | None, typer.Option(parser=number, metavar="M", help="Stature, m; a C3D file may contain it.")
+    ] = None,
+    sex: Sex = None,
     markers: Annotated[
         str | None,
         typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
@@ -44,11 +55,15 @@ def fit(
         bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
     ] = False,
     method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Estimate body segment parameters from gait.
+
+    Of several subject files each gets a folder of its name in the folder for
+    the results; an error in one does not keep the others from being fitted.
 
     Exit status 1 if there is an estimate but a check of it failed
     (see kinertia --help).
@@ -58,6 +73,8 @@ def fit(
     kinertia fit subject.toml -o out
 
     kinertia fit FOLDER -o out
+
+    kinertia fit anna.toml ben.toml -o out
 
     kinertia fit walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male -o out
 
@@ -76,17 +93,71 @@ def fit(
         "--model": model,
         "--calibrate": calibrate or None,
     }
-    wanted = _wanted(trial, options, method)
-    names = [one.name for one in wanted.trials]
-    results_folder(output, force, names if len(names) > 1 else ())
-    result = _run(wanted)
-    folder = save_fit(result, output, provenance_of(wanted, _command(trial, options, method, output)))
-    judged = verdicts(result)
-    if not out.quiet:
-        report_fit(result)
-        report_verdicts(judged, result, verbose)
-        out.print(f"results in {folder}", soft_wrap=True)
-    raise typer.Exit(int(stands_against(judged)))
+    runs = _runs(trials, output, options, method)
+    for one in runs:
+        names = [trial.name for trial in one.wanted.trials]
+        results_folder(one.folder, force, names if len(names) > 1 else ())
+    told, status = [], 0
+    for one in runs:
+        try:
+            result = _fitted(one)
+        except KinertiaError as error:
+            if len(runs) == 1:
+                raise
+            show_error(f"{one.given}: {error}")
+            status = 2
+            continue
+        judged = verdicts(result)
+        status = max(status, int(stands_against(judged)))
+        told.append({"folder": str(one.folder), **summary(result)})
+        if not (out.quiet or as_json):
+            report_fit(result)
+            report_verdicts(judged, result, verbose)
+            out.print(f"results in {one.folder}", soft_wrap=True)
+    if as_json:
+        typer.echo(json.dumps(told if len(runs) > 1 else told[0], indent=2))
+    raise typer.Exit(status)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One person: what was given, what it asks for, where the results go, and the command that repeats it."""
+
+    given: Path
+    wanted: SubjectFile
+    folder: Path
+    command: str
+
+
+def _runs(trials: Sequence[Path], output: Path, options: dict[str, Any], method: str | None) -> list[_Run]:
+    """Everybody, each with a folder of their own if there are several; all subject files are read here."""
+    folders = [output]
+    if len(trials) > 1:
+        for path in trials:
+            if path.suffix.lower() != ".toml" and not path.is_dir():
+                raise FileError(path, "is no subject file; several are fitted by their subject files only")
+        names = [_name(path) for path in trials]
+        for k, name in enumerate(names):
+            if before := [path for path, other in zip(trials, names[:k], strict=False) if same_folder(name, other)]:
+                raise FileError(trials[k], f"its results would go to {name}, as those of {before[0]}; rename one file")
+        folders = [output / name for name in names]
+    return [
+        _Run(path, _wanted(path, options, method), folder, _command(path, options, method, folder))
+        for path, folder in zip(trials, folders, strict=True)
+    ]
+
+
+def _name(path: Path) -> str:
+    """What the results of a subject file are called: its name, or that of its folder if it is only subject.toml."""
+    return path.resolve().name if path.is_dir() else path.resolve().parent.name if path.stem == "subject" else path.stem
+
+
+def _fitted(one: _Run) -> Fit:
+    """The fit, which is in its folder."""
+    with shown_progress() as progress:
+        result = fit_subject(one.wanted, progress)
+    save_fit(result, one.folder, provenance_of(one.wanted, one.command))
+    return result
 
 
 def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
@@ -139,8 +210,3 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
     return subject_from_options(
         {"subject": {"name": trial.stem, **tables["subject"]}, "model": tables["model"], "trial": trials}
     )
-
-
-def _run(wanted: SubjectFile) -> Fit:
-    with shown_progress() as progress:
-        return fit_subject(wanted, progress)

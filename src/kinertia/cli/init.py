@@ -10,7 +10,7 @@ import typer
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.subject_draft import init_subject
+from kinertia.io.subject_draft import NO_FORCES, init_subject
 
 
 def init(
@@ -27,4 +27,7 @@ def init(
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
     text = init_subject(folder)
     write_then_rename(path, text)
+    for line in text.splitlines():
+        if line.startswith(NO_FORCES):
+            out.print(line.removeprefix("# "), soft_wrap=True)
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)

@@ -10,6 +10,7 @@ import typer
 
 from kinertia.cli.terminal import be_quiet
 from kinertia.io.output_folder import check_folder, expect_own_folder
+from kinertia.settings import sex_of
 
 
 def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ()) -> None:
@@ -23,6 +24,34 @@ def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ())
         expect_own_folder(folder)
 
 
+def number(text: str) -> float:
+    """A number with a decimal point or a decimal comma.
+
+    Raises:
+        BadParameter: it is none.
+    """
+    try:
+        return float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is not a number; write it like 72.6") from None
+
+
+def sex(text: str) -> str:
+    """ "male" or "female"; m and f are enough.
+
+    Raises:
+        BadParameter: it is neither.
+    """
+    found = sex_of(text)
+    if found not in ("male", "female"):
+        raise typer.BadParameter(f"'{text}' is neither male (m) nor female (f): the literature has a table for each")
+    return str(found)
+
+
+Sex = Annotated[
+    str | None, typer.Option(parser=sex, metavar="SEX", help="male or female (m, f): which table of the literature.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON, for scripts, and nothing else.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
 Force = Annotated[bool, typer.Option("--force", help="Write into a folder that holds other files, too.")]
 Quiet = Annotated[

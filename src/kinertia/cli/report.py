@@ -9,22 +9,49 @@ import typer
 
 from kinertia.cli.options import Quiet
 from kinertia.cli.terminal import out
+from kinertia.errors import FileError
+from kinertia.estimation.result import Fit
+from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.output_folder import write_then_rename
+from kinertia.report.cycle_figures import quantities_of
 from kinertia.report.page import render
 from kinertia.report.saved_fit import read_saved
 
 
 def report(
     results: Annotated[Path, typer.Argument(help="Folder that kinertia fit has written.")],
+    norms: Annotated[
+        Path | None, typer.Option(help="CSV file with norms, drawn as bands: quantity,percent,mean,sd.")
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Write the report of a fit again, without the recordings: report.html in its folder is replaced.
 
-    [bold]Example[/]
+    With --norms, your laboratory's normal curves are grey bands behind those
+    over the gait cycle.
+
+    [bold]Examples[/]
 
     kinertia report out
+
+    kinertia report out --norms adults.csv
     """
     saved = read_saved(results)
-    page = render(saved.fit, saved.provenance, saved.versions)
+    bands = {} if norms is None else _norms_for(saved.fit, norms)
+    page = render(saved.fit, saved.provenance, saved.versions, bands)
     write_then_rename(results / "report.html", page)
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)
+
+
+def _norms_for(fit: Fit, path: Path) -> dict[str, Norm]:
+    """The norms in a file; says which of them this fit has no curve for."""
+    norms, known = read_norms(path), quantities_of(fit)
+    other = sorted(set(norms) - known)
+    if len(other) == len(norms):
+        expected = f"its names are those of cycles.csv, such as {min(known)}" if known else "there are no strides"
+        raise FileError(
+            path, f"no quantity of it is among the curves of this fit (the first is {other[0]}); {expected}"
+        )
+    if other:
+        out.print(f"note: norms that this fit has no curve for: {', '.join(other)}")
+    return norms

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
 import typer
 
+from kinertia.cli.measured_demo import FILES as MEASURED_WALK
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
 from kinertia.report.accuracy import HEADINGS, JOINT_CAPTION, JOINT_HEADINGS, accuracy_rows, joint_rows, save_accuracy
 from kinertia.report.extras import HOW, has_matplotlib
+from kinertia.report.faults import counts, save_faults
 from kinertia.report.sensitivity import save_sensitivity
 from kinertia.report.table1 import save_table1, table1_rows
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.table1_variants import save_variants, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
+from kinertia.studies.faults import run_faults, synthetic_walk
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.studies.table1_variants import run_variants
@@ -156,6 +160,49 @@ def sensitivity(
     out.print(f"shown by no condition: {', '.join(found.never()) or 'none'}")
     save_sensitivity(found, output)
     _say_where(output, ("sensitivity.md", "sensitivity.json", "sensitivity.csv"), "sensitivity.png")
+
+
+@study.command()
+def faults(
+    walks: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[SUBJECT]...", help="Subject files of sound walks to spoil besides the package's two."),
+    ] = None,
+    workers: Workers = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Is a wrong measurement named? Fifty known mistakes in real walks, one at a time.
+
+    Swapped labels, wrong axes, units, clocks and zeros, another person's static
+    trial and the like are made in the files of sound walks: a measured and a
+    synthetic one that come with Kinertia, and yours. Each goes to kinertia
+    check, and to kinertia fit where that has no doubts.
+
+    [bold]Examples[/]
+
+    kinertia study faults -o out
+
+    kinertia study faults anna.toml ben.toml -o out
+    """
+    results_folder(output, force)
+    given = [read_subject(path) for path in walks or ()]
+    with TemporaryDirectory() as folder, shown_progress() as progress:
+        sources = {"synthetic walk": synthetic_walk(Path(folder) / "lab")}
+        for wanted in (read_subject(MEASURED_WALK / "subject.toml"), *given):
+            name = wanted.subject.name
+            sources[name if name not in sources else f"{name} ({len(sources)})"] = wanted
+        sound, outcomes = run_faults(sources, workers=workers, progress=lambda share: progress("mistakes", share))
+    shown = plain_table("", *(one.name for one in sound))
+    for kind in counts(()):
+        shown.add_row(kind, *(str(counts([one for one in outcomes if one.walk == walk.name])[kind]) for walk in sound))
+    out.print(shown)
+    for one in outcomes:
+        if one.outcome in ("silent", "warned"):
+            out.print(f"{one.outcome}: {one.walk}: {one.mistake}" + (f": {one.said}" if one.said else ""))
+    save_faults(sound, outcomes, output)
+    out.print(f"results in {output}: faults.md, faults.json", soft_wrap=True)
 
 
 def _say_where(output: Path, files: Sequence[str], picture: str) -> None:

@@ -10,16 +10,16 @@ not the same all the time, and a support that is not measured carries at most a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinertia.errors import TrialError
-from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.markers_centre import centre_height, owners_of
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
-from kinertia.trial.data import FloatArray, Markers, Trial, runs
+from kinertia.trial.data import FloatArray, Trial, runs
 
 CONTRADICTING_MASS = 0.10
 """Scale and vertical force, or two trials, may differ by this share, and by twice the deviation of the mass by force,
@@ -27,9 +27,6 @@ before an estimate refuses."""
 VELOCITY_SD_M_S = 0.1
 """Deviation of the vertical velocity of the markers' centre from that of the body's, at either end of the window: half
 of it is what arms and trunk do beside their markers, half what skin does."""
-_SHARES = {"pelvis": 14.2, "torso": 40.0, "thigh": 12.3, "shank": 4.8, "foot": 1.2, "upper_arm": 2.4, "forearm": 2.3}
-"""Per cent of the body's mass, head with torso, hand with forearm (Dumas 2007, men)."""
-_SEEN = 0.8
 _FAST_HZ, _SLOW_HZ = 8.0, 4.0
 _AROUND_S = 0.25
 """Frames this near the window help to know velocities at its ends."""
@@ -68,6 +65,8 @@ class ForceMass:
             f"from {self.time[0]:.3f} to {self.time[-1]:.3f} s the vertical force corresponds to {self.mass_kg:.1f} "
             f"kg; stated mass {mass_kg:.1f} kg"
         )
+        if hint := unit_hint(self.mass_kg, mass_kg):
+            return f"{hint}: {told}"
         share = self.carried / mass_kg - 1.0
         if self.mass_kg > mass_kg:
             return (
@@ -90,6 +89,23 @@ class ForceMass:
         )
 
 
+_UNITS = (
+    (1 / GRAVITY_M_S2, "the forces look to be in kg (kilograms-force); export them in N"),
+    (0.45359, "the stated mass looks to be in pounds; give it in kg"),
+    (0.2248, "the forces look to be in pounds-force; export them in N"),
+    (2.2046, "the stated mass looks to have been divided by the kilograms of a pound; give it in kg"),
+    (0.001, "the forces look to be in kN; export them in N"),
+)
+_UNIT_OFF = 0.1
+"""A ratio of forces to mass within this share of a ratio of units is likelier that of units than of people."""
+
+
+def unit_hint(by_force_kg: float, stated_kg: float) -> str:
+    """The unit that is wrong, where forces and stated mass differ as two units do; else empty."""
+    ratio = by_force_kg / stated_kg
+    return next((told for factor, told in _UNITS if abs(ratio / factor - 1) <= _UNIT_OFF), "")
+
+
 def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
     """Body mass by the forces in the longest measured window.
 
@@ -102,7 +118,7 @@ def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
     """
     start, end = trial.windows()[0]
     around, time = trial.markers.cut(start - _AROUND_S, end + _AROUND_S), trial.markers.cut(start, end).time
-    height = _centre_height(skeleton, around) if len(time) >= _FEWEST_FRAMES else None
+    height = centre_height(owners_of(skeleton), around) if len(time) >= _FEWEST_FRAMES else None
     if height is None:
         return None
     loads = trial.loads
@@ -140,24 +156,3 @@ def check_masses(mass_kg: float, by_force: Sequence[ForceMass]) -> None:
 def check_force_masses(skeleton: Skeleton, mass_kg: float, trials: Sequence[Trial]) -> None:
     """`check_masses` of the trials whose forces tell a mass."""
     check_masses(mass_kg, [found for trial in trials if (found := force_mass(skeleton, trial)) is not None])
-
-
-def _centre_height(skeleton: Skeleton, markers: Markers) -> FloatArray | None:
-    """(n,) m, height of the markers' centre, each segment at its share of the body's mass; None without a pelvis."""
-    seen = markers.seen
-    owners = {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
-    heights: dict[str, list[FloatArray]] = {}
-    for column, label in enumerate(markers.labels):
-        if owners.get(label) and seen[:, column].mean() >= _SEEN:
-            known = seen[:, column]
-            own = np.interp(markers.time, markers.time[known], markers.positions[known, column, 1])
-            heights.setdefault(owners[label], []).append(own)
-    if not heights.keys() & {"pelvis", "torso"}:
-        return None
-    shares = _shares(heights)
-    total: FloatArray = sum((shares[name] * np.mean(own, axis=0) for name, own in heights.items()), np.zeros(len(seen)))
-    return total / sum(shares.values())
-
-
-def _shares(segments: Mapping[str, object]) -> dict[str, float]:
-    return {name: _SHARES[name.removesuffix("_r").removesuffix("_l")] for name in segments}

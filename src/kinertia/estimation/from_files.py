@@ -30,7 +30,7 @@ def read_inputs(
     Raises:
         KinertiaError: a file is missing or broken.
     """
-    static = read_recording(_static(wanted))
+    static = read_recording(_static(wanted), length_unit=wanted.model.length_unit)
     marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
     return static, read_trials(wanted, progress), marker_set
 
@@ -129,7 +129,7 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
     for k, files in enumerate(wanted.trials):
         progress("reading", k / len(wanted.trials))
         started = time.perf_counter()
-        recording = read_recording(files.markers, files.forces, files.loads)
+        recording = read_recording(files.markers, files.forces, files.loads, files.length_unit)
         seconds = time.perf_counter() - started
         plates = recording.plates
         apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates

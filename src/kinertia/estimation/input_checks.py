@@ -10,15 +10,10 @@ import numpy as np
 
 from kinertia.errors import SubjectError, TrialError
 from kinertia.model.anthropometry import check_subject
-from kinertia.model.body_sides import sides_trouble
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.marker_set import MarkerSet
-from kinertia.model.same_body import body_trouble
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.force_faults import direction_trouble, loads_trouble, offset_trouble
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording, Trial
-from kinertia.trial.marker_quality import axes_trouble, extent_m, spikes_trouble
 
 T = TypeVar("T")
 
@@ -75,45 +70,6 @@ def check_visible(skeleton: Skeleton, trial: Trial) -> None:
                 f"none of the markers of the {segment} ({', '.join(worn)}) is in the file, so its coordinates are "
                 f"unknown; use a trial that has them",
             )
-
-
-def check_recordings(trials: Sequence[Recording], static: Recording | None, marker_set: MarkerSet | None) -> None:
-    """Raise TrialError for what the recordings show by themselves: wrong axes, swapped labels, spikes, wrong forces.
-
-    Args:
-        trials: that shall be estimated from.
-        static: the static trial; None with an OpenSim model.
-        marker_set: which label is which landmark; None with an OpenSim model.
-    """
-    for recording in ([] if static is None else [static]) + list(trials):
-        markers = recording.markers
-        worn = [label for label in marker_set.labels if label in markers.labels] if marker_set else markers.labels
-        own = markers.select(worn)
-        trouble = axes_trouble(extent_m(own)) or spikes_trouble(own)
-        if marker_set is not None:
-            trouble = trouble or sides_trouble(markers, marker_set)
-            if static is not None and recording is not static:
-                trouble = trouble or body_trouble(static.markers, markers, marker_set)
-        if recording is not static and recording.plates is not None:
-            trouble = trouble or loads_trouble(recording.plates)
-        if trouble:
-            raise TrialError(recording.name, trouble)
-
-
-def check_force_directions(trials: Sequence[Trial], pelvis: Sequence[str]) -> list[str]:
-    """Raise TrialError when forces point against the motion; warnings of what in them moves nobody.
-
-    Args:
-        trials: with the loads sorted by foot.
-        pelvis: labels of the markers on the pelvis.
-    """
-    warnings = []
-    for trial in trials:
-        if trouble := direction_trouble(trial, pelvis):
-            raise TrialError(trial.name, trouble)
-        if trouble := offset_trouble(trial, pelvis):
-            warnings.append(f"{trial.name}: {trouble}")
-    return warnings
 
 
 def check_same_person(skeleton: Skeleton, trials: Sequence[Trial]) -> None:

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
+from kinertia.estimation.doubts import motion_doubts, static_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import (
-    check_force_directions,
-    check_recordings,
     check_same_person,
     check_visible,
     complete_subject,
     known,
 )
+from kinertia.estimation.joint_widths import with_widths
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.io.marker_set_file import choose_marker_set
@@ -150,11 +150,15 @@ def prepare(
     else:
         check_marker_set(marker_set, static.markers.labels)
 
+    static, marker_set, width_notes = with_widths(static, recordings, marker_set, subject)
     progress("calibration", 0.0)
     started = time.perf_counter()
-    check_recordings(recordings, static, marker_set)
-    turned = [_turned(item, marker_set) for item in inputs]
-    warnings += check_force_directions([trial for trial, _ in turned], marker_set.segments.get("pelvis", ()))
+    warnings += warnings_of(static.name, static_doubts(static, marker_set, subject.height_m))
+    turned = []
+    for item in inputs:
+        trial, told = _looked_at(item, static, marker_set)
+        warnings += told
+        turned.append(_turned(trial, marker_set))
     model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
     literature = literature_bsp(
         known(subject.mass_kg), known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
@@ -169,7 +173,7 @@ def prepare(
         ik_s = time.perf_counter() - started
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
 
-    notes = [f"marker set: {marker_set.name}", *static.notes, *notes]
+    notes = [f"marker set: {marker_set.name}", *static.notes, *width_notes, *notes]
     for trial, _ in turned:
         absent = [label for label in skeleton.labels if label not in trial.markers.labels]
         if absent:
@@ -189,8 +193,8 @@ def prepare(
     )
 
 
-def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
-    """The trial with its loads sorted by foot, facing +X, and the angle (deg) it was turned by."""
+def _looked_at(item: TrialInput, static: Recording, marker_set: MarkerSet) -> tuple[Trial, list[str]]:
+    """The trial with its loads sorted by foot, in the laboratory's axes, and warnings."""
     recording = item.recording.without_empty_markers()
     for side in "rl":
         label = marker_set.landmarks[f"asis_{side}"][0]
@@ -203,7 +207,13 @@ def _turned(item: TrialInput, marker_set: MarkerSet) -> tuple[Trial, float]:
             raise TrialError(
                 recording.name, f"no marker of the {'right' if side == 'r' else 'left'} foot is in the file"
             )
+    warnings = warnings_of(recording.name, trial_doubts(recording, marker_set, static, feet))
     trial = build_trial(recording, feet, item.window_s)
+    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(recording, trial, marker_set))]
+
+
+def _turned(trial: Trial, marker_set: MarkerSet) -> tuple[Trial, float]:
+    """The trial facing +X, and the angle (deg) it was turned by."""
     try:
         rotation, angle = facing(trial.markers, marker_set)
     except MarkerSetError as error:

@@ -14,19 +14,21 @@ import numpy as np
 
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
+from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
-from kinertia.estimation.input_checks import check_force_directions, check_recordings, complete_subject, known
+from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported import OsimModel
+from kinertia.model.model_markers import markers_of_model
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Settings, Subject
-from kinertia.trial.data import Recording, Trial
+from kinertia.trial.data import Trial
 from kinertia.trial.plate_assignment import build_trial
 
 LIGHT_KG = 0.5
@@ -55,12 +57,11 @@ def prepare_osim(
     feet = _feet(model)
     progress("calibration", 0.0)
     started = time.perf_counter()
-    check_recordings([_of_model(model, item.recording) for item in inputs], None, None)
-    trials = [_trial(model, item, feet) for item in inputs]
-    root = model.skeleton.segments[0]
-    warnings += check_force_directions(
-        trials, [marker.label for marker in model.skeleton.markers if marker.segment == root]
-    )
+    trials = []
+    for item in inputs:
+        trial, told = _looked_at(model, item, feet)
+        warnings += told
+        trials.append(trial)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
     check_force_masses(skeleton, known(subject.mass_kg), trials)
@@ -131,15 +132,8 @@ def _feet(model: OsimModel) -> dict[str, list[str]]:
     return feet
 
 
-def _of_model(model: OsimModel, recording: Recording) -> Recording:
-    """The recording with those markers only that the model has."""
-    known_labels = {marker.label for marker in model.skeleton.markers}
-    worn = [label for label in recording.markers.labels if label in known_labels]
-    return replace(recording, markers=recording.markers.select(worn)) if worn else recording
-
-
-def _trial(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> Trial:
-    """The trial with its loads sorted by foot."""
+def _looked_at(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> tuple[Trial, list[str]]:
+    """The trial with its loads sorted by foot, and warnings."""
     recording = item.recording.without_empty_markers()
     labels = {}
     for (side, bodies), name in zip(feet.items(), ("right", "left"), strict=True):
@@ -151,7 +145,10 @@ def _trial(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]
                 f"no marker of the {name} foot is in the file (the model has {', '.join(worn) or 'none'} there); it "
                 f"takes one to tell which plate the foot stands on",
             )
-    return build_trial(recording, labels, item.window_s)
+    marker_set = markers_of_model(model)
+    warnings = warnings_of(recording.name, trial_doubts(recording, marker_set, None, labels))
+    trial = build_trial(recording, labels, item.window_s)
+    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(recording, trial, marker_set))]
 
 
 def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -45,8 +45,11 @@ class FitPictures(Protocol):
     def moments(self, trial: str | None = None) -> Figure:
         """Joint moments per body mass, before against estimate."""
 
-    def cycles(self, kind: Kind = "moment") -> Figure | None:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides."""
+    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure | None:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides.
+
+        `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
+        """
 
     def markers(self, trial: str | None = None) -> Figure:
         """Distance between every measured and modelled marker."""
@@ -57,8 +60,14 @@ class FitPictures(Protocol):
     def skeleton(self, trial: str | None = None) -> Figure:
         """The skeleton in motion, with markers, centres of mass and ground reactions."""
 
+    def body(self, shown: Literal["mass", "information"] = "mass") -> Figure | None:
+        """The body, coloured by change of mass or by what the data say of it ("information"; None after two-level)."""
+
     def bsp(self) -> Figure:
-        """Body segment parameters before and after, with intervals where there are any."""
+        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
+
+    def departures(self) -> Figure | None:
+        """The same in prior SDs; None after two-level."""
 
     def information(self) -> Figure | None:
         """What the data say about each parameter; None after two-level."""
@@ -246,6 +255,20 @@ class Fit:
     def save(self, folder: str | Path) -> Path:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
         return display.save(self, folder)
+
+    def figure(self, name: str, path: str | Path) -> Path:
+        """Draw a figure for a paper into a file: 180 mm wide, three panels in a row; returns the file.
+
+        Args:
+            name: "moments", "angles", "powers" or "forces" over the gait cycle (moments and angles without strides over
+                time, of the first trial), or "bsp": changes of body segment parameters.
+            path: .svg, .pdf, .eps, .png or .tif.
+
+        Raises:
+            KinertiaError: no such figure, no strides to draw it from, or matplotlib (the extra `plots`) is missing.
+            FileError: a format that is not known, or the file cannot be written.
+        """
+        return display.figure(self, name, path)
 
     @property
     def covariance(self) -> pd.DataFrame | None:

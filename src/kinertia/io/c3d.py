@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.c3d_plates import LabPlates, lab_plates, to_ground_plates
+from kinertia.io.c3d_plates import lab_plates, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
+from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
 from kinertia.io.trc import METRES_PER_UNIT
-from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
+from kinertia.trial.data import FloatArray, Markers, Recording
 
-_AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
 _PERSON_M = (0.3, 2.8)
@@ -31,7 +31,7 @@ _PERSON_M = (0.3, 2.8)
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
 
 
-def read_c3d(path: str | Path) -> Recording:
+def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
     """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
 
     Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
@@ -43,6 +43,11 @@ def read_c3d(path: str | Path) -> Recording:
     `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so
     `plates` is None when none is left.
 
+    Args:
+        path: the file.
+        length_unit: of its lengths, "mm", "cm" or "m", whatever the file says; by the file, or by the size of a person
+            where it says nothing, if None.
+
     Raises:
         FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit;
             or ezc3d is not installed.
@@ -51,12 +56,13 @@ def read_c3d(path: str | Path) -> Recording:
     file, notes = _open(path)
     parameters = file["parameters"]
     labels, positions, label_notes = _markers(path, file)
-    unit_name, unit_notes = _length_unit(path, parameters, positions)
+    unit_name, unit_notes = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
     notes += unit_notes
     time = _times(file, "points")
     plates, plate_notes = lab_plates(path, file, unit)
-    rotation, up, axis_notes = _to_ground(path, parameters, unit * positions, plates)
+    told = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
+    rotation, up, axis_notes = to_ground(path, told, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
     mass, height, measurements, subject_notes = _subject(path, parameters)
@@ -95,13 +101,19 @@ def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
     return default
 
 
-def _length_unit(path: Path, parameters: Any, positions: FloatArray) -> tuple[str, list[str]]:
+def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[str]]:
     """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
     unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
+    if stated is not None:
+        differs = f"{path.name}: lengths were read in {stated}, as stated; POINT:UNITS says '{unit}'"
+        return stated, [] if unit == stated else [differs]
     if unit in METRES_PER_UNIT:
         return unit, []
     if unit:
-        raise FileError(path, f"POINT:UNITS is '{unit}'; expected mm, cm or m, correct the parameter")
+        raise FileError(
+            path,
+            f"POINT:UNITS is '{unit}'; expected mm, cm or m: correct it, or state length_unit in the subject file",
+        )
     whole = positions[np.isfinite(positions).all(axis=(1, 2))]
     size = float(np.median(np.ptp(whole, axis=1).max(axis=1))) if len(whole) else np.nan
     low, high = _PERSON_M
@@ -110,11 +122,11 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray) -> tuple[st
         raise FileError(
             path,
             f"POINT:UNITS is empty, and its markers, which reach {size:.3g} units, are a person's in none of mm, cm "
-            f"and m; write the unit into the parameter",
+            f"and m; write the unit into the parameter, or state it: length_unit in the subject file",
         )
     return likely[0], [
         f"{path.name}: POINT:UNITS is empty; taken as {likely[0]}, in which the markers reach "
-        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, write the unit into the parameter"
+        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, state it: length_unit in the subject file"
     ]
 
 
@@ -141,7 +153,7 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
     zero = np.asarray((positions == 0).all(axis=2))
     positions[zero] = np.nan
-    seen = np.asarray(_seen(positions).any(axis=0))
+    seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
     labels = _continued(file["parameters"], "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
     outputs = _outputs(file["parameters"], labels)
@@ -193,48 +205,6 @@ def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[st
         others = ", ".join(name for name in prefixes if name != subject)
         notes = [f"{path.name}: several subjects; '{subject}:' was removed from the labels, {others} keep theirs"]
     return [label.removeprefix(subject + ":") for label in labels], notes
-
-
-def _to_ground(
-    path: Path, parameters: Any, positions: FloatArray, plates: LabPlates | None
-) -> tuple[FloatArray, str, list[str]]:
-    """Rotation (3, 3) from lab to ground axes and the axis that is up, from the file's word and from the data."""
-    told = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
-    told_up = _AXES.get(told)
-    seen = positions[_seen(positions).any(axis=1)]
-    extent = np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=0)
-    floor = np.zeros(3) if plates is None else plates.corners.mean(axis=(0, 1))
-    force = np.zeros(3) if plates is None else plates.loaded_direction()
-    if np.abs(force).max() > 0.8:
-        axis, why = int(np.argmax(np.abs(force))), "the plates' forces"
-    else:
-        axis, why = int(np.argmax(extent)), "the markers' extents"
-        if told_up is not None and extent[told_up[0]] > 0.5 * extent[axis]:
-            axis = told_up[0]
-    middle = np.nanmedian(seen, axis=(0, 1))[axis] - floor[axis]
-    found_up = (axis, 1 if middle >= 0 else -1)
-    up = f"{'+-'[found_up[1] < 0]}{'XYZ'[axis]}"
-    notes = []
-    if told_up is None:
-        notes.append(f"{path.name}: no vertical axis given (POINT:Y_SCREEN); {up} was found from {why}")
-    elif told_up != found_up:
-        notes.append(f"{path.name}: POINT:Y_SCREEN says {told} is up but {why} say {up}; {up} was used")
-    if up != "+Y":
-        notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
-    return _rotation(*found_up), up, notes
-
-
-def _seen(positions: FloatArray) -> BoolArray:
-    """(n, m) True where all three coordinates are there."""
-    return np.asarray(np.isfinite(positions).all(axis=2))
-
-
-def _rotation(axis: int, sign: int) -> FloatArray:
-    """Rotation (3, 3) that turns a lab axis to +Y and keeps lab X where it can; for Z up (x, y, z) -> (x, z, -y)."""
-    up = np.zeros(3)
-    up[axis] = sign
-    forward = np.eye(3)[1 if axis == 0 else 0]
-    return np.array([forward, up, np.cross(forward, up)])
 
 
 def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[str]]:

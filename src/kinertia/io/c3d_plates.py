@@ -32,13 +32,13 @@ class LabPlates:
         names: (p) `plate 1`, ... by the file's order.
         force: (k, p, 3) N as in the file, on the person or on the plate.
         moment: (k, p, 3) N m about the lab origin.
-        corners: (p, 4, 3) m.
+        corners: (p, 4, 3) m, or None where the file does not tell.
     """
 
     names: tuple[str, ...]
     force: FloatArray
     moment: FloatArray
-    corners: FloatArray
+    corners: FloatArray | None
 
     def loaded_direction(self) -> FloatArray:
         """Mean direction (3,) of the loaded samples, each without its sign; zero when nothing is loaded."""
@@ -86,8 +86,8 @@ def to_ground_plates(
     if plates is None:
         return None, [f"{path.name}: no force plate that can be used"]
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
-    corners = plates.corners @ rotation.T
-    notes, noises = [], []
+    corners = None if plates.corners is None else plates.corners @ rotation.T
+    notes, noises, idle = [], [], []
     for p, name in enumerate(plates.names):
         vertical = np.nan_to_num(force[:, p, 1])
         if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
@@ -104,16 +104,24 @@ def to_ground_plates(
         if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
             told = ", ".join(f"{value:.0f}" for value in offset)
             notes.append(f"{path.name}: {name} reads ({told}) N when unloaded; this was not subtracted")
-        force[:, p], moment[:, p], noise = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
-        noises.append(noise)
+        plate = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
+        force[:, p], moment[:, p] = plate.force, plate.moment
+        noises.append(plate.noise_n)
+        idle.append(plate.idle)
         if not loaded.any():
             notes.append(f"{path.name}: {name} never reaches {LOAD_THRESHOLD_N:g} N")
-        elif (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M:
+        elif (
+            corners is not None
+            and (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M
+        ):
             notes.append(
                 f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
                 "corners; check the plate's corners, origin and units"
             )
-    return PlateLoads(time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises)), notes
+    loads = PlateLoads(
+        time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises), tuple(idle)
+    )
+    return loads, notes
 
 
 def _corner_trouble(corners: FloatArray) -> str:

@@ -235,7 +235,8 @@ def _trial_doubt(header: _Header, parameters: _Parameters) -> str:
 
 def _list_doubt(parameters: _Parameters, channels: int) -> str:
     """Lists per channel that are shorter than there are channels, or not of numbers."""
-    if ("ROTATION", "USED") in parameters:
+    rotations = parameters.get(("ROTATION", "USED"))
+    if rotations is not None and rotations.numbers != (0,):  # ezc3d writes that there are none
         return "it has rotations"
     for name in ("SCALE", "OFFSET"):
         entry = parameters.get(("ANALOG", name))

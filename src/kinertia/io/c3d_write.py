@@ -19,7 +19,7 @@ _CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
 def write_c3d(path: str | Path, recording: Recording) -> None:
-    """Write markers, force plates, mass and height to a C3D file; numbers are stored in single precision.
+    """Write markers, force plates, mass, height and measurements to a C3D file; numbers are in single precision.
 
     Plate channels hold the force on the person and its moment about the middle of the plate's surface, in plate axes.
 
@@ -47,6 +47,8 @@ def write_c3d(path: str | Path, recording: Recording) -> None:
         file.add_parameter("PROCESSING", "Bodymass", float(recording.mass_kg))
     if recording.height_m is not None:
         file.add_parameter("PROCESSING", "Height", _MM * recording.height_m)
+    for name, length_m in recording.measurements.items():
+        file.add_parameter("PROCESSING", name, _MM * length_m)
     if recording.plates is not None:
         _add_plates(file, recording.plates, _samples_per_frame(recording, recording.plates))
     save_c3d(file, path)

@@ -78,6 +78,7 @@ def read_forces_with_notes(
         np.stack([plate.moment for plate in wrenches], axis=1),
         tuple(group.foot for group in groups),
         noise_n=tuple(plate.noise_n for plate in wrenches),
+        idle=tuple(plate.idle for plate in wrenches),
     )
     return loads, (*notes, *table.notes, *_remarks(path, loads, groups))
 

@@ -1,4 +1,4 @@
-"""Marker sets from TOML files: three come with the package, and a user's own has the same form.
+"""Marker sets from TOML files: the presets come with the package, and a user's own has the same form.
 
 Copy one from `src/kinertia/io/marker_sets/` and change it.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.toml_lines import TomlFile, parse_toml, read_toml
-from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, mismatch, share_worn
+from kinertia.model.marker_set import ENOUGH_WORN, LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, mismatch, share_worn
 
 
 def preset_names() -> list[str]:
@@ -44,14 +44,17 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
         MarkerSetError: no preset fits; says for the best one what is missing and the nearest labels.
     """
     best = nearest_preset(labels)
-    if share_worn(best, labels) < 0.8:
+    if share_worn(best, labels) < ENOUGH_WORN:
         raise mismatch(best, labels, "no marker-set preset fits the static trial; the nearest is")
     return best
 
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
-    """The preset that shares most of its labels with these, be it many or few."""
-    return max(map(read_marker_set, preset_names()), key=lambda preset: share_worn(preset, labels))
+    """The preset that shares most of its labels with these, be it many or few; of such that are part of one another,
+    the larger.
+    """
+    presets = map(read_marker_set, preset_names())
+    return max(presets, key=lambda preset: (share_worn(preset, labels), len(preset.labels)))
 
 
 def _marker_set(document: TomlFile, path: Path) -> MarkerSet:

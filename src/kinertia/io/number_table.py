@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -95,6 +96,6 @@ def _cell(path: Path, line: int, column: int, cell: str) -> float:
     try:
         return float(cell)
     except ValueError:
-        raise FileError(
-            path, f"'{cell.strip()}' in column {column} is not a number; repair or export it again", line
-        ) from None
+        commas = re.fullmatch(r"\s*[-+]?\d+,\d+(e[-+]?\d+)?\s*", cell, re.IGNORECASE)
+        hint = "export it again with decimal points" if commas else "repair or export it again"
+        raise FileError(path, f"'{cell.strip()}' in column {column} is not a number; {hint}", line) from None

@@ -13,20 +13,28 @@ from kinertia.io.number_table import expect_file
 from kinertia.io.trc import read_trc_recording
 from kinertia.trial.data import Recording
 
+MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
+FORCE_FILES = (".mot", ".sto", ".tsv")
+"""Endings of what is read."""
 _FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
 """Farther and stronger than anything in a laboratory."""
 
 
 def read_recording(
-    markers_path: str | Path, forces_path: str | Path | None = None, loads_path: str | Path | None = None
+    markers_path: str | Path,
+    forces_path: str | Path | None = None,
+    loads_path: str | Path | None = None,
+    length_unit: str | None = None,
 ) -> Recording:
     """Read one trial: markers, and forces where there are any.
 
     Args:
-        markers_path: a .trc or .c3d file.
-        forces_path: a .mot or .sto file; its forces go before those of a C3D file.
+        markers_path: a .trc or .c3d file, a .tsv file of Qualisys, or a .csv file of Vicon.
+        forces_path: a .mot or .sto file; its forces go before those of the markers' file. Of Qualisys also the .tsv
+            file of a plate: those of the trial's other plates beside it are read, too.
         loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without
             `forces_path` its own datafile is read.
+        length_unit: of a .c3d file's lengths, "mm", "cm" or "m", whatever it says itself.
 
     Returns:
         the recording; its `plates` is None where no file holds usable force plates.
@@ -36,10 +44,13 @@ def read_recording(
         TrialError: forces and markers do not overlap in time.
     """
     markers_path = Path(markers_path)
-    _expect_kind(markers_path, (".trc", ".c3d"), "markers")
-    recording = _read_c3d(markers_path) if markers_path.suffix.lower() == ".c3d" else read_trc_recording(markers_path)
+    _expect_kind(markers_path, MARKER_FILES, "markers")
+    tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
+    recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit)
+    if tsv:
+        forces_path = None
     if forces_path is not None:
-        _expect_kind(Path(forces_path), (".mot", ".sto"), "forces")
+        _expect_kind(Path(forces_path), FORCE_FILES, "forces")
     if loads_path is not None:
         _expect_kind(Path(loads_path), (".xml",), "external loads")
     if forces_path is not None or loads_path is not None:
@@ -52,16 +63,34 @@ def read_recording(
     return recording
 
 
-def _read_c3d(path: Path) -> Recording:
-    """`read_c3d`, loaded by those who have such files."""
-    from kinertia.io.c3d import read_c3d
+def _read_markers(path: Path, plate: Path | None, length_unit: str | None) -> Recording:
+    """What a file of markers holds; readers are loaded by those who have such files."""
+    kind = path.suffix.lower()
+    if length_unit is not None and kind != ".c3d":
+        raise FileError(path, "length_unit is for C3D files; this one says its own unit")
+    if plate is not None:
+        expect_file(plate)
+        if kind != ".tsv":
+            raise FileError(plate, "a plate of Qualisys goes with markers of Qualisys; expected a .tsv file of markers")
+    if kind == ".c3d":
+        from kinertia.io.c3d import read_c3d
 
-    return read_c3d(path)
+        return read_c3d(path, length_unit)
+    if kind == ".tsv":
+        from kinertia.io.qualisys import plates_beside, read_qualisys
+
+        return read_qualisys(path, None if plate is None else plates_beside(plate))
+    if kind == ".csv":
+        from kinertia.io.vicon_csv import read_vicon_csv
+
+        return read_vicon_csv(path)
+    return read_trc_recording(path)
 
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
     if path.suffix.lower() not in suffixes:
-        raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {' or '.join(suffixes)}")
+        known = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {known}")
     expect_file(path)
 
 

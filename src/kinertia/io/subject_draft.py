@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import difflib
 import json
+import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
-from kinertia.io.recording import read_recording
+from kinertia.io.qualisys import plates_beside
+from kinertia.io.recording import MARKER_FILES, read_recording
 from kinertia.io.subject_file import Model, TrialFiles
 from kinertia.settings import Settings, Subject, Table
 
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 """What the names of static trials contain."""
+NO_FORCES = "# No forces were found for"
+"""How the line begins that says so of a trial."""
 
 
 def init_subject(folder: str | Path) -> str:
     """Draft a subject file for the recordings in a folder (not its subfolders); writes nothing.
 
     The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads go
-    with the trial whose name is most like theirs; mass and height come from a C3D file that holds them. What
-    stays unknown is a commented line marked FILL IN. Recordings whose names begin like another static trial's
-    are left out and named in a comment.
+    with the trial whose name is most like theirs, and are looked for in the folders in it and beside it where the
+    folder itself has none; mass and height come from a C3D file that holds them. What stays unknown is a commented
+    line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names begin like another
+    static trial's are left out and named in a comment.
 
     Raises:
-        FileError: no such folder, or no .c3d or .trc file in it.
+        FileError: no such folder, or no file of markers in it.
     """
     folder = Path(folder).resolve()
     if not folder.is_dir():
@@ -37,15 +42,20 @@ def init_subject(folder: str | Path) -> str:
         if not _is_utf8(file.name):
             raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
     c3d = [file for file in files if file.suffix.lower() == ".c3d"]
-    trc = [file for file in files if file.suffix.lower() == ".trc"]
+    trc = [file for file in files if file.suffix.lower() != ".c3d" and _holds_markers(file)]
     captures = c3d + [file for file in trc if file.stem not in [twin.stem for twin in c3d]]
     if not captures:
-        raise FileError(folder, "holds no .c3d or .trc file; give the folder that holds the recordings")
+        inside = [f.name for f in files if f.is_dir() and any(map(_is_capture, filter(Path.is_file, f.iterdir())))]
+        if inside:
+            raise FileError(folder, f"holds no file of markers, but its folder {inside[0]} does; give that one")
+        raise FileError(
+            folder, f"holds no file of markers ({', '.join(MARKER_FILES)}); give the folder that holds the recordings"
+        )
     static, trials = _static_and_trials(captures)
     others = [file.name for file in c3d + trc if file not in (static, *trials)]
-    forces = [file for file in files if _holds_forces(file)]
-    loads = [file for file in files if file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)]
-    chosen = matched_by_name([trial for trial in trials if trial not in c3d], forces)
+    alone = [trial for trial in trials if not _brings_forces(trial)]
+    forces, loads = (_here_or_near(folder, files, holds) for holds in (_holds_forces, _holds_loads))
+    chosen = matched_by_name(alone, forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
@@ -57,10 +67,11 @@ def init_subject(folder: str | Path) -> str:
     for trial in trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
         if trial in chosen:
-            text += [_entry(TrialFiles, "forces", chosen[trial].name, note=" (matched by name)")]
+            text += [_entry(TrialFiles, "forces", _relative(chosen[trial], folder), note=" (matched by name)")]
             for file in matched_by_name([chosen[trial]], loads).values():
-                text += [_entry(TrialFiles, "loads", file.name, note=" (matched by name)")]
-        elif trial not in c3d:
+                text += [_entry(TrialFiles, "loads", _relative(file, folder), note=" (matched by name)")]
+        elif trial in alone:
+            text += [f"{NO_FORCES} {trial.name}, here or in the folders in and beside this one."]
             text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
     if not trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
@@ -126,6 +137,51 @@ def _duration_s(file: Path) -> float:
 def _head(file: Path) -> str:
     with file.open("rb") as stream:
         return stream.read(20_000).decode("utf-8", errors="replace")
+
+
+def _is_capture(file: Path) -> bool:
+    return file.suffix.lower() == ".c3d" or _holds_markers(file)
+
+
+def _holds_markers(file: Path) -> bool:
+    """Whether a text file is a recording of markers, by its ending and its head."""
+    told = {".tsv": "MARKER_NAMES", ".csv": "Sub Frame"}
+    kind = file.suffix.lower()
+    return kind == ".trc" or (kind in told and told[kind] in _head(file))
+
+
+def _brings_forces(file: Path) -> bool:
+    """Whether force plates come with it."""
+    kind = file.suffix.lower()
+    return kind == ".c3d" or (kind == ".tsv" and bool(plates_beside(file))) or (kind == ".csv" and _has_plates(file))
+
+
+def _has_plates(file: Path) -> bool:
+    recording = _recording(file)
+    return recording is not None and recording.plates is not None
+
+
+def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], bool]) -> list[Path]:
+    """The files of the folder that hold it; where there are none, those of the folders in it and beside it, but for
+    folders with markers of their own: those may be another person's.
+    """
+    found = [file for file in files if holds(file)]
+    if found:
+        return found
+    for other in (*files, *sorted(folder.parent.iterdir())):
+        inside = sorted(file for file in other.iterdir() if file.is_file()) if other.is_dir() else []
+        if other != folder and not any(map(_is_capture, inside)):
+            found += [file for file in inside if holds(file)]
+    return found
+
+
+def _relative(file: Path, folder: Path) -> str:
+    """As a subject file in the folder names it."""
+    return Path(os.path.relpath(file, folder)).as_posix()
+
+
+def _holds_loads(file: Path) -> bool:
+    return file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)
 
 
 def _holds_forces(file: Path) -> bool:

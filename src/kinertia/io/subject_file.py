@@ -41,7 +41,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PureWindowsPath
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     BeforeValidator,
@@ -103,6 +103,7 @@ File = Annotated[Path, BeforeValidator(_file)]
 MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 TrialName = Annotated[str, BeforeValidator(_trial_name)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
+LengthUnit = Literal["mm", "cm", "m"]
 
 
 class Model(Table):
@@ -111,7 +112,10 @@ class Model(Table):
     `markers` is a preset's name, an absolute path, or None: detect it.
     """
 
-    static: File | None = Field(default=None, description="static trial, .c3d or .trc")
+    static: File | None = Field(default=None, description="static trial, .c3d, .trc, .tsv or .csv")
+    length_unit: LengthUnit | None = Field(
+        default=None, description="of a static C3D file that says none, or a wrong one: mm, cm or m"
+    )
     markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
     osim: File | None = Field(default=None, description="scaled OpenSim model, .osim, in place of a static trial")
     calibrate: bool = Field(default=False, description="OpenSim model only; true: markers and joint centres may move")
@@ -121,9 +125,14 @@ class TrialFiles(Table):
     """Files of one dynamic trial; `window_s` (start, end) overrides the measured window, s."""
 
     name: TrialName = Field(description="name in files and report; left out: the marker file's")
-    markers: File = Field(description="markers, .c3d or .trc")
-    forces: File | None = Field(default=None, description="plate forces, .mot or .sto; C3D has its own")
+    markers: File = Field(description="markers, .c3d, .trc, .tsv or .csv")
+    forces: File | None = Field(
+        default=None, description="plate forces, .mot or .sto; C3D, .tsv and .csv have their own"
+    )
     loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
+    length_unit: LengthUnit | None = Field(
+        default=None, description="of a C3D file that says none, or a wrong one: mm, cm or m"
+    )
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
 
     @model_validator(mode="before")

@@ -73,6 +73,8 @@ def parse_toml(text: str, path: Path) -> TomlFile:
         slashes = "; write paths with / instead of \\"  # TOML reads \d and \U as the beginning of something else
         hints = {"Invalid value": "; put text in quotes", "Unescaped": slashes, "Invalid hex value": slashes}
         hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
+        if comma := re.search(r"=\s*([-+]?\d+),(\d+)\s*(#|$)", text.splitlines()[line - 1] if number else ""):
+            hint = f"; a number has a decimal point, not a comma: {comma[1]}.{comma[2]}"
         raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
 
 

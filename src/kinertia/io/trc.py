@@ -19,6 +19,7 @@ METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
 _TIME_TOLERANCE_FRAMES = 0.25
+_MOST_DECIMALS = 7
 
 
 def read_trc(path: str | Path) -> Markers:
@@ -54,7 +55,7 @@ def read_trc_recording(path: str | Path) -> Recording:
     counted = f"{path.name}: its header announces {frames} frames, the file has {len(values)}: all of them were read"
     count_notes = () if len(values) == frames else (counted,)
     time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
-    positions, position_notes = _positions(path, values[:, 2:], labels, line_numbers)
+    positions, position_notes = seen_positions(path, values[:, 2:], labels, line_numbers)
     unit = header["Units"].lower()
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
@@ -165,7 +166,9 @@ def _uniform_time(
     if len(time) == 1:
         return time, ()
     step = (time[-1] - time[0]) / (len(time) - 1)
-    if abs(rate_hz * step - 1) > 0.01:
+    at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
+    # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
+    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > _rounding_s(time):
         found = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
         raise FileError(path, f"{found}; correct the wrong one", 3)
     frames = np.arange(len(time))
@@ -186,6 +189,14 @@ def _uniform_time(
     return uniform, ((note,) if error.max() > 1e-6 else ())
 
 
+def _rounding_s(time: FloatArray) -> float:
+    """The unit of the last decimal that the times are told to."""
+    for decimals in range(_MOST_DECIMALS):
+        if np.abs(time - time.round(decimals)).max() < 1e-9:
+            return float(10.0**-decimals)
+    return 0.0
+
+
 def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) -> None:
     if np.isnan(time).any():
         row = int(np.argmax(np.isnan(time)))
@@ -200,9 +211,10 @@ def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) ->
         raise FileError(path, f"{found}; expected every frame, export gaps as empty cells", line_numbers[row])
 
 
-def _positions(
+def seen_positions(
     path: Path, values: FloatArray, labels: tuple[str, ...], line_numbers: list[int]
 ) -> tuple[FloatArray, tuple[str, ...]]:
+    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where all are missing or zero, and notes on zeros."""
     positions = values.reshape(len(values), len(labels), 3)
     absent = np.isnan(positions)
     partly = np.argwhere(absent.any(axis=2) & ~absent.all(axis=2))

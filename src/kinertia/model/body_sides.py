@@ -16,6 +16,9 @@ from kinertia.trial.data import FloatArray, Markers
 _UP = np.array([0.0, 1.0, 0.0])
 _CLEAR = 0.5
 """Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
+_BELOW_M = 0.05
+_BENT = 0.35
+"""Sine of 20 degrees: beyond it, an elbow's bend is clear."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
 _OUTER = (("knee_lateral", "knee_medial"), ("ankle_lateral", "ankle_medial"))
 _WORDS = {"r": "right", "l": "left"}
@@ -24,8 +27,7 @@ _WORDS = {"r": "right", "l": "left"}
 def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
     """What the labels have the wrong way round, what shows it, and what to do; empty where nothing is.
 
-    Directions are medians over the frames, so that a few bad frames do not count. Elbows are not looked at: an arm may
-    turn its outer side anywhere.
+    Directions are medians over the frames, so that a few bad frames do not count.
 
     Args:
         markers: of a person upright, standing or walking; Y up.
@@ -54,7 +56,11 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
             f"left and right look swapped in the labels {pairs}: toes and pelvis face the other way than they say; "
             f"correct the labels"
         )
-    return _outside_trouble(places, right, marker_set)
+    return (
+        _order_trouble(places, marker_set)
+        or _outside_trouble(places, right, marker_set)
+        or _elbow_trouble(places, right, marker_set)
+    )
 
 
 def _landmarks(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:
@@ -117,6 +123,54 @@ def _outside_trouble(places: Mapping[str, FloatArray], right: FloatArray, marker
                     f"the outer marker of the {_WORDS[side]} {joint} is on its inner side: the labels "
                     f"{_names(marker_set, *names)} look swapped; correct them"
                 )
+    return ""
+
+
+def _order_trouble(places: Mapping[str, FloatArray], marker_set: MarkerSet) -> str:
+    """Knees that are below ankles, the pelvis below knees."""
+    for side in "rl":
+        for upper, lower in (
+            (f"knee_lateral_{side}", f"ankle_lateral_{side}"),
+            (f"asis_{side}", f"knee_lateral_{side}"),
+        ):
+            if not {upper, lower} <= set(places):
+                continue
+            heights = (places[upper] - places[lower])[:, 1]
+            known = heights[np.isfinite(heights)]
+            if known.size and np.median(known) < -_BELOW_M:
+                return (
+                    f"{_names(marker_set, upper)} is {-1e3 * np.median(known):.0f} mm below "
+                    f"{_names(marker_set, lower)}: their labels look swapped; correct them"
+                )
+    return ""
+
+
+def _elbow_trouble(places: Mapping[str, FloatArray], right: FloatArray, marker_set: MarkerSet) -> str:
+    """An arm may turn its outer side anywhere, but elbows bend forwards only; and the outer side of a straight arm is
+    never inside where it hangs, nor below where it is raised.
+    """
+    for side, sign in (("r", 1.0), ("l", -1.0)):
+        names = [f"{name}_{side}" for name in ("elbow_lateral", "elbow_medial", "acromion", "wrist")]
+        if not set(names) <= set(places):
+            continue
+        lateral, medial, shoulder, wrist = (places[name] for name in names)
+        elbow = (lateral + medial) / 2
+        upper, fore, out = _unit(elbow - shoulder), _unit(wrist - elbow), _unit(lateral - medial)
+        normal = np.cross(upper, fore)
+        bent = np.linalg.norm(normal, axis=1) > _BENT
+        with np.errstate(invalid="ignore"):
+            by_bend = sign * (normal * out).sum(axis=1) / np.linalg.norm(normal, axis=1)
+            outwards = np.where(
+                np.abs(upper[:, 1]) > _CLEAR, sign * (_unit(_level(right)) * out).sum(axis=1), out[:, 1]
+            )
+        shown = np.where(bent, by_bend, outwards)
+        shown = shown[np.isfinite(shown)]
+        if shown.size and np.median(shown) < -_CLEAR:
+            why = "the elbow would bend backwards" if bent.mean() > 0.5 else "it is on the inner side of the arm"
+            return (
+                f"the outer and inner elbow markers of the {_WORDS[side]} arm, {_names(marker_set, *names[:2])}, look "
+                f"swapped: {why}; correct the labels"
+            )
     return ""
 
 

@@ -170,7 +170,8 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
         marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
         raise MarkerSetError(
             f"the {joint} needs a medial marker or the joint's width, and the static trial has neither; "
-            f"use a static trial with medial markers, or a C3D file with the widths in PROCESSING",
+            f"use a static trial with medial markers, a C3D file with the widths in PROCESSING, or give the width "
+            f"in the subject file: {joint.rpartition('_')[0]}_width_mm = ... under [subject]",
             [medial],
         )
     marks.require(joint, lateral, wand)

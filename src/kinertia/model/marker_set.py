@@ -40,6 +40,8 @@ LANDMARKS = (
     "sternal_notch",
     "head_top",
 )
+ENOUGH_WORN = 0.8
+"""Share of a preset's labels from which on a recording has it."""
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
 
 
@@ -93,7 +95,8 @@ def mismatch(marker_set: MarkerSet, labels: Sequence[str], what: str) -> MarkerS
     listed = ", ".join(label + _hint(nearest[label]) for label in missing)
     return MarkerSetError(
         f"{what} '{marker_set.name}', which lacks {len(missing)} of {len(marker_set.labels)} labels: {listed}; "
-        f"write a marker set of your own as TOML and name it under [model] markers",
+        f"write a marker set of your own as TOML (kinertia markers FILE -o SET.toml drafts it) and name it under "
+        f"[model] markers",
         missing,
         nearest,
     )
@@ -101,11 +104,11 @@ def mismatch(marker_set: MarkerSet, labels: Sequence[str], what: str) -> MarkerS
 
 def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, list[str]]:
     """For each missing label the labels that look most like it."""
-    folded: dict[str, str] = {}
+    known: dict[str, str] = {}
     for label in labels:
-        folded.setdefault(_fold(label), label)
+        known.setdefault(folded(label), label)
     return {
-        label: [folded[near] for near in difflib.get_close_matches(_fold(label), list(folded), n=2, cutoff=0.6)]
+        label: [known[near] for near in difflib.get_close_matches(folded(label), list(known), n=2, cutoff=0.6)]
         for label in missing
     }
 
@@ -114,5 +117,6 @@ def _hint(near: Sequence[str]) -> str:
     return f" (nearest: {' or '.join(near)})" if near else ""
 
 
-def _fold(label: str) -> str:
+def folded(label: str) -> str:
+    """Its letters and digits, in lower case."""
     return "".join(ch for ch in label.lower() if ch.isalnum())

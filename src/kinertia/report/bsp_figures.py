@@ -1,4 +1,4 @@
-"""Figures of body segment parameters: intervals before and after, and what the data say about each."""
+"""Figures of body segment parameters: changes with intervals, and what the data say about each."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.model.bsp import PARAMETERS
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, base_layout, plain, small_multiples
-from kinertia.report.wording import decimals, fixed, read_in, start_of
+from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in, start_of
 
 DEPARTURE_SD = 2.0
 """Estimates further from where they started than this many prior SDs are pointed out."""
@@ -30,9 +29,8 @@ NAMES = (
     "Iyz",
 )
 """Of `PARAMETERS`, in words."""
-_INTERVAL_SD = 1.96
-_ESTIMATED_BY_TWO_LEVEL = 7
-"""The study's, first in `PARAMETERS`; products of inertia stay as they were."""
+MASS_AND_COM, MAIN, PRODUCTS = range(4), range(7), range(7, 10)
+"""Columns of `PARAMETERS`; two-level leaves the products of inertia as they were."""
 
 
 def segment_name(segment: str) -> str:
@@ -62,97 +60,116 @@ def estimated_rows(fit: Fit) -> np.ndarray:
     return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
 
 
-def bsp_figure(fit: Fit) -> Figure:
-    """Estimate against start (literature, or OpenSim model): a panel per parameter, a row per segment.
+def change_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure:
+    """Change of these parameters by the estimate, in kg, mm and kg m2: a panel per parameter, a row per segment.
 
-    With error bars everything is in prior SDs, so that feet can be read beside the trunk; without (two-level),
-    it is the difference in the parameter's unit. Segments that are held are left out.
+    With 95 % intervals of prior and estimate, where there are any (not after two-level). Segments that are held are
+    left out.
     """
+    posterior, start = fit.posterior, start_of(fit)
+    shown, rows = _rows(fit)
+    panels = []
+    for k in columns:
+        unit, factor = read_in(k)
+        scale = np.full(len(shown), 1 / factor)
+        panels.append(Panel(f"{NAMES[k]} ({unit})", _traces(fit, shown, k, scale), (), rows))
+    bars = "without error bars" if posterior is None else "with 95 % intervals before and after"
+    alt = f"Change against {start.of} by the estimate, {bars}: {', '.join(NAMES[k] for k in columns)}."
+    return small_multiples(panels, alt, {"nticks": 5}, row_px=230, left_px=112, linked=False)
+
+
+def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
+    """The same in prior SDs, so that feet can be read beside the trunk; None after two-level, which has none."""
     away, posterior, start = departures(fit), fit.posterior, start_of(fit)
-    shown = estimated_rows(fit)
-    segments = [segment_name(fit.estimate.segments[i]) for i in shown]
-    rows = {**_named(segments), "range": [len(segments) - 0.4, -0.6]}
     if away is None or posterior is None:
-        change = fit.estimate.table() - fit.literature.table()
-        panels = [_plain_panel(k, change[:, k], rows, start.word) for k in range(_ESTIMATED_BY_TWO_LEVEL)]
-        axis: dict[str, Any] = {"nticks": 5}
-        alt = f"Differences between estimate and {start.word} for every body segment parameter, without error bars."
-    else:
-        panels = [_panel(fit, posterior, shown, k, rows) for k in range(len(PARAMETERS))]
-        away, half = away[shown], (_INTERVAL_SD * posterior.sd / _scale(posterior))[shown]
-        reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
-        title = {"text": f"prior SDs from {start.of}", "font": {"size": 11}, "standoff": 2}
-        axis = {"range": [-reach, reach], "title": title, "nticks": 7}
-        far = int((np.abs(away) > DEPARTURE_SD).sum())
-        alt = (
-            f"95 % intervals of every body segment parameter before and after the estimate; {far} of "
-            f"{int((posterior.prior_sd > 0).sum())} estimates lie more than {DEPARTURE_SD:g} prior SDs from "
-            f"{start.of}."
-        )
-    return small_multiples(panels, alt, axis, row_px=230, left_px=112, linked=away is not None)
+        return None
+    shown, rows = _rows(fit)
+    scale = _scale(posterior)
+    panels = [Panel(NAMES[k], _traces(fit, shown, k, scale[shown, k]), (), rows) for k in columns]
+    part = np.ix_(shown, np.array(columns))
+    away, half = away[part], (INTERVAL_SD * posterior.sd / scale)[part]
+    reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
+    title = {"text": f"prior SDs from {start.of}", "font": {"size": 11}, "standoff": 2}
+    alt = (
+        f"95 % intervals before and after the estimate in prior SDs: {', '.join(NAMES[k] for k in columns)}; "
+        f"{int((np.abs(away) > DEPARTURE_SD).sum())} of {int((posterior.prior_sd[part] > 0).sum())} estimates lie more "
+        f"than {DEPARTURE_SD:g} prior SDs from {start.of}."
+    )
+    axis = {"range": [-reach, reach], "title": title, "nticks": 7}
+    return small_multiples(panels, alt, axis, row_px=230, left_px=112)
 
 
-def _panel(fit: Fit, posterior: Posterior, shown: np.ndarray, k: int, rows: dict[str, Any]) -> Panel:
-    start = start_of(fit)
+def _rows(fit: Fit) -> tuple[np.ndarray, dict[str, Any]]:
+    """Rows of the segments that are shown, and the axis with their names, downwards."""
+    shown = estimated_rows(fit)
+    names = [segment_name(fit.estimate.segments[i]) for i in shown]
+    return shown, {**_named(names), "range": [len(names) - 0.4, -0.6]}
+
+
+def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict[str, Any]]:
+    """Change of parameter k in units of `scale` per segment; what was held is left out."""
+    posterior, start = fit.posterior, start_of(fit)
     before, after = fit.literature.table()[shown, k], fit.estimate.table()[shown, k]
-    prior_sd, sd, scale = posterior.prior_sd[shown, k], posterior.sd[shown, k], _scale(posterior)[shown, k]
-    away, half = (after - before) / scale, _INTERVAL_SD * sd / scale
-    place = np.arange(len(shown))
+    away, place = (after - before) / scale, np.arange(len(shown))
+    names = [plain(segment_name(fit.estimate.segments[i])) for i in shown]
+    if posterior is None:
+        told = [f"{name}: {_change(k, a - b)}" for name, b, a in zip(names, before, after, strict=True)]
+        return [_dots(away, place, told) | {"name": f"estimate minus {start.word}"}]
+    prior_sd, sd = posterior.prior_sd[shown, k], posterior.sd[shown, k]
+    half = INTERVAL_SD * sd / scale
     told = [
-        f"{plain(segment_name(fit.estimate.segments[i]))}: {start.word} {_interval(k, b, p)}, "
-        f"estimate {_interval(k, a, s)} {read_in(k)[0]}"
-        for i, b, p, a, s in zip(shown, before, prior_sd, after, sd, strict=True)
+        f"{name}: {start.word} {_interval(k, b, p)}, estimate {_interval(k, a, s)} {read_in(k)[0]}"
+        for name, b, p, a, s in zip(names, before, prior_sd, after, sd, strict=True)
     ]
-    prior = {
-        "type": "scatter",
-        "mode": "markers",
-        "x": compact(np.zeros(len(place))),
-        "y": place.tolist(),
-        "marker": {"symbol": "line-ns-open", "size": 9, "color": style.GREY},
-        "error_x": {"type": "constant", "value": _INTERVAL_SD, "thickness": 7, "width": 0, "color": style.PALE},
-        "name": f"{start.word}, 95 %",
-        "hoverinfo": "skip",
-    }
-    far = np.abs(away) > DEPARTURE_SD
-    traces = [prior]
+    free = prior_sd > 0
+    traces: list[dict[str, Any]] = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "x": compact(np.zeros(int(free.sum()))),
+            "y": place[free].tolist(),
+            "marker": {"symbol": "line-ns-open", "size": 9, "color": style.GREY},
+            "error_x": _bars(INTERVAL_SD * prior_sd[free] / scale[free], 7, style.PALE),
+            "name": f"{start.word}, 95 %",
+            "hoverinfo": "skip",
+        }
+    ]
+    far = np.abs(after - before) > DEPARTURE_SD * prior_sd
     for chosen, name, colour, symbol in (
-        (~far, "estimate, 95 %", style.BLUE, "circle"),
-        (far, f"estimate beyond {DEPARTURE_SD:g} prior SDs", style.VERMILION, "diamond"),
+        (free & ~far, "estimate, 95 %", style.BLUE, "circle"),
+        (free & far, f"estimate beyond {DEPARTURE_SD:g} prior SDs", style.VERMILION, "diamond"),
     ):
         if chosen.any():
-            traces.append(
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "x": compact(away[chosen]),
-                    "y": place[chosen].tolist(),
-                    "marker": {"symbol": symbol, "size": 8, "color": colour},
-                    "error_x": {"array": compact(half[chosen]), "thickness": 2.2, "width": 0, "color": colour},
-                    "name": name,
-                    "text": [line for line, yes in zip(told, chosen, strict=True) if yes],
-                    "hovertemplate": "%{text}<extra></extra>",
-                }
-            )
-    return Panel(NAMES[k], traces, (), rows)
+            dots = _dots(away[chosen], place[chosen], [line for line, yes in zip(told, chosen, strict=True) if yes])
+            look = {"symbol": symbol, "size": 8, "color": colour}
+            traces.append(dots | {"marker": look, "error_x": _bars(half[chosen], 2.2, colour), "name": name})
+    return traces
+
+
+def _dots(x: np.ndarray, place: np.ndarray, told: list[str]) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "x": compact(x),
+        "y": place.tolist(),
+        "marker": {"size": 8, "color": style.BLUE},
+        "text": told,
+        "hovertemplate": "%{text}<extra></extra>",
+    }
+
+
+def _bars(half: np.ndarray, thickness: float, colour: str) -> dict[str, Any]:
+    return {"array": compact(half), "thickness": thickness, "width": 0, "color": colour}
+
+
+def _change(k: int, value: float) -> str:
+    unit, factor = read_in(k)
+    return f"{fixed(factor * value, decimals(k, abs(value)), sign=True)} {unit}"
 
 
 def _interval(k: int, value: float, sd: float) -> str:
     factor, digits = read_in(k)[1], decimals(k, sd)
     return f"{fixed(factor * value, digits)} ± {fixed(factor * sd, digits)}"
-
-
-def _plain_panel(k: int, change: np.ndarray, rows: dict[str, Any], start: str) -> Panel:
-    unit, factor = read_in(k)
-    trace = {
-        "type": "scatter",
-        "mode": "markers",
-        "x": compact(factor * change),
-        "y": list(range(len(change))),
-        "marker": {"size": 8, "color": style.BLUE},
-        "name": f"estimate minus {start}",
-        "hovertemplate": f"%{{y}}: %{{x:.3g}} {unit}<extra></extra>",
-    }
-    return Panel(f"{NAMES[k]} ({unit})", [trace], (), rows)
 
 
 def information_figure(fit: Fit) -> Figure | None:

@@ -23,10 +23,10 @@ from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
-from kinertia.report.wording import decimals, fixed, read_in
+from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
 from kinertia.trial.data import FEET
 
-CHANGED_SD = 1.96
+CHANGED_SD = INTERVAL_SD
 """A difference of more than this many of its own deviations is a change."""
 _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
 MOST_FITS = len(_COLOURS)

@@ -9,44 +9,52 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
 from kinertia.estimation.result import Fit
+from kinertia.io.norms_file import Norm
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, small_multiples
-from kinertia.report.wording import start_of
+from kinertia.report.wording import INTERVAL_SD, start_of
 from kinertia.trial.data import FEET, runs
 
 MOST_STRIDES = 100
 """Of a trial and side; of more, so many are taken, evenly spread."""
 _MOST_DRAWN = 5
 """Of a side; mean and bands are of all."""
-_BAND_SD = 1.96
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY = 0.13, 0.25, 0.45
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
 """By quantity and side."""
+Norms = Mapping[str, Norm]
+"""By quantity, for both sides."""
 
 
-def cycle_figures(fit: Fit) -> dict[Kind, Figure]:
-    """All figures over the gait cycle, by kind; none where no trial has a stride."""
+def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({})) -> dict[Kind, Figure]:
+    """All figures over the gait cycle, by kind; none where no trial has a stride. Norms are grey bands below."""
     if not any(trial.strides for trial in fit.trials):
         return {}
-    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"))
+    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"), norms)
     return {kind: drawn.figure(kind) for kind in UNITS}
 
 
-def cycle_figure(fit: Fit, kind: Kind) -> Figure | None:
+def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> Figure | None:
     """The one of this kind; None where no trial has a stride."""
-    return cycle_figures(fit).get(kind)
+    return cycle_figures(fit, norms).get(kind)
+
+
+def quantities_of(fit: Fit) -> set[str]:
+    """Names of all curves that a fit has over the gait cycle."""
+    return {quantity for quantity, _ in curves_of(fit, "estimate")}
 
 
 def curves_of(fit: Fit, stage: Stage) -> Curves:
@@ -65,6 +73,7 @@ class _Drawn:
     fit: Fit
     estimate: Curves
     usual: Curves
+    norms: Norms
 
     def figure(self, kind: Kind) -> Figure:
         panels = [
@@ -90,6 +99,9 @@ class _Drawn:
 
     def _traces(self, quantity: str) -> Iterator[dict[str, Any]]:
         values = start_of(self.fit).values
+        if norm := self.norms.get(quantity):
+            outline = _outline(norm.percent, norm.mean - norm.sd, norm.mean + norm.sd, style.faded(style.GREY, 0.3))
+            yield {**outline, "name": "norm, mean ± SD"}
         for side in FEET:
             curves, usual = (found.get((quantity, side), []) for found in (self.estimate, self.usual))
             word, colour = style.SIDES[side]
@@ -139,7 +151,7 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
         yield {**_band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
     sds = [one.sd for one in curves if one.sd is not None]
     if sds:
-        half = _BAND_SD * _over_strides(np.nanmean, np.array(sds))
+        half = INTERVAL_SD * _over_strides(np.nanmean, np.array(sds))
         name = f"{word}, 95 % of the estimate"
         yield {**_band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
     if len(curves) > 1:
@@ -194,20 +206,26 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
 
 
 def _band(low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
+    """Around every stretch without a gap; whole percents in one byte each."""
+    band = _outline(PERCENT, low, high, colour)
+    return {**band, "x": np.asarray(band["x"]).astype(np.uint8)}
+
+
+def _outline(percent: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
     """A closed outline around every stretch without a gap."""
     x: list[np.ndarray] = []
     y: list[np.ndarray] = []
     for first, last in runs(np.isfinite(low) & np.isfinite(high)):
         part = slice(first, last + 1)
-        x += [PERCENT[part], PERCENT[part][::-1], np.zeros(1)]
+        x += [percent[part], percent[part][::-1], np.zeros(1)]
         y += [low[part], high[part][::-1], np.full(1, np.nan)]
-    outline = {"fill": "toself", "fillcolor": colour, "line": {"width": 0}, "hoverinfo": "skip"}
-    if not x:
-        return {"type": "scatter", "mode": "lines", "x": [], "y": [], **outline}
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": np.concatenate(x)[:-1].astype(np.uint8),
-        "y": compact(np.concatenate(y)[:-1]),
-        **outline,
+        "x": compact(np.concatenate(x)[:-1]) if x else [],
+        "y": compact(np.concatenate(y)[:-1]) if y else [],
+        "fill": "toself",
+        "fillcolor": colour,
+        "line": {"width": 0},
+        "hoverinfo": "skip",
     }

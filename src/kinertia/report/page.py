@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,21 @@ from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.bsp_figures import NAMES, bsp_figure, departures, information_figure, segment_name
-from kinertia.report.cycle_figures import MOST_STRIDES, cycle_figures
+from kinertia.report.body_figure import body_figure
+from kinertia.report.bsp_figures import (
+    MAIN,
+    MASS_AND_COM,
+    NAMES,
+    PRODUCTS,
+    change_figure,
+    departure_figure,
+    departures,
+    information_figure,
+    segment_name,
+)
+from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures
 from kinertia.report.cycle_table import stride_rows
-from kinertia.report.figure import written
+from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
@@ -34,7 +46,7 @@ from kinertia.report.time_figures import (
     moment_figure,
     residual_figure,
 )
-from kinertia.report.wording import decimals, fixed, read_in, start_of
+from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in, start_of
 from kinertia.trial.data import runs
 from kinertia.trial.rms import rms_length
 
@@ -44,13 +56,21 @@ _VIEW_FRAMES = 400
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
 
 
-def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[str, str] | None = None) -> str:
-    """The report of a fit. Without provenance (a fit made in Python) it names neither files nor command.
+def render(
+    fit: Fit,
+    provenance: Provenance | None = None,
+    computed_by: Mapping[str, str] | None = None,
+    norms: Norms = MappingProxyType({}),
+) -> str:
+    """The report of a fit.
 
-    `computed_by` are the versions that the fit is from, where they are not the present ones.
+    Args:
+        fit: what it is about.
+        provenance: files and command; a fit made in Python has none.
+        computed_by: the versions that the fit is from, where they are not the present ones.
+        norms: of the curves over the gait cycle, as bands behind them.
     """
     shown = fit.trials[:MOST_TRIALS]
-    information = information_figure(fit)
     return rendered(
         "report.html.j2",
         title=f"{fit.subject.name}: body segment parameters",
@@ -60,9 +80,20 @@ def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
-        cycle=_cycle(fit),
-        bsp={"figure": written(bsp_figure(fit)), "rows": bsp_rows(fit)},
-        information=None if information is None else written(information),
+        cycle=_cycle(fit, norms),
+        body={
+            "mass": _written(body_figure(fit)),
+            "information": _written(body_figure(fit, "information")),
+            "changes": written(change_figure(fit, MASS_AND_COM)),
+        },
+        bsp={
+            **{
+                name: {"change": written(change_figure(fit, some)), "departure": _written(departure_figure(fit, some))}
+                for name, some in (("main", MAIN), ("products", PRODUCTS))
+            },
+            "rows": bsp_rows(fit),
+        },
+        information=_written(information_figure(fit)),
         residuals=residual_rows(fit.trials),
         trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
         settings=fit.settings.model_dump(),
@@ -75,15 +106,20 @@ def render(fit: Fit, provenance: Provenance | None = None, computed_by: Mapping[
     )
 
 
-def _cycle(fit: Fit) -> dict[str, Any] | None:
+def _written(figure: Figure | None) -> dict[str, Any] | None:
+    return None if figure is None else written(figure)
+
+
+def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
     """Everything that the templates show of the gait cycle; None where there are no strides."""
-    figures = cycle_figures(fit)
+    figures = cycle_figures(fit, norms)
     if not figures:
         return None
     strides = [stride for trial in fit.trials for stride in trial.strides]
     return {
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
+        "norms": bool(norms),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
         **{kind: written(figure) for kind, figure in figures.items()},
@@ -94,7 +130,6 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
     """Everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
     noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
-    gaps = gap_figure(trial)
     return {
         "id": f"trial{k + 1}",
         "name": trial.name,
@@ -112,7 +147,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
         ),
         "noise": noise,
-        "gaps": None if gaps is None else written(gaps),
+        "gaps": _written(gap_figure(trial)),
         "scene": Markup(json.dumps(packed(scene(fit, trial, _VIEW_FRAMES // count)))),
     }
 
@@ -142,6 +177,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
             unit, factor = read_in(k)
             values = {"before": before[i, k], "estimate": after[i, k]}
             row: dict[str, Any] = {"segment": segment_name(segment), "parameter": f"{NAMES[k]} ({unit})"}
+            row |= {"product": k in PRODUCTS, "changed": bool(after[i, k] != before[i, k])}
             # without a deviation, inertias have about three digits
             size = 0.1 * max(abs(before[i, k]), abs(after[i, k]))
             if posterior is not None and away is not None:
@@ -151,6 +187,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
                 told = float(posterior.information[i, k])
                 row |= {"away": away[i, k], "information": 0.0 if held else max(100 * told, 0.0), "held": held}
                 row["evidence"] = evidence(told)
+                row["changed"] = not held and abs(after[i, k] - before[i, k]) > INTERVAL_SD * posterior.sd[i, k]
             for name, value in values.items():
                 row[name] = {"value": value * factor, "text": fixed(value * factor, decimals(k, size))}
             rows.append(row)

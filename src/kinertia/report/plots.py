@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinertia.estimation.cycles import Kind
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.report.bsp_figures import bsp_figure, information_figure
+from kinertia.io.norms_file import read_norms
+from kinertia.report.body_figure import Shown, body_figure
+from kinertia.report.bsp_figures import change_figure, departure_figure, information_figure
 from kinertia.report.cycle_figures import cycle_figure
 from kinertia.report.extras import expect_plotly
 from kinertia.report.figure import Figure
@@ -30,6 +33,10 @@ def as_plotly(figure: Figure) -> go.Figure:
     import plotly.graph_objects as go
 
     return go.Figure(figure.data, figure.layout, figure.frames)
+
+
+def _plotly_if_any(figure: Figure | None) -> go.Figure | None:
+    return None if figure is None else as_plotly(figure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +62,12 @@ class FitPlots:
         mass_kg, start = self.fit.mass_kg, start_of(self.fit)
         return as_plotly(moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start))
 
-    def cycles(self, kind: Kind = "moment") -> go.Figure | None:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides."""
-        figure = cycle_figure(self.fit, kind)
-        return None if figure is None else as_plotly(figure)
+    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> go.Figure | None:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides.
+
+        `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
+        """
+        return _plotly_if_any(cycle_figure(self.fit, kind, {} if norms is None else read_norms(norms)))
 
     def markers(self, trial: str | None = None) -> go.Figure:
         """Distance between every measured and modelled marker."""
@@ -68,21 +77,27 @@ class FitPlots:
 
     def gaps(self, trial: str | None = None) -> go.Figure | None:
         """When markers were not seen; None where all always were."""
-        figure = gap_figure(self._trial(trial))
-        return None if figure is None else as_plotly(figure)
+        return _plotly_if_any(gap_figure(self._trial(trial)))
 
     def skeleton(self, trial: str | None = None) -> go.Figure:
         """The skeleton in motion, with markers, centres of mass and ground reactions."""
         return as_plotly(skeleton_figure(self.fit, self._trial(trial)))
 
+    def body(self, shown: Shown = "mass") -> go.Figure | None:
+        """The body, coloured by change of mass or by what the data say of it ("information"; None after two-level)."""
+        return _plotly_if_any(body_figure(self.fit, shown))
+
     def bsp(self) -> go.Figure:
-        """Body segment parameters before and after, with intervals where there are any."""
-        return as_plotly(bsp_figure(self.fit))
+        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
+        return as_plotly(change_figure(self.fit))
+
+    def departures(self) -> go.Figure | None:
+        """The same in prior SDs; None after two-level."""
+        return _plotly_if_any(departure_figure(self.fit))
 
     def information(self) -> go.Figure | None:
         """What the data say about each parameter; None after two-level."""
-        figure = information_figure(self.fit)
-        return None if figure is None else as_plotly(figure)
+        return _plotly_if_any(information_figure(self.fit))
 
     def _trial(self, name: str | None) -> TrialFit:
         trials = {trial.name: trial for trial in self.fit.trials}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.files import save_fit
+from kinertia.report.journal_figure import save_figure
 from kinertia.report.notebook import fit_html, recording_html, trial_fit_html, trial_html
 from kinertia.report.plots import FitPlots
 from kinertia.trial import display
@@ -15,3 +16,4 @@ display.html.register(TrialFit, trial_fit_html)
 display.html.register(Fit, fit_html)
 display.pictures.register(Fit, FitPlots)
 display.save.register(Fit, save_fit)
+display.figure.register(Fit, save_figure)

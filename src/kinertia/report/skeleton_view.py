@@ -86,7 +86,6 @@ def _bones(
 ) -> tuple[np.ndarray, tuple[str, ...], np.ndarray]:
     """A line to every joint centre from its parent's, across hips and shoulders, and to every last marker."""
     index = {name: i for i, name in enumerate(skeleton.segments)}
-    parents = {joint.parent for joint in skeleton.joints}
     bones = [(index[joint.parent], index[joint.child]) for joint in skeleton.joints if joint.parent in index]
     named = [joint.child for joint in skeleton.joints if joint.parent in index]
     parent = {joint.child: joint.parent for joint in skeleton.joints}
@@ -97,15 +96,24 @@ def _bones(
             named.append(parent[right])
     points = [translation]
     for i, segment in enumerate(skeleton.segments):
-        worn = skeleton.marker_locals[skeleton.marker_segments == i]
-        if not len(worn) or (segment in parents and segment != "torso"):
+        end = last_marker(skeleton, i)
+        if end is None:
             continue
-        end = worn[np.argmax(np.linalg.norm(worn, axis=1))]
         points.append((rotation[:, i] @ end + translation[:, i])[:, None])
         bones.append((i, len(index) + len(points) - 2))
         named.append(segment)
     sides = tuple(name[-1] if name.endswith(("_r", "_l")) else "" for name in named)
     return np.array(bones), sides, np.concatenate(points, axis=1)
+
+
+def last_marker(skeleton: Skeleton, i: int) -> np.ndarray | None:
+    """(3,) m, of segment i in its frame: where it ends if nothing hangs on it, or if it is the trunk; else None."""
+    segment = skeleton.segments[i]
+    worn = skeleton.marker_locals[skeleton.marker_segments == i]
+    if not len(worn) or (segment != "torso" and any(joint.parent == segment for joint in skeleton.joints)):
+        return None
+    end: np.ndarray = worn[np.argmax(np.linalg.norm(worn, axis=1))]
+    return end
 
 
 def _centres(

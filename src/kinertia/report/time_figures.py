@@ -18,7 +18,7 @@ from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, small_multiples
-from kinertia.report.wording import LITERATURE, Start
+from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
 from kinertia.trial.gait_events import GaitEvent, gait_events
 from kinertia.trial.rms import rms, rms_length
 
@@ -29,7 +29,6 @@ MOST_EVENTS = 40
 _AROUND = 0.2
 """Share of the window that is shown before and after it."""
 _AXES = ("forward", "upward", "to the right")
-_BAND_SD = 1.96
 
 
 def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> Figure:
@@ -138,7 +137,7 @@ def _bands(one: Coordinate, trial: TrialFit, sd: np.ndarray, mass_kg: float, thi
     traces = []
     for side, column in one.columns.items():
         word, colour = style.SIDES[side]
-        middle, half = trial.joint_loads["estimate"][:, column] / mass_kg, _BAND_SD * sd[:, column]
+        middle, half = trial.joint_loads["estimate"][:, column] / mass_kg, INTERVAL_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
         fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
         traces.append({**_curve(trial.time, middle - half, thin), **edge, "showlegend": False})

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import UNITS
 
+INTERVAL_SD = 1.96
+"""Half of a 95 % interval, in standard deviations."""
 _READ_IN = {"m": ("mm", 1e3)}
 _DECIMALS = {"kg": 2, "m": 1}
 _INERTIA_DECIMALS = (4, 6)

@@ -108,7 +108,7 @@ def plan_measured(
 
     def told(chosen: Sequence[int]) -> Information:
         seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, uncertainty)
-        calibration = calibration_prior(used, uncertainty)
+        calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
         return Information(MapProblem(used, prior, calibration, seen.alone, bandwidth.spacing_s), seen.repeats)
 
     everything = tuple(range(len(trials)))

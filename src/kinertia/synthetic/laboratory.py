@@ -141,12 +141,12 @@ def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc"
             else:
                 write_trc(work / f"{name}.trc", recording.markers)
         if kind == "trc" and recordings.walk.plates is not None:
-            write_sto(work / "walk_grf.mot", _force_table(recordings.walk.plates), False, "walk_grf")
+            write_sto(work / "walk_grf.mot", force_table(recordings.walk.plates), False, "walk_grf")
         (work / "subject.toml").write_text(_subject_text(kind), encoding="utf-8")
     return Path(folder) / "subject.toml"
 
 
-def _force_table(plates: PlateLoads) -> pd.DataFrame:
+def force_table(plates: PlateLoads) -> pd.DataFrame:
     """Columns as OpenSim's examples name them: force, its point of application on the ground, and torque there."""
     columns: dict[str, np.ndarray] = {}
     point = centre_of_pressure(np.concatenate([plates.force, plates.moment], axis=-1))

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -109,6 +110,20 @@ class Markers:
         return replace(self, positions=self.positions @ rotation.T)
 
 
+class IdleReading(NamedTuple):
+    """What a plate reads while nobody stands on it.
+
+    Attributes:
+        level_n: median force along X, Y, Z, N; NaN where it is hardly ever idle.
+        drift_n: by how much the vertical force changes over the recording, by a straight line, N; NaN likewise.
+        peak_n: the largest vertical force of the whole recording, N.
+    """
+
+    level_n: tuple[float, float, float]
+    drift_n: float
+    peak_n: float
+
+
 @dataclass(frozen=True, eq=False)
 class PlateLoads:
     """What p force plates (or column groups of a force file) measured.
@@ -122,6 +137,8 @@ class PlateLoads:
             the loads file may be wrong, `kinertia.trial.plate_assignment` decides by the data.
         corners: (p, 4, 3) m, or None where the file does not tell.
         noise_n: of each plate, deviation of its vertical force while nobody stands on it, N; None where it is unknown.
+        idle: of each plate, what it read while nobody stood on it, before that was taken away; None where it is
+        unknown.
 
     Examples:
         >>> force, moment = np.zeros((5, 1, 3)), np.zeros((5, 1, 3))
@@ -138,6 +155,7 @@ class PlateLoads:
     declared_feet: tuple[str | None, ...]
     corners: FloatArray | None = None
     noise_n: tuple[float, ...] | None = None
+    idle: tuple[IdleReading, ...] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.names), 3)

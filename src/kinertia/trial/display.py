@@ -44,6 +44,13 @@ def save(thing: object, folder: str | Path) -> Path:
     return save(thing, folder)
 
 
+@singledispatch
+def figure(thing: object, name: str, path: str | Path) -> Path:
+    """Draw one figure of `thing` into a file, and return the file."""
+    _load(figure, thing)
+    return figure(thing, name, path)
+
+
 def _load(function: Any, thing: object) -> None:
     for module in _modules:
         import_module(module)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, nearest_samples
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading, nearest_samples
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
@@ -21,17 +21,22 @@ _ABOVE_NOISE, _LEAST_TAIL_N = 4.0, 1.0
 _FEWEST_IDLE = 20
 _IDLE_MOST_N, _STEADY_N = 3 * LOAD_THRESHOLD_N, 5.0
 """An idle level is below the first, and varies by less than the second: a foot that lands or leaves does not."""
+_BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
+_IDLE_BLOCK_N, _STEADY_BLOCK_N = 150.0, 15.0
+"""In a tenth of a second in which nobody steps on or off, a plate reads less than the first, and varies by less than
+the second."""
 _GAUSSIAN = 1.4826
 """Deviation of Gaussian noise over its median absolute deviation."""
 
 
 class PlateLoad(NamedTuple):
     """One plate without what it reads when unloaded: force (k, 3) N, moment (k, 3) N m, noise of the vertical force
-    N."""
+    N, and what it read."""
 
     force: FloatArray
     moment: FloatArray
     noise_n: float
+    idle: IdleReading
 
 
 def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> PlateLoad:
@@ -44,8 +49,9 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     """
     loaded = force[:, 1] >= load_threshold_n(force[:, 1])
     offset_n, noise_n = _idle(force[~loaded, 1])
+    idle = idle_reading(time, force)
     if not loaded.any():
-        return PlateLoad(np.zeros_like(force), np.zeros_like(force), noise_n)
+        return PlateLoad(np.zeros_like(force), np.zeros_like(force), noise_n, idle)
     firm = np.flatnonzero(loaded)
     nearest = firm[nearest_samples(time[firm], time)] if len(firm) > 1 else np.full(len(time), firm[0])
     stands_out = force[:, 1] > max(offset_n + _ABOVE_NOISE * noise_n, _LEAST_TAIL_N)
@@ -53,7 +59,26 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     tail = _joining(loaded, loaded | (stands_out & near)) & ~loaded
     point = centre_of_pressure(np.concatenate([force, moment], axis=1)[nearest])
     moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))
-    return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n)
+    return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n, idle)
+
+
+def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
+    """What a plate reads (k, 3) N while nobody stands on it: in tenths of a second in which little changes."""
+    peak_n = float(np.abs(force[:, 1]).max(initial=0.0))
+    every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
+    count = len(time) // every
+    if not count:
+        return IdleReading((np.nan,) * 3, np.nan, peak_n)
+    blocks = force[: count * every].reshape(count, every, 3)
+    low, high = np.percentile(blocks[..., 1], (5, 95), axis=1)
+    level = np.median(blocks, axis=1)
+    idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < _IDLE_BLOCK_N)
+    if idle.sum() < _FEWEST_BLOCKS:
+        return IdleReading((np.nan,) * 3, np.nan, peak_n)
+    x, y, z = (float(value) for value in np.median(level[idle], axis=0))
+    when = time[: count * every].reshape(count, every).mean(axis=1)[idle]
+    drift_n = float(np.polyfit(when - when.mean(), level[idle, 1], 1)[0]) * float(time[-1] - time[0])
+    return IdleReading((x, y, z), drift_n, peak_n)
 
 
 def load_threshold_n(vertical: FloatArray) -> float:

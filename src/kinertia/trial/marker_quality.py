@@ -60,10 +60,6 @@ class Travel:
         return f"walks along {axis}{aside}, {self.distance_m:.2f} m at {self.speed_m_s:.2f} m/s"
 
 
-_SPIKE_M, _FEW_SPIKES = 0.08, 2
-_LISTED = 6
-
-
 def visibility(markers: Markers) -> tuple[Visibility, ...]:
     """Of every marker, in the file's order."""
     seen = markers.seen
@@ -97,31 +93,6 @@ def travel(markers: Markers) -> Travel:
     if distance < _LEAST_WALK_M:
         return Travel("no net travel", distance, 0.0, np.nan)
     return Travel("walks", distance, speed, float(np.degrees(np.arctan2(-velocity[2], velocity[0]))))
-
-
-def spikes_trouble(markers: Markers) -> str:
-    """Which markers leave their way for single frames, how far and how often; empty where none does more than twice.
-
-    Judged is how far a marker is from the middle between the frames before and after: bodies' accelerations account for
-    less than 20 mm at 60 frames a second.
-    """
-    if len(markers.time) < 3:
-        return ""
-    place = markers.positions
-    away = np.nan_to_num(np.linalg.norm(place[1:-1] - (place[2:] + place[:-2]) / 2, axis=-1))
-    # of three frames around a spike the middle one is farthest away
-    beside = np.pad(away, ((1, 1), (0, 0)))
-    spike = (away > _SPIKE_M) & (away >= beside[2:]) & (away >= beside[:-2])
-    often = np.flatnonzero(spike.sum(axis=0) > _FEW_SPIKES)
-    if not often.size:
-        return ""
-    told = ", ".join(f"{markers.labels[k]} ({spike[:, k].sum()} times)" for k in often[:_LISTED])
-    more = f" and {often.size - _LISTED} more" if often.size > _LISTED else ""
-    first = float(markers.time[1 + int(np.argmax(spike[:, often[0]]))])
-    return (
-        f"spikes: single frames in which markers are up to {1e3 * away[spike].max():.0f} mm off their way: "
-        f"{told}{more}; the first at {first:.3f} s: delete those frames of the marker, a gap is bridged, or label them"
-    )
 
 
 def extent_m(markers: Markers) -> FloatArray:

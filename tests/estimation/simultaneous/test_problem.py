@@ -196,3 +196,35 @@ def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):
     silent = np.setdiff1d(np.arange(basis.size), touched)
     assert not normal.border[silent][..., problem.layout.theta].any()
     assert np.abs(normal.border[touched][..., problem.layout.theta]).max(axis=(1, 2)).min() > 0
+
+
+@pytest.mark.parametrize("place", [0, 4, 5, 6], ids=["mass", "Lxx", "Lyy", "Lzz"])
+def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
+    """The cost is a square in masses and second moments: by their logarithms it bends by its slope more.
+
+    Second moments without products, else a diagonal of L stands in other elements, too.
+    """
+    coefficients, static = here[0], here[1].copy()
+    static[problem.layout.theta].reshape(-1, 10)[:, 7:] = 0.0
+    rows = np.arange(problem.layout.theta.stop).reshape(-1, 10)[:, place]
+
+    def at(values):
+        return problem.at(Point((coefficients,), values, problem.beginning.displaced))
+
+    def right(linearised):
+        return linearised.right + linearised.normals[0].static_right
+
+    found = at(static)
+    bends = problem.bends(found)
+    assert (bends[rows] >= 0.0).all()
+    pulled = [row for row in rows if right(found)[row] < 0.0]
+    assert pulled
+    step = 1e-5
+    for row in pulled:
+        change = np.zeros_like(static)
+        change[row] = step
+        second = -(right(at(static + change))[row] - right(at(static - change))[row]) / (2.0 * step)
+        left_out = second - found.information[row, row] - found.normals[0].static[row, row]
+        assert bends[row] == pytest.approx(left_out, rel=1e-3)
+    others = [row for row in rows if right(found)[row] > 0.0]
+    np.testing.assert_array_equal(bends[others], 0.0)

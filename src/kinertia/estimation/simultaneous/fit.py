@@ -23,8 +23,8 @@ from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
 
-_STAYING_SD_M = 1e-6
-"""Of markers that stay where they are."""
+_STAYING_SD_M = 1e-4
+"""At least, of markers that stay where a model has them."""
 _NOTABLE = 2.0
 _DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
@@ -111,10 +111,11 @@ def fit_simultaneous(
     used = used_skeleton(skeleton, trials, uncertainty)
     seen = observed(used, prior, trials, bandwidth, uncertainty)
     together = seen.together
-    calibration = calibration_prior(used, uncertainty)
+    calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
     result = estimate_simultaneous(used, prior, calibration, together, bandwidth.spacing_s)
     found = result.skeleton.carrying(None)
-    if uncertainty.marker_sd_m is None:
+    staying = uncertainty.marker_sd_m is None
+    if staying:
         found = found.with_markers(used.markers)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
@@ -135,7 +136,7 @@ def fit_simultaneous(
         result,
         uncertainty.whole(result.bsp),
         found,
-        tuple(found.with_places(found.marker_locals + moved) for moved in result.displacements_m),
+        tuple(found.with_places(found.marker_locals + (0.0 if staying else m)) for m in result.displacements_m),
         posterior,
         motions,
         loads,
@@ -158,13 +159,20 @@ def observed(
     uncertainty: ModelUncertainty,
 ) -> Observations:
     """What the estimate sees of trials of a `used_skeleton`."""
-    staying = uncertainty.marker_sd_m is None
-    return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidth, staying)
+    return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidth)
 
 
-def calibration_prior(skeleton: Skeleton, uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY) -> CalibrationPrior:
-    """How far a calibrated skeleton with these markers, plates and clock may be off."""
-    places = np.full(len(skeleton.markers), uncertainty.marker_sd_m or _STAYING_SD_M)
+def calibration_prior(
+    skeleton: Skeleton, uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY, misplaced_m: np.ndarray | float = 0.0
+) -> CalibrationPrior:
+    """How far a calibrated skeleton with these markers, plates and clock may be off.
+
+    Markers that stay where a model has them are off by as much as they are found to be (`misplaced_m`): taken as exact,
+    they would hold the motion in poses that the forces contradict.
+    """
+    known = uncertainty.marker_sd_m
+    each = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
+    places = np.broadcast_to(each, len(skeleton.markers)).copy()
     return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments)
 
 

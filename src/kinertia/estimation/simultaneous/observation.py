@@ -45,11 +45,14 @@ class Observations:
     Attributes:
         alone: per trial, with the deviations of errors that never come back.
         noise: per trial.
+        misplaced_m: (m,) deviation of the markers' mean places in their segments, over the trials, from those that the
+            skeleton has.
         repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
     """
 
     alone: tuple[Observation, ...]
     noise: tuple[MarkerNoise, ...]
+    misplaced_m: np.ndarray
     repeats: np.ndarray
 
     @property
@@ -58,9 +61,7 @@ class Observations:
         return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
 
 
-def observe(
-    skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidth: Bandwidth, staying: bool = False
-) -> Observations:
+def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidth: Bandwidth) -> Observations:
     """The observations of trials of one person, and the noise of their markers.
 
     Args:
@@ -68,7 +69,6 @@ def observe(
         trials: kinematics of each.
         mass_kg: for the size of force errors.
         bandwidth: of motion and forces.
-        staying: markers stay where the skeleton has them, in all trials: no displacements.
     """
     errors = [_errors(skeleton, each) for each in trials]
     rates = [each.trial.markers.rate_hz for each in trials]
@@ -81,7 +81,7 @@ def observe(
         _observed(skeleton, *each, mass_kg, bandwidth)
         for each in zip(trials, errors, rest.varying, skin, frames, strict=True)
     ]
-    displaced = np.zeros(places.shape[1]) if staying else _displacement_sd(skeleton, rest.displaced)
+    displaced = _displacement_sd(skeleton, rest.displaced)
     # what the estimate finds to go with the joints comes back, too: it counts as often as before it was found
     alike = [
         repeats([weighed(e, o.marker_sd) for e, (o, _) in zip(every, found, strict=True)], rates)
@@ -93,24 +93,41 @@ def observe(
         replace(one, repeats=float(count), displacement_sd_m={label: by_label[label] for label in one.sd_m})
         for (_, one), count in zip(found, counts.sum(axis=1), strict=True)
     ]
-    return Observations(tuple(replace(o, displacement_sd_m=displaced) for o, _ in found), tuple(noise), counts)
+    together = tuple(replace(o, displacement_sd_m=displaced) for o, _ in found)
+    return Observations(together, tuple(noise), _misplaced(skeleton, rest.displaced), counts)
 
 
 def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
     """(m,) deviation over trials of where markers are in their segments (t, m, 3), segment by segment; NaN where a
     trial does not show them. Zero for a single trial.
     """
-    seen = np.isfinite(displaced)
-    count = seen.sum(axis=0)
-    middle = np.where(seen, displaced, 0.0).sum(axis=0) / np.maximum(count, 1)
-    apart = np.where(seen, displaced - middle, 0.0)
+    count = np.isfinite(displaced).sum(axis=0)
+    apart = np.nan_to_num(displaced - _middle(displaced))
+    return _spread(skeleton, apart, np.maximum(count - 1, 0))
+
+
+def _misplaced(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
+    """(m,) deviation of the mean places of markers (t, m, 3) from those of the skeleton, segment by segment."""
+    shown = np.isfinite(displaced).any(axis=0)
+    return _spread(skeleton, _middle(displaced)[None], shown.astype(int))
+
+
+def _middle(displaced: np.ndarray) -> np.ndarray:
+    """(m, 3) mean over trials (t, m, 3) of what is not NaN; zero where all is."""
+    result: np.ndarray = np.nansum(displaced, axis=0) / np.maximum(np.isfinite(displaced).sum(axis=0), 1)
+    return result
+
+
+def _spread(skeleton: Skeleton, apart: np.ndarray, freedom: np.ndarray) -> np.ndarray:
+    """(m,) root mean square of distances (t, m, 3) with these degrees of freedom (m, 3), the same for all markers of a
+    segment but for how many of them err alike.
+    """
     alike = markers_alike(skeleton, apart)
     result = np.zeros(len(alike))
     for segment in np.unique(skeleton.marker_segments):
         own = skeleton.marker_segments == segment
-        freedom = np.maximum(count[own] - 1, 0).sum()
-        if freedom:
-            result[own] = np.sqrt(alike[own] * np.square(apart[:, own]).sum() / freedom)
+        if freedom[own].any():
+            result[own] = np.sqrt(alike[own] * np.square(apart[:, own]).sum() / freedom[own].sum())
     return result
 
 

@@ -21,6 +21,7 @@ from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.range_terms import add_ranges
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
@@ -252,10 +253,30 @@ class MapProblem:
 
     def shortened(self, step: np.ndarray) -> np.ndarray:
         """The step with no logarithm (mass, second moments) changing by more than one."""
-        logs = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
         step = step.copy()
-        step[logs] = np.clip(step[logs], -1.0, 1.0)
+        step[self.logs] = np.clip(step[self.logs], -1.0, 1.0)
         return step
+
+    @property
+    def logs(self) -> np.ndarray:
+        """Where the static unknowns are logarithms: per segment of the mass, and three of square roots of second
+        moments.
+        """
+        result: np.ndarray = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
+        return result
+
+    def bends(self, here: Linearised) -> np.ndarray:
+        """(S,) what Gauss-Newton leaves out of second derivatives by the logarithms, where the cost falls with them.
+
+        The data may ask for a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
+        them what holds a Gauss-Newton step back: it would promise much and keep nothing, again and again. A cost F of
+        exp(x) has the second derivative F'' exp(2 x) + F' exp(x), and the last term is the slope by x; by the logarithm
+        of a square root it is twice the slope.
+        """
+        slope = -(here.right + sum(normal.static_right for normal in here.normals))[self.logs].reshape(-1, 4)
+        result = np.zeros(self.layout.size)
+        result[self.logs] = (np.maximum(slope, 0.0) * [1.0, 2.0, 2.0, 2.0]).ravel()
+        return result
 
     def full(self, parts: Sequence[np.ndarray], static: np.ndarray) -> list[np.ndarray]:
         """Coordinates and derivatives of the freed skeleton: the static ones do not move."""
@@ -363,6 +384,8 @@ class MapProblem:
             self.moving,
             self.still,
         )
+        inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
+        add_ranges(normal, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving])
         dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
         for piece in pieces(len(dynamic)):
             terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])

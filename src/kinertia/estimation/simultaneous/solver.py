@@ -83,7 +83,8 @@ information: 1e-3 would hold the first steps back."""
 _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
-_MAX_ITERATIONS = 40
+_MAX_ITERATIONS = 100
+"""Most trials take 10 to 20; impacts, and arms that reach the ends of their ranges, some 50."""
 
 
 @one_blas_thread
@@ -141,7 +142,8 @@ def _iterated(problem: MapProblem, state: _State, judging: bool) -> _State:
         instruments = _judged(problem, here, eliminated, instruments)
     under = here.under(instruments, places)
     scale = np.maximum(scale, np.diag(under.information) + sum(np.diag(normal.static) for normal in here.normals))
-    there, promised, moved_sd = _step(problem, under, eliminated, damping, scale)
+    held = damping * scale + problem.bends(under)
+    there, promised, moved_sd = _step(problem, under, eliminated, damping, held)
     kept = (under.cost - there.under(instruments, places).cost) / promised
     converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
     return _State(there if kept > 0.0 else here, instruments, _next_damping(damping, kept), scale, converged)
@@ -198,15 +200,15 @@ def _next_damping(damping: float, kept: float) -> float:
 
 
 def _step(
-    problem: MapProblem, here: Linearised, eliminated: Eliminated, damping: float, scale: np.ndarray
+    problem: MapProblem, here: Linearised, eliminated: Eliminated, damping: float, held: np.ndarray
 ) -> tuple[Linearised, float, float]:
-    """Where a step leads, by how much it promises to lower the cost, and how far body and calibration move, in
-    deviations of all of them together.
+    """Where a step leads that is held back by so much (S,) on the diagonal of the information, by how much it promises
+    to lower the cost, and how far body and calibration move, in deviations of all of them together.
     """
     parts, displaced = eliminated
     information = here.information + sum(each.information for each in displaced)
     right = here.right + sum(each.right for each in displaced)
-    information[np.diag_indices_from(information)] += damping * scale
+    information[np.diag_indices_from(information)] += held
     step = np.linalg.solve(information, right)
     moved_sd = float(np.sqrt(step @ information @ step))
     coefficients, moved = [], []

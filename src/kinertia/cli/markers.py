@@ -1,0 +1,57 @@
+"""`kinertia markers`: which marker set a recording has, and a draft of one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.terminal import out, plain_table
+from kinertia.errors import FileError
+from kinertia.io.marker_set_draft import draft_marker_set
+from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.recording import read_recording
+from kinertia.model.marker_set import ENOUGH_WORN, share_worn
+
+_LISTED = 6
+
+
+def markers(
+    file: Annotated[Path, typer.Argument(help="A recording (.c3d, .trc, .tsv, .csv), best the static trial.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File (.toml) for a draft of a marker set of your own.")
+    ] = None,
+) -> None:
+    """Show the labels of a file against every marker-set preset, and draft a marker set from them.
+
+    A preset is recognised by itself where a file has at least 80 % of its labels. For any other set give -o, complete
+    the draft, and name it with --markers.
+
+    [bold]Examples[/]
+
+    kinertia markers static.c3d
+
+    kinertia markers static.c3d -o our_lab.toml
+    """
+    labels = read_recording(file).without_empty_markers().markers.labels
+    out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
+    table = plain_table("preset", "labels present", "absent")
+    shares = {name: share_worn(read_marker_set(name), labels) for name in preset_names()}
+    for name in sorted(shares, key=lambda name: -shares[name]):
+        wanted = read_marker_set(name).labels
+        absent = [label for label in wanted if label not in labels]
+        more = f" and {len(absent) - _LISTED} more" if len(absent) > _LISTED else ""
+        table.add_row(name, f"{len(wanted) - len(absent)} of {len(wanted)}", ", ".join(absent[:_LISTED]) + more)
+    out.print(table)
+    best = max(shares, key=lambda name: shares[name])
+    if shares[best] >= ENOUGH_WORN:
+        out.print(f"{best} is recognised by itself", soft_wrap=True)
+    elif output is None:
+        out.print("no preset is recognised; for a draft of your own: -o our_lab.toml", soft_wrap=True)
+    if output is not None:
+        if output.exists():
+            raise FileError(output, "exists already and is left alone; remove it, or give another name")
+        write_then_rename(output, draft_marker_set(labels, output.stem))
+        out.print(f"wrote {output}: check it, complete what it asks for, then give it as --markers", soft_wrap=True)

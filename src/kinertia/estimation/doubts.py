@@ -1,0 +1,139 @@
+"""What speaks against measurements before anything is computed from them: one list for `check` and for every fit.
+
+Each detector looks where a mistake shows first; of two that could see the same one, the likelier cause comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from kinertia.errors import TrialError
+from kinertia.model.body_sides import sides_trouble
+from kinertia.model.marker_set import MarkerSet
+from kinertia.model.same_body import body_trouble, session_doubts
+from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.motion.force_faults import direction_trouble, offset_trouble
+from kinertia.motion.plate_gains import gain_doubts
+from kinertia.trial.data import Markers, Recording, Trial
+from kinertia.trial.load_places import load_places_doubts, load_places_trouble
+from kinertia.trial.marker_faults import (
+    exchanged_trouble,
+    jump_doubts,
+    lost_frames_trouble,
+    spikes_trouble,
+    straight_doubts,
+)
+from kinertia.trial.marker_quality import axes_trouble, extent_m
+from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+
+
+class Doubt(NamedTuple):
+    """One thing that speaks against a recording: what, with its evidence and what to do, and whether a fit refuses."""
+
+    sentence: str
+    refused: bool
+
+
+def static_doubts(static: Recording, marker_set: MarkerSet | None, height_m: float | None = None) -> list[Doubt]:
+    """What speaks against a static trial by itself.
+
+    Args:
+        static: the person standing.
+        marker_set: which label is which landmark; None with an OpenSim model.
+        height_m: as stated, where it is known.
+    """
+    own = _worn(static.markers, marker_set)
+    found = _refused(axes_trouble(extent_m(own)) or spikes_trouble(own) or _sides(static.markers, marker_set))
+    if found or marker_set is None or not marker_set.landmarks:
+        return found
+    stature = [] if height_m is None else stature_doubts(static, marker_set, height_m)
+    return _told([*floor_doubts(static.markers, marker_set), *stature])
+
+
+def trial_doubts(
+    recording: Recording,
+    marker_set: MarkerSet | None,
+    static: Recording | None,
+    feet: Mapping[str, Sequence[str]] | None,
+) -> list[Doubt]:
+    """What speaks against the recording of a motion, before its loads are sorted by foot.
+
+    Args:
+        recording: with or without plates.
+        marker_set: which label is which landmark; None with an OpenSim model.
+        static: the static trial that goes with it, if there is one.
+        feet: labels of the markers on each foot; None where they are not known.
+    """
+    markers = recording.markers
+    own = _worn(markers, marker_set)
+    trouble = (
+        axes_trouble(extent_m(own))
+        or spikes_trouble(own)
+        or _sides(markers, marker_set)
+        or lost_frames_trouble(own)
+        or exchanged_trouble(own)
+    )
+    session: list[str] = []
+    if not trouble and static is not None and marker_set is not None:
+        trouble = body_trouble(static.markers, markers, marker_set)
+        session = [] if trouble else session_doubts(static.markers, markers, marker_set)
+    if not trouble and recording.plates is not None:
+        trouble = loads_trouble(recording.plates)
+        if not trouble and feet is not None:
+            trouble = load_places_trouble(recording, feet)
+    if trouble:
+        return _refused(trouble)
+    # a stretch that was written by a computer often ends with a jump
+    straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
+    told = [*straight, *jump_doubts(own), *session]
+    if recording.plates is not None:
+        told += loads_doubts(recording.plates)
+        told += [] if feet is None else load_places_doubts(recording, feet)
+    return _told(told)
+
+
+def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> list[Doubt]:
+    """What speaks against loads that were sorted by foot: whether they move the body as the markers show.
+
+    Args:
+        recording: as read.
+        trial: what became of it, in the laboratory's axes.
+        marker_set: which marker is on which segment.
+    """
+    pelvis = marker_set.segments.get("pelvis", ())
+    if trouble := direction_trouble(trial, pelvis):
+        return _refused(trouble)
+    offset = offset_trouble(trial, pelvis)
+    owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    return _told([*([offset] if offset else []), *gain_doubts(recording, trial, owners)])
+
+
+def warnings_of(name: str, doubts: Sequence[Doubt]) -> list[str]:
+    """Warnings for a fit of the recording of this name.
+
+    Raises:
+        TrialError: one of the doubts is refused.
+    """
+    for one in doubts:
+        if one.refused:
+            raise TrialError(name, one.sentence)
+    return [f"{name}: {one.sentence}" for one in doubts]
+
+
+def _worn(markers: Markers, marker_set: MarkerSet | None) -> Markers:
+    if marker_set is None:
+        return markers
+    return markers.select([label for label in marker_set.labels if label in markers.labels])
+
+
+def _sides(markers: Markers, marker_set: MarkerSet | None) -> str:
+    return "" if marker_set is None else sides_trouble(markers, marker_set)
+
+
+def _refused(trouble: str) -> list[Doubt]:
+    return [Doubt(trouble, True)] if trouble else []
+
+
+def _told(sentences: Sequence[str]) -> list[Doubt]:
+    return [Doubt(sentence, False) for sentence in sentences]

@@ -1,0 +1,64 @@
+"""Which axis of a laboratory is up, and the rotation to ground axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.io.c3d_plates import LabPlates
+from kinertia.trial.data import BoolArray, FloatArray
+
+_AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
+
+
+def to_ground(
+    path: Path, told: str, where: str, positions: FloatArray, plates: LabPlates | None
+) -> tuple[FloatArray, str, list[str]]:
+    """From the axes of a laboratory to ground axes, by the file's word and by the data.
+
+    Args:
+        path: the file, for messages.
+        told: the axis that it calls vertical, "+Z" or the like; empty where it says nothing.
+        where: it says so, or would say so.
+        positions: (n, m, 3) m, markers in the laboratory's axes; NaN where not seen.
+        plates: what stood on the floor, if anything.
+
+    Returns:
+        the rotation (3, 3), the axis that is up, and notes.
+    """
+    told_up = _AXES.get(told)
+    seen = positions[_seen(positions).any(axis=1)]
+    extent = np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=0)
+    floor = np.zeros(3) if plates is None or plates.corners is None else plates.corners.mean(axis=(0, 1))
+    force = np.zeros(3) if plates is None else plates.loaded_direction()
+    if np.abs(force).max() > 0.8:
+        axis, why = int(np.argmax(np.abs(force))), "the plates' forces"
+    else:
+        axis, why = int(np.argmax(extent)), "the markers' extents"
+        if told_up is not None and extent[told_up[0]] > 0.5 * extent[axis]:
+            axis = told_up[0]
+    middle = np.nanmedian(seen, axis=(0, 1))[axis] - floor[axis]
+    found_up = (axis, 1 if middle >= 0 else -1)
+    up = f"{'+-'[found_up[1] < 0]}{'XYZ'[axis]}"
+    notes = []
+    if told_up is None:
+        notes.append(f"{path.name}: no vertical axis given ({where}); {up} was found from {why}")
+    elif told_up != found_up:
+        notes.append(f"{path.name}: {where} says {told} is up but {why} say {up}; {up} was used")
+    if up != "+Y":
+        notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
+    return _rotation(*found_up), up, notes
+
+
+def _seen(positions: FloatArray) -> BoolArray:
+    """(n, m) True where all three coordinates are there."""
+    return np.asarray(np.isfinite(positions).all(axis=2))
+
+
+def _rotation(axis: int, sign: int) -> FloatArray:
+    """Rotation (3, 3) that turns a lab axis to +Y and keeps lab X where it can; for Z up (x, y, z) -> (x, z, -y)."""
+    up = np.zeros(3)
+    up[axis] = sign
+    forward = np.eye(3)[1 if axis == 0 else 0]
+    return np.array([forward, up, np.cross(forward, up)])

@@ -1,0 +1,81 @@
+"""A first marker set from the labels of a recording: what `kinertia markers` drafts.
+
+A label is known by what it is called in the presets: `R.Knee`, `RKNE`, `r_knee_study`. Of others the nearest name of a
+preset is taken where it is near enough; what is left is listed to be placed by hand.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+
+from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, folded, share_worn
+
+_NEAR = 0.85
+_NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand", "shank_wand", "head_top")))
+
+
+def draft_marker_set(labels: Sequence[str], name: str) -> str:
+    """The text of a marker set (TOML) for these labels; landmarks and labels that are not known are in comments."""
+    landmarks = _placed(labels, dict(_names("landmarks", labels)), single=True)
+    segments = _placed(labels, dict(_names("segments", labels)), single=False)
+    lines = [
+        "# Drafted from the labels: check every line, complete those marked FILL IN, and name the file with --markers",
+        "# or under [model] markers.",
+        f'name = "{name}"',
+        "",
+        "[landmarks]",
+    ]
+    for landmark in LANDMARKS:
+        found = landmarks.get(landmark)
+        if found:
+            lines.append(f"{landmark} = {_quoted(found)}")
+        elif landmark in _NEEDED:
+            lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
+    lines += ["", "[segments]"]
+    for segment in SEGMENTS:
+        if segment in segments:
+            lines.append(f"{segment} = {_quoted(segments[segment])}")
+        else:
+            lines.append(f"# {segment} = []  # FILL IN")
+    placed = {label for found in segments.values() for label in found}
+    rest = [label for label in labels if label not in placed]
+    if rest:
+        lines += ["", f"# Not placed; FILL IN where they belong: {', '.join(rest)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(labels: Sequence[str]) -> str:
+    return "[" + ", ".join('"' + label.replace("\\", "\\\\").replace('"', '\\"') + '"' for label in labels) + "]"
+
+
+def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """What labels are called in the presets, folded, and entries of this table; the preset most like these labels has
+    the last word.
+    """
+    presets = map(read_marker_set, preset_names())
+    for preset in sorted(presets, key=lambda preset: (share_worn(preset, labels), len(preset.labels))):
+        entries = preset.landmarks if table == "landmarks" else preset.segments
+        for entry, own in entries.items():
+            # a landmark of several labels is their middle: none of them is it alone
+            yield from ((folded(label), entry) for label in own if table == "segments" or len(own) == 1)
+
+
+def _placed(labels: Sequence[str], names: Mapping[str, str], single: bool) -> dict[str, list[str]]:
+    """Entry -> labels, those of the very names first."""
+    found: dict[str, list[str]] = {}
+    exact = {label: names[folded(label)] for label in labels if folded(label) in names}
+    near = {label: _nearest(label, names) for label in labels if label not in exact}
+    for label, entry in (*exact.items(), *near.items()):
+        if entry is not None and not (single and entry in found):
+            found.setdefault(entry, []).append(label)
+    return found
+
+
+def _nearest(label: str, names: Mapping[str, str]) -> str | None:
+    """The entry of the name that looks most like the label, of the same side if it has one."""
+    side = folded(label)[:1]
+    alike = [name for name in names if name[:1] == side]
+    near = difflib.get_close_matches(folded(label), alike, n=1, cutoff=_NEAR)
+    return names[near[0]] if near else None

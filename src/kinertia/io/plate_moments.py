@@ -1,0 +1,59 @@
+"""Moments of a plate's force about the laboratory's origin, where a file gives force, moment and centre of pressure.
+
+Files do not say about which point their moments are: the middle of the plate, of its surface, or the origin. But the
+force at the centre of pressure has no horizontal moment about it. So the point c is the one for which
+
+    M - (p - c) x F
+
+has none, by least squares over the loaded samples; what is left is the free moment.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray
+
+_FITS = 0.05
+"""Moments agree with the centre of pressure if they miss it by no more than this share (RMS)."""
+_FEWEST = 10
+
+
+class PlateMoments(NamedTuple):
+    """Of one plate.
+
+    Attributes:
+        about_origin: (k, 3) N m; without a free moment where moments and centre of pressure contradict each other.
+        misses: by which share of the horizontal moments they do; infinite where nobody stands on the plate.
+    """
+
+    about_origin: FloatArray
+    misses: float
+
+    @property
+    def agree(self) -> bool:
+        """Moments and centre of pressure say the same."""
+        return self.misses <= _FITS
+
+    @classmethod
+    def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> PlateMoments:
+        """From force (k, 3) N, moment (k, 3) N m about an unknown point, and centre of pressure (k, 3) m."""
+        at = np.cross(np.nan_to_num(point), force)
+        loaded = (np.abs(force[:, 2]) > LOAD_THRESHOLD_N) & np.isfinite(point).all(axis=1)
+        if loaded.sum() < _FEWEST:
+            return cls(at, float("inf"))
+        rest, f = moment[loaded] - at[loaded], force[loaded]
+        zero = np.zeros(len(f))
+        # rows of -c x F, horizontal axes
+        rows = -np.concatenate(
+            [np.stack([zero, f[:, 2], -f[:, 1]], axis=1), np.stack([-f[:, 2], zero, f[:, 0]], axis=1)]
+        )
+        centre = np.linalg.lstsq(rows, rest[:, :2].T.ravel(), rcond=None)[0]
+        left = moment - at + np.cross(centre, force)
+        size = moment[loaded, :2] - moment[loaded, :2].mean(axis=0)
+        misses = float(np.sqrt(np.square(left[loaded, :2]).sum() / max(np.square(size).sum(), 1e-12)))
+        if misses <= _FITS:
+            at[:, 2] += left[:, 2]
+        return cls(at, misses)

@@ -1,0 +1,205 @@
+"""CSV and TXT files that Vicon Nexus exports as ASCII: sections of trajectories and of devices.
+
+A section has a line with its name, one with its rate, one with what the columns belong to, one with the columns' names,
+one with units, and then a row per frame or, of devices, per sub frame. A force plate is three groups of a device:
+`... - Force`, `... - Moment` and `... - CoP`. Nexus writes centres of pressure in the laboratory's axes, and forces in
+those or in the plate's; which, is seen from whether they agree (`plate_moments`).
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.io.c3d_plates import LabPlates, to_ground_plates
+from kinertia.io.lab_axes import to_ground
+from kinertia.io.number_table import read_lines
+from kinertia.io.plate_moments import PlateMoments
+from kinertia.io.trc import METRES_PER_UNIT, seen_positions
+from kinertia.trial.data import FloatArray, Markers, Recording
+
+_HEADER_LINES = 5
+_NEWTON_METRES = {"N.m": 1.0, "Nm": 1.0, "N.mm": 1e-3, "Nmm": 1e-3, "mm.N": 1e-3, "m.N": 1.0}
+_MUCH_BETTER = 0.2
+"""Forces are in other axes than they seem to be if there they miss the centre of pressure by so much less."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Section:
+    """Attributes: rate, owner and name and unit of each column, rows (NaN where empty), and the line they begin at."""
+
+    rate_hz: float
+    owners: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: FloatArray
+    first_line: int
+
+    def columns(self, owner: str, names: Sequence[str]) -> list[int]:
+        """Places of these columns of an owner."""
+        return [k for name in names for k in range(len(self.names)) if (self.owners[k], self.names[k]) == (owner, name)]
+
+
+def read_vicon_csv(path: str | Path) -> Recording:
+    """Read markers, and force plates where there are any, from an ASCII export of Nexus, turned to ground axes.
+
+    Raises:
+        FileError: the file is missing, broken, or has no trajectories.
+    """
+    path = Path(path)
+    sections = dict(_sections(path))
+    if "Trajectories" not in sections:
+        found = ", ".join(sections) or "none"
+        raise FileError(path, f"no section Trajectories (sections: {found}); export them from Vicon Nexus, too")
+    markers, notes = _markers(path, sections["Trajectories"])
+    plates, time, plate_notes = _plates(path, sections.get("Devices"), markers.rate_hz)
+    rotation, up, axis_notes = to_ground(path, "+Z", "Vicon's usual setting", markers.positions, plates)
+    ground, load_notes = to_ground_plates(path, plates, rotation, time) if plates is not None else (None, [])
+    return Recording(
+        path.stem,
+        markers.rotated(rotation),
+        ground,
+        notes=(*notes, *plate_notes, *axis_notes, *load_notes),
+        length_unit="mm",
+        vertical=up,
+    )
+
+
+def _sections(path: Path) -> Iterator[tuple[str, _Section]]:
+    lines = read_lines(path)
+    delimiter = max(",;\t", key=lambda mark: sum(line.count(mark) for line in lines[:10]))
+    cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
+    begins = [
+        k for k in range(len(cells) - _HEADER_LINES)
+        if cells[k] and cells[k][0] and not any(cells[k][1:]) and _header_at(cells, k)
+    ]  # fmt: skip
+    if not begins:
+        raise FileError(
+            path, "no section of an ASCII export of Vicon Nexus in it (Trajectories, Devices); export it again"
+        )
+    for begin in begins:
+        names = cells[begin + 3]
+        rows, width = [], len(names)
+        for number, row in enumerate(cells[begin + _HEADER_LINES :], start=begin + _HEADER_LINES + 1):
+            if not any(row):
+                break
+            rows.append(_numbers(path, number, row, width))
+        owners = _carried(cells[begin + 2], width)
+        units = (cells[begin + 4] + [""] * width)[:width]
+        table = np.array(rows).reshape(len(rows), width)
+        rate = float(cells[begin + 1][0])
+        yield cells[begin][0], _Section(rate, owners, tuple(names), tuple(units), table, begin + _HEADER_LINES + 1)
+
+
+def _header_at(cells: Sequence[Sequence[str]], k: int) -> bool:
+    rate, names = cells[k + 1], cells[k + 3]
+    return bool(rate) and re.fullmatch(r"[\d.]+", rate[0]) is not None and [n.lower() for n in names[:2]] == [
+        "frame", "sub frame"
+    ]  # fmt: skip
+
+
+def _carried(cells: Sequence[str], width: int) -> tuple[str, ...]:
+    """A name stands over the first of its columns."""
+    result, current = [], ""
+    for cell in (list(cells) + [""] * width)[:width]:
+        current = cell or current
+        result.append(current)
+    return tuple(result)
+
+
+def _numbers(path: Path, line: int, row: Sequence[str], width: int) -> list[float]:
+    if len(row) > width and any(row[width:]):
+        raise FileError(
+            path, f"the row has {len(row)} values, expected {width} as the header says; export it again", line
+        )
+    try:
+        return [float(cell) if cell else np.nan for cell in (list(row) + [""] * width)[:width]]
+    except ValueError:
+        bad = next(cell for cell in row if cell and not re.fullmatch(r"[-+.\deE]+", cell))
+        raise FileError(path, f"'{bad}' is not a number; repair or export it again", line) from None
+
+
+def _markers(path: Path, section: _Section) -> tuple[Markers, list[str]]:
+    """Markers in the laboratory's axes, m, and notes; what is not in a unit of length is no marker."""
+    owners = [owner for owner in dict.fromkeys(section.owners) if len(section.columns(owner, "XYZ")) == 3]
+    places = {owner: section.columns(owner, "XYZ") for owner in owners}
+    places = {o: at for o, at in places.items() if section.units[at[0]] in METRES_PER_UNIT}
+    labels = [owner.rsplit(":", 1)[-1] for owner in places]
+    kept = {label: at for label, at in zip(labels, places.values(), strict=True) if label and not label.startswith("*")}
+    if not kept or not len(section.rows):
+        raise FileError(path, "no trajectories in its section Trajectories; label the markers and export it again")
+    unit = METRES_PER_UNIT[section.units[next(iter(kept.values()))[0]]]
+    values = section.rows[:, [column for at in kept.values() for column in at]]
+    lines = list(range(section.first_line, section.first_line + len(values)))
+    positions, notes = seen_positions(path, values, tuple(kept), lines)
+    frames = section.rows[:, 0]
+    odd = np.flatnonzero(np.diff(frames) != 1)
+    if odd.size:
+        raise FileError(
+            path,
+            f"frame {frames[odd[0] + 1]:g} follows frame {frames[odd[0]]:g}; expected every frame",
+            lines[odd[0] + 1],
+        )
+    return Markers((frames - 1.0) / section.rate_hz, tuple(kept), unit * positions), list(notes)
+
+
+def _plates(path: Path, section: _Section | None, camera_hz: float) -> tuple[LabPlates | None, FloatArray, list[str]]:
+    if section is None:
+        return None, np.zeros(0), []
+    time = (section.rows[:, 0] - 1.0) / camera_hz + section.rows[:, 1] / section.rate_hz
+    names, forces, moments, notes = [], [], [], []
+    for owner in dict.fromkeys(section.owners):
+        name, dash, what = owner.rpartition(" - ")
+        if not dash or what != "Force":
+            continue
+        at = [section.columns(f"{name} - {kind}", columns) for kind, columns in _GROUPS]
+        if any(len(columns) != 3 for columns in at):
+            notes.append(f"{path.name}: {name} was left out: expected its Force, Moment and CoP, three columns each")
+            continue
+        force, moment, point = (section.rows[:, columns] for columns in at)
+        units = [section.units[columns[0]] for columns in at[1:]]
+        if units[0] not in _NEWTON_METRES or units[1] not in METRES_PER_UNIT:
+            raise FileError(
+                path, f"{name}: moments in '{units[0]}' and CoP in '{units[1]}'; expected N.mm or N.m, and mm"
+            )
+        moment, point = _NEWTON_METRES[units[0]] * moment, METRES_PER_UNIT[units[1]] * point
+        force, moments_found, note = _in_lab_axes(force, moment, point)
+        notes += [f"{path.name}: {name}: {note}"] if note else []
+        names.append(name)
+        forces.append(force)
+        moments.append(moments_found.about_origin)
+    if not names:
+        return None, time, notes
+    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), None), time, notes
+
+
+_GROUPS = (("Force", ("Fx", "Fy", "Fz")), ("Moment", ("Mx", "My", "Mz")), ("CoP", ("Cx", "Cy", "Cz")))
+_TURNS = [
+    np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, flip, flip])
+    for (c, s), flip in product(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)), (1.0, -1.0))
+]
+"""A plate's axes in the laboratory's: turned by quarters, z up or down; the first is none."""
+
+
+def _in_lab_axes(force: FloatArray, moment: FloatArray, point: FloatArray) -> tuple[FloatArray, PlateMoments, str]:
+    """Force and moments in the axes of the centre of pressure, and what was done for it."""
+    tried = [PlateMoments.of(force @ turn.T, moment @ turn.T, point) for turn in _TURNS]
+    best = int(np.argmin([one.misses for one in tried]))
+    if not np.isfinite(tried[best].misses):
+        return force, tried[0], ""
+    if tried[best].misses > _MUCH_BETTER * tried[0].misses:
+        best = 0
+    said = "" if best == 0 else "force and moment are in the plate's axes, as their centre of pressure tells; turned"
+    if not tried[best].agree:
+        said = (
+            f"moments and centre of pressure contradict each other (by {100 * tried[best].misses:.0f} %); the centre "
+            f"of pressure was taken, without a free moment"
+        )
+    return force @ _TURNS[best].T, tried[best], said

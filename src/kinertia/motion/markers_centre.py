@@ -1,0 +1,45 @@
+"""How high the body is, by its markers alone: no model is fitted, so that nothing of ours can be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinertia.model.anatomy import segment_of
+from kinertia.model.skeleton import Skeleton
+from kinertia.trial.data import FloatArray, Markers
+
+_SHARES = {"pelvis": 14.2, "torso": 40.0, "thigh": 12.3, "shank": 4.8, "foot": 1.2, "upper_arm": 2.4, "forearm": 2.3}
+"""Per cent of the body's mass, head with torso, hand with forearm (Dumas 2007, men)."""
+_SEEN = 0.8
+
+
+def owners_of(skeleton: Skeleton) -> dict[str, str]:
+    """Which segment of the anthropometric tables each marker of a model is on; empty where that is unknown."""
+    return {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
+
+
+def centre_height(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
+    """(n,) m, height of the markers' centre, each segment at its share of the body's mass; None without a pelvis.
+
+    Args:
+        owners: the segment that each marker is on.
+        markers: Y up.
+    """
+    seen = markers.seen
+    heights: dict[str, list[FloatArray]] = {}
+    for column, label in enumerate(markers.labels):
+        if owners.get(label) and seen[:, column].mean() >= _SEEN:
+            known = seen[:, column]
+            own = np.interp(markers.time, markers.time[known], markers.positions[known, column, 1])
+            heights.setdefault(owners[label], []).append(own)
+    if not heights.keys() & {"pelvis", "torso"}:
+        return None
+    shares = _shares(heights)
+    total: FloatArray = sum((shares[name] * np.mean(own, axis=0) for name, own in heights.items()), np.zeros(len(seen)))
+    return total / sum(shares.values())
+
+
+def _shares(segments: Mapping[str, object]) -> dict[str, float]:
+    return {name: _SHARES[name.removesuffix("_r").removesuffix("_l")] for name in segments}

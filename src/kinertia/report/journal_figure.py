@@ -1,0 +1,201 @@
+"""`fit.figure`: the report's figures as files for papers, drawn by matplotlib without a browser.
+
+Two columns wide (180 mm), letters of 7 points, which stay letters in SVG and PDF files.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+import textwrap
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinertia.errors import FileError, KinertiaError
+from kinertia.estimation.result import Fit
+from kinertia.report.bsp_figures import change_figure
+from kinertia.report.cycle_figures import cycle_figure
+from kinertia.report.extras import expect_matplotlib
+from kinertia.report.figure import Figure
+from kinertia.report.time_figures import coordinate_figure, moment_figure
+from kinertia.report.wording import start_of
+from kinertia.trial.data import runs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+_COLUMNS = 3
+_WIDTH_MM, _ROW_MM, _LEGEND_MM = 180.0, 42.0, 12.0
+_MM_PER_INCH = 25.4
+_POINTS_PER_PX = 0.5
+"""Of lines and marks: those of the report are for screens, and a journal's panels are half as wide."""
+_TITLE_LETTERS = 36
+"""In a line, beyond which it would leave the panel."""
+_DOTS_PER_INCH = 600
+_FORMATS = (".svg", ".pdf", ".eps", ".png", ".tif", ".tiff")
+_DASHES = {"dot": ":", "dash": "--"}
+_MARKERS = {"circle": "o", "diamond": "D", "line-ns-open": "|"}
+_STYLE: Any = {
+    "font.size": 7,
+    "axes.titlesize": 7,
+    "axes.linewidth": 0.5,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Arial", "Helvetica", "DejaVu Sans"],
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+}
+
+
+def _moments(fit: Fit) -> Figure:
+    return cycle_figure(fit, "moment") or moment_figure(fit.trials[0], fit.skeleton, fit.mass_kg, start=start_of(fit))
+
+
+FIGURES: Mapping[str, Callable[[Fit], Figure | None]] = {
+    "moments": _moments,
+    "angles": lambda fit: cycle_figure(fit, "angle") or coordinate_figure(fit.trials[0], fit.skeleton),
+    "powers": lambda fit: cycle_figure(fit, "power"),
+    "forces": lambda fit: cycle_figure(fit, "force"),
+    "bsp": change_figure,
+}
+"""By the name that `fit.figure` takes."""
+
+
+def save_figure(fit: Fit, name: str, path: str | Path) -> Path:
+    """Draw a figure into a file, whose ending says its format; returns the file.
+
+    Raises:
+        KinertiaError: no such figure, the fit has no strides to draw it from, or matplotlib is not installed.
+        FileError: a format that is not known, or the file cannot be written.
+    """
+    path = Path(path)
+    if name not in FIGURES:
+        raise KinertiaError(f"there is no figure '{name}'; expected one of {', '.join(FIGURES)}")
+    if path.suffix.lower() not in _FORMATS:
+        raise FileError(path, f"'{path.suffix}' is no format of figures; expected one of {', '.join(_FORMATS)}")
+    expect_matplotlib()
+    figure = FIGURES[name](fit)
+    if figure is None:
+        raise KinertiaError(f"the figure '{name}' is over the gait cycle, and no trial of this fit has a stride")
+    import matplotlib as mpl
+
+    with mpl.rc_context(_STYLE):
+        drawn = drawing(figure)
+        try:
+            drawn.savefig(path, dpi=_DOTS_PER_INCH)
+        except OSError as error:
+            raise FileError(path, f"cannot be written: {error.strerror or error}") from error
+    return path
+
+
+def drawing(figure: Figure) -> Drawing:
+    """Small multiples as matplotlib draws them: a panel per pair of axes, in rows of three."""
+    from matplotlib.figure import Figure as Drawing
+
+    suffixes = [name.removeprefix("xaxis") for name in figure.layout if name.startswith("xaxis")]
+    rows = -(-len(suffixes) // _COLUMNS)
+    inches = (_WIDTH_MM / _MM_PER_INCH, (rows * _ROW_MM + _LEGEND_MM) / _MM_PER_INCH)
+    drawn = Drawing(figsize=inches, layout="constrained")
+    cells = drawn.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    panels = dict(zip(suffixes, cells, strict=False))
+    for cell in cells[len(suffixes) :]:
+        cell.remove()
+    for suffix, title in zip(suffixes, figure.layout["annotations"], strict=True):
+        panels[suffix].set_title(textwrap.fill(_text(title["text"]), _TITLE_LETTERS), loc="left")
+    lower: np.ndarray | None = None
+    for trace in figure.data:
+        x, y = _numbers(trace, "x"), _numbers(trace, "y")
+        _draw(panels[trace["xaxis"][1:]], trace, x, y, lower)
+        lower = y
+    for shape in figure.layout["shapes"]:
+        _mark(panels[shape["xref"][1:]], shape)
+    for suffix, panel in panels.items():
+        _finish(panel, figure.layout[f"xaxis{suffix}"], figure.layout[f"yaxis{suffix}"])
+    drawn.legend(*_legend(list(panels.values())), loc="outside upper left", ncols=4, frameon=False)
+    return drawn
+
+
+def _numbers(trace: Mapping[str, Any], name: str) -> np.ndarray:
+    """Of a trace: a list, an array, or evenly spaced."""
+    if name in trace:
+        return np.asarray(trace[name], dtype=float)
+    return np.asarray(trace[f"{name}0"] + trace[f"d{name}"] * np.arange(len(trace["y"])))
+
+
+def _draw(panel: Axes, trace: Mapping[str, Any], x: np.ndarray, y: np.ndarray, lower: np.ndarray | None) -> None:
+    label = _text(trace["name"]) if trace.get("showlegend") else None
+    if trace.get("fill") == "toself":
+        for k, part in enumerate(_parts(x, y)):
+            panel.fill(*part, color=_colour(trace["fillcolor"]), linewidth=0, label=None if k else label)
+    elif trace.get("fill") == "tonexty":
+        assert lower is not None
+        panel.fill_between(x, lower, y, color=_colour(trace["fillcolor"]), linewidth=0, label=label)
+    elif trace["mode"] == "markers":
+        marker = trace["marker"]
+        colour, bars = _colour(marker["color"]), trace.get("error_x")
+        if bars is not None:
+            half, width = np.asarray(bars["array"], dtype=float), _POINTS_PER_PX * bars["thickness"]
+            panel.errorbar(x, y, xerr=half, fmt="none", ecolor=_colour(bars["color"]), elinewidth=width)
+        size = _POINTS_PER_PX * marker["size"]
+        symbol = _MARKERS[marker.get("symbol", "circle")]
+        panel.plot(x, y, symbol, color=colour, markersize=size, label=label)
+    elif trace["line"]["width"]:
+        line = trace["line"]
+        width, dashes = _POINTS_PER_PX * line["width"], _DASHES.get(line.get("dash", ""), "-")
+        panel.plot(x, y, dashes, color=_colour(line["color"]), linewidth=width, label=label)
+
+
+def _parts(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Outlines with a gap between them, one by one."""
+    return [(x[first : last + 1], y[first : last + 1]) for first, last in runs(np.isfinite(y))]
+
+
+def _mark(panel: Axes, shape: Mapping[str, Any]) -> None:
+    """A vertical line, or a shaded span."""
+    if shape["type"] == "rect":
+        panel.axvspan(shape["x0"], shape["x1"], color=_colour(shape["fillcolor"]), linewidth=0, zorder=0)
+    else:
+        dashes = _DASHES.get(shape["line"].get("dash", ""), "-")
+        panel.axvline(shape["x0"], color=_colour(shape["line"]["color"]), linestyle=dashes, linewidth=0.4)
+
+
+def _finish(panel: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
+    """Ranges, ticks and the title below."""
+    for axis, told, limits in ((panel.xaxis, x, panel.set_xlim), (panel.yaxis, y, panel.set_ylim)):
+        if "range" in told:
+            limits(*told["range"])
+        if "tickvals" in told:
+            axis.set_ticks(told["tickvals"], labels=[_text(one) for one in told.get("ticktext", told["tickvals"])])
+    if "title" in x:
+        panel.set_xlabel(_text(x["title"]["text"]))
+    zero = panel.axhline if "ticktext" not in y else panel.axvline
+    zero(0, color="#C8C8C8", linewidth=0.4, zorder=0)
+
+
+def _legend(panels: list[Axes]) -> tuple[list[Any], list[str]]:
+    """Each name once."""
+    found: dict[str, Any] = {}
+    for panel in panels:
+        handles, labels = panel.get_legend_handles_labels()
+        found = {**dict(zip(labels, handles, strict=True)), **found}
+    return list(found.values()), list(found)
+
+
+def _text(marked: object) -> str:
+    """What plotly would show of a text with markup; a dollar sign is none of mathematics."""
+    return html.unescape(re.sub(r"<[^>]+>", "", str(marked))).replace("$", r"\$")
+
+
+def _colour(written: str) -> Any:
+    """ "rgba(0,114,178,0.25)" as matplotlib takes it; "#0072B2" as it is."""
+    if not written.startswith("rgba("):
+        return written
+    *rgb, opacity = (float(part) for part in written[5:-1].split(","))
+    return (*(part / 255 for part in rgb), opacity)

@@ -1,0 +1,178 @@
+"""What goes wrong with forces between the plates and the file: axes, signs, units, zeros, places, clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.synthetic.marker_mistakes import Change
+from kinertia.synthetic.measured_person import MeasuredPerson, acting, loads_of
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+
+
+def loads(change: Callable[[PlateLoads], PlateLoads]) -> Change:
+    """Other loads of the walk."""
+    return lambda person, rng: person.with_plates(change(person.plates))
+
+
+def with_signs(x: float, y: float, z: float) -> Change:
+    """Force components times these, at the same points."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        force, point, torque = acting(plates)
+        return loads_of(plates, force * np.array([x, y, z]), point, torque)
+
+    return loads(change)
+
+
+def turned_about_vertical(degrees: float) -> Change:
+    """Each plate turned about the vertical through its middle: the forces' directions and points."""
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        force, point, torque = acting(plates)
+        middle = _middles(plates, point)
+        return loads_of(plates, force @ turn.T, middle + (point - middle) @ turn.T, torque)
+
+    return loads(change)
+
+
+def directions_turned(degrees: float) -> Change:
+    """Forces turned about the vertical at the same points."""
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        force, point, torque = acting(plates)
+        return loads_of(plates, force @ turn.T, point, torque)
+
+    return loads(change)
+
+
+def scaled(force: float = 1.0, point: float = 1.0, plates: slice = slice(None)) -> Change:
+    """Forces with their torques, and points times these, on all plates or on some."""
+
+    def change(loads: PlateLoads) -> PlateLoads:
+        forces, points, torques = (part.copy() for part in acting(loads))
+        forces[:, plates] *= force
+        points[:, plates] *= point
+        torques[:, plates] *= force
+        return loads_of(loads, forces, points, torques)
+
+    return loads(change)
+
+
+def torques_in_n_mm(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+    """Torques a thousand times as large; of plates with corners, all moments about the plate's middle."""
+    plates = person.plates
+    if plates.corners is not None:
+        middle = plates.corners.mean(axis=1)
+        about = plates.moment - np.cross(middle, plates.force)
+        return person.with_plates(replace(plates, moment=1000.0 * about + np.cross(middle, plates.force)))
+    force, point, torque = acting(plates)
+    loaded = force[..., 1] > LOAD_THRESHOLD_N
+    if np.abs(torque[loaded]).max() < 0.1:  # the file has none
+        return None
+    return person.with_plates(loads_of(plates, force, point, 1000.0 * torque))
+
+
+def moved(x_m: float, z_m: float) -> Change:
+    """Centres of pressure elsewhere, with the corners of the plates where the file has them."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        force, point, torque = acting(plates)
+        offset = np.array([x_m, 0.0, z_m])
+        corners = None if plates.corners is None else plates.corners + offset
+        return replace(loads_of(plates, force, point + offset, torque), corners=corners)
+
+    return loads(change)
+
+
+def with_offset(x_n: float = 0.0, y_n: float = 0.0, z_n: float = 0.0) -> Change:
+    """A wrong zero of every plate, which acts in its middle."""
+    return _with_more(lambda time: np.array([x_n, y_n, z_n]) * np.ones((len(time), 1)))
+
+
+def with_drift(last_n: float) -> Change:
+    """The zero of the vertical force of every plate drifts from 0 to this."""
+    return _with_more(lambda time: np.outer((time - time[0]) / (time[-1] - time[0]), [0.0, last_n, 0.0]))
+
+
+def _with_more(extra: Callable[[FloatArray], FloatArray]) -> Change:
+    def change(plates: PlateLoads) -> PlateLoads:
+        middle = _middles(plates, acting(plates)[1])
+        more = np.repeat(extra(plates.time)[:, None], len(plates.names), axis=1)
+        return replace(plates, force=plates.force + more, moment=plates.moment + np.cross(middle, more))
+
+    return loads(change)
+
+
+def on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+    """The foot of the second plate lands on the first for the first 0.08 s, in front of the other foot."""
+    plates = person.plates
+    order = _by_time(plates)
+    if len(order) < 2:
+        return None
+    first, second = order[:2]
+    loaded = np.flatnonzero(plates.force[:, second, 1] > LOAD_THRESHOLD_N)
+    inside = (plates.time >= plates.time[loaded[0]]) & (plates.time < plates.time[loaded[0]] + 0.08)
+    if not (plates.force[inside, first, 1] > LOAD_THRESHOLD_N).all():
+        return None
+    force, moment = plates.force.copy(), plates.moment.copy()
+    for part in (force, moment):
+        part[inside, first] += part[inside, second]
+        part[inside, second] = 0.0
+    return person.with_plates(replace(plates, force=force, moment=moment))
+
+
+def plates_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+    """The channels of two plates exchanged: each load lies where the other plate is. Force files have no channels."""
+    plates = person.plates
+    order = _by_time(plates)
+    if len(order) < 2 or plates.corners is None:
+        return None
+    force, point, torque = (part.copy() for part in acting(plates))
+    first, second = order[:2]
+    middle = _middles(plates, point)
+    there = middle[:, second] - middle[:, first]
+    point[:, first] += there
+    point[:, second] -= there
+    found = loads_of(plates, force, point, torque)
+    pair, other = [first, second], [second, first]
+    force, moment = found.force.copy(), found.moment.copy()
+    force[:, pair], moment[:, pair] = found.force[:, other], found.moment[:, other]
+    return person.with_plates(replace(found, force=force, moment=moment))
+
+
+def late(delay_s: float) -> Change:
+    """Forces later than they were."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        step = float(plates.time[1] - plates.time[0])
+        rows = np.clip(np.arange(len(plates.time)) - round(delay_s / step), 0, len(plates.time) - 1)
+        return replace(plates, force=plates.force[rows], moment=plates.moment[rows])
+
+    return loads(change)
+
+
+def of_another_trial(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+    """Forces of a walk that began 0.3 s earlier, and 120 mm further on."""
+    earlier = late(-0.3)(person, rng)
+    return None if earlier is None else moved(0.12, 0.02)(earlier, rng)
+
+
+def _by_time(plates: PlateLoads) -> list[int]:
+    """Plates that are loaded, in the order of the first load."""
+    firm = plates.force[..., 1] > 5 * LOAD_THRESHOLD_N
+    return sorted(np.flatnonzero(firm.any(axis=0)).tolist(), key=lambda p: int(np.argmax(firm[:, p])))
+
+
+def _middles(plates: PlateLoads, point: FloatArray) -> FloatArray:
+    """(1, p, 3) m, the plates' middles: by their corners, or by where they are loaded."""
+    if plates.corners is not None:
+        return np.asarray(plates.corners.mean(axis=1)[None])
+    weight = np.where(plates.force[..., 1] > LOAD_THRESHOLD_N, plates.force[..., 1], 0.0)[..., None]
+    return np.asarray((weight * point).sum(axis=0, keepdims=True) / np.maximum(weight.sum(axis=0, keepdims=True), 1.0))

@@ -1,0 +1,95 @@
+"""What goes wrong with plates by themselves: axes, units, zeros, drift."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+
+_FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
+_LONGEST_ARM_M = 0.15
+"""Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
+_STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
+_ZERO_N, _DRIFT_N = 15.0, 15.0
+_WEAKEST_N = 0.3
+_IDLE_PERCENT = (2.0, 15.0)
+"""A plate that somebody walks over is idle for at least so many percent of the record."""
+
+
+def loads_trouble(plates: PlateLoads) -> str:
+    """What is wrong with the axes or units of the plates' loads by themselves; empty where nothing is."""
+    peaks = np.abs(plates.force).max(axis=(0, 1), initial=0.0)
+    axis = "XYZ"[int(np.argmax(peaks))]
+    if axis != "Y" and peaks[1] < 0.7 * peaks.max():
+        return (
+            f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is "
+            f"up in the markers; export forces and markers in the same axes"
+        )
+    if trouble := _never_unloaded(plates) or _hardly_loaded(plates):
+        return trouble
+    wrench = np.concatenate((plates.force, plates.moment), axis=2)
+    arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > _FIRM_LOAD_N]
+    arms /= plates.force[..., 1][plates.force[..., 1] > _FIRM_LOAD_N]
+    typical = float(np.median(arms)) if arms.size else 0.0
+    if typical > _LONGEST_ARM_M:
+        return (
+            f"the torques are those of vertical forces at {typical:.2g} m from the foot; expected less than 0.04 m: "
+            f"they are in N mm, or not about the centre of pressure; export them in N m, about the point of the force"
+        )
+    return ""
+
+
+def loads_doubts(plates: PlateLoads) -> list[str]:
+    """Zeros that are wrong or drift, by what plates read while nobody stands on them."""
+    if plates.idle is None:
+        return []
+    found = []
+    for name, idle in zip(plates.names, plates.idle, strict=True):
+        off = [(axis, value) for axis, value in zip("XYZ", idle.level_n, strict=True) if abs(value) > _ZERO_N]
+        if off:
+            told = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off)
+            vertical = any(axis == "Y" for axis, _ in off)
+            which = "the zero of its vertical force" if vertical else "the zero of that axis"
+            found.append(
+                f"{name} reads {told} while nobody stands on it: {which} is wrong, and the loads are off by as much; "
+                "zero the plates without load, or subtract it before export"
+            )
+        if abs(idle.drift_n) > _DRIFT_N:
+            found.append(
+                f"the zero of {name} drifts: its vertical force changes by {idle.drift_n:+.0f} N over the recording "
+                "while nobody stands on it; let the amplifiers warm up and zero them before each trial, or take the "
+                "drift off"
+            )
+    return found
+
+
+def _never_unloaded(plates: PlateLoads) -> str:
+    """Which plate somebody walked over shows a small steady force where others show none; empty where none does."""
+    for name, vertical in zip(plates.names, plates.force[..., 1].T, strict=True):
+        low, high = np.percentile(vertical, _IDLE_PERCENT)
+        steady = high - low < _STEADY_N
+        if vertical.max() > _STEP_N and low > LOAD_THRESHOLD_N and high < _MOST_IDLE_N and steady:
+            return (
+                f"{name} never shows less than {vertical.min():.0f} N, and a steady {(low + high) / 2:.0f} N while "
+                f"nobody stands on it: the zero of its vertical force is wrong; zero the plates without load, or "
+                f"subtract it before export"
+            )
+    return ""
+
+
+def _hardly_loaded(plates: PlateLoads) -> str:
+    """What all plates show is too little for a person, and more than noise."""
+    peak = max((idle.peak_n for idle in plates.idle or ()), default=np.inf)
+    if not _WEAKEST_N < peak < LOAD_THRESHOLD_N or plates.force.any():
+        return ""
+    return (
+        f"the largest vertical force is {peak:.2g}: the forces are in kN, or in multiples of the body weight; export "
+        "them in N"
+    )
+
+
+def _free_moment(wrench: FloatArray) -> FloatArray:
+    point = centre_of_pressure(wrench)
+    result: FloatArray = (wrench[..., 3:] - np.cross(point, wrench[..., :3]))[..., 1]
+    return result

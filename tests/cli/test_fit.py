@@ -1,0 +1,120 @@
+"""`kinertia fit` of several people; values as people write them, results as scripts read them; shell completion."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from command_line import run
+from kinertia.errors import FileError
+
+
+@pytest.fixture
+def subjects(demo_run, tmp_path, monkeypatch, fit):
+    """Folder of the demo's files with two subject files, whose fits are those of the demo and take no time."""
+    folder = tmp_path / "lab"
+    shutil.copytree(demo_run[0].subject_file.parent, folder)
+    for name in ("anna.toml", "ben.toml"):
+        shutil.copy(demo_run[0].subject_file, folder / name)
+    monkeypatch.setattr("kinertia.cli.fit.fit_subject", lambda wanted, progress: replace(fit, subject=wanted.subject))
+    return folder
+
+
+def test_several_people_are_fitted_each_into_a_folder_of_their_own(subjects, tmp_path):
+    out = tmp_path / "out"
+    told = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", out, "--json")
+    assert told.status in (0, 1), told.err
+    anna, ben = json.loads(told.out)
+    assert [anna["folder"], ben["folder"]] == [str(out / "anna"), str(out / "ben")]
+    for name, one in (("anna", anna), ("ben", ben)):
+        written = json.loads((out / name / "fit.json").read_text())
+        assert {key: value for key, value in one.items() if key != "folder"} == written
+        assert f"{subjects / name}.toml -o {out / name}" in (out / name / "report.html").read_text()
+    only = json.loads(run("fit", subjects / "anna.toml", "-o", tmp_path / "one", "--json").out)
+    assert only["folder"] == str(tmp_path / "one")
+    assert only["trials"] == anna["trials"]
+    shown = run("fit", subjects / "anna.toml", subjects, "-o", out).out
+    assert f"results in {out / 'anna'}" in shown
+    assert f"results in {out / 'lab'}" in shown  # subject.toml is called like its folder
+
+
+def test_an_error_of_one_person_does_not_keep_the_others_from_being_fitted(subjects, tmp_path, monkeypatch, fit):
+    def fitted_or_not(wanted, progress):
+        if wanted.subject.mass_kg == 60.0:
+            raise FileError(subjects / "walk.trc", "is of somebody else")
+        return fit
+
+    monkeypatch.setattr("kinertia.cli.fit.fit_subject", fitted_or_not)
+    text = (subjects / "anna.toml").read_text()
+    (subjects / "anna.toml").write_text(text.replace("72.6", "60.0"))
+    told = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", tmp_path / "out", "--quiet")
+    assert told.status == 2
+    assert "anna.toml" in told.err
+    assert "is of somebody else" in told.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"ben"}
+
+
+def test_several_people_need_subject_files_of_different_names(subjects, tmp_path):
+    (subjects / "more").mkdir()
+    shutil.copy(subjects / "anna.toml", subjects / "more")
+    walk = subjects / "walk.trc"
+    for wrong, words in (
+        ((subjects / "anna.toml", walk), "walk.trc: is no subject file"),
+        ((subjects / "anna.toml", subjects / "nobody.toml"), "nobody.toml: no such file"),
+    ):
+        told = run("fit", *wrong, "-o", tmp_path / "out")
+        assert (told.status, words in told.err) == (2, True), told.err
+    (subjects / "more" / "anna.toml").write_text((subjects / "anna.toml").read_text())
+    told = run("fit", subjects / "anna.toml", subjects / "more" / "anna.toml", "-o", tmp_path / "out")
+    assert told.status == 2
+    assert "its results would go to anna, as those of" in told.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_numbers_and_sex_as_people_write_them(subjects, tmp_path):
+    walk, forces = subjects / "walk.trc", subjects / "walk_grf.mot"
+    given = ("fit", walk, "--forces", forces, "--static", subjects / "static.trc")
+    told = run(*given, "--mass", "72,6", "--height", "1,803", "--sex", "M", "-o", tmp_path / "out", "--json")
+    assert told.status in (0, 1), told.err
+    subject = json.loads(told.out)["subject"]
+    assert (subject["mass_kg"], subject["height_m"], subject["sex"]) == (72.6, 1.803, "male")
+    for option, text, words in (
+        ("--mass", "72.6kg", "'72.6kg' is not a number"),
+        ("--mass", "1.072,6", "'1.072,6' is not a number"),
+        ("--sex", "x", "neither male (m) nor female (f)"),
+    ):
+        told = run("check", walk, option, text)
+        assert told.status == 2
+        assert words in " ".join(told.err.replace("│", " ").split())
+    wrong = subjects / "ben.toml"
+    wrong.write_text(wrong.read_text().replace("72.6", "72,6"))
+    told = run("fit", wrong, "-o", tmp_path / "out")
+    assert "a number has a decimal point, not a comma: 72.6" in told.err
+
+
+def test_check_tells_scripts_what_it_tells_people(subjects):
+    files = (subjects / "walk.trc", subjects / "walk_grf.mot", "--mass", 72.6)
+    told = run("check", *files, "--json")
+    (recording,) = json.loads(told.out)["recordings"]
+    shown = " ".join(run("check", *files).out.split())
+    assert len(recording["verdicts"]) > 3
+    for verdict in recording["verdicts"]:
+        assert f"{verdict['level']}: {verdict['sentence']}" in shown
+    for fact, words in recording["facts"].items():
+        assert " ".join(f"{fact} {words}".split()) in shown
+    wrong = run("check", subjects / "walk_grf.mot", subjects / "anna.trc", "--json")
+    assert wrong.status == 2
+
+
+def test_shells_complete_commands_and_options():
+    program = "from kinertia.cli.start import main; main()"
+    for typed, expected in (("kinertia com", "compare"), ("kinertia report --no", "--norms")):
+        words = {"_KINERTIA_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=False, env={**os.environ, **words}
+        )
+        assert done.stdout.split() == [expected], done.stderr

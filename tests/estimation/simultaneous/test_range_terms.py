@@ -1,0 +1,51 @@
+"""What coordinates pay beyond their ranges, and an estimate that stays within them."""
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.normal_equations import NormalEquations
+from kinertia.estimation.simultaneous.range_terms import CLAMPED_SD, SD, RangeTerms, add_ranges
+from kinertia.estimation.simultaneous.stretches import Stretch, stretches
+from kinertia.model.coordinate_range import Bounds, Range
+
+RANGES = {"elbow": Range(0.0, 2.6, clamped=True), "shoulder": Range(-1.0, 1.0, clamped=False)}
+BOUNDS = Bounds.of(("elbow", "shoulder", "root"), RANGES)
+
+
+def total(q: np.ndarray) -> float:
+    """What these coordinates pay, frames worth one knot interval each."""
+    return RangeTerms.of(BOUNDS, q, 1.0).cost
+
+
+def test_within_nothing_is_paid_and_beyond_one_deviation_is_a_half():
+    assert total(np.array([[1.0, 0.5, 1e9], [0.0, -1.0, -1e9]])) == 0.0
+    assert total(np.array([[-CLAMPED_SD, 0.0, 0.0]])) == pytest.approx(0.5)
+    assert total(np.array([[1.0, 1.0 + SD, 0.0]])) == pytest.approx(0.5)
+
+
+def test_derivatives_are_those_of_the_cost():
+    rng = np.random.default_rng(0)
+    basis = MotionBasis(np.linspace(0.0, 1.0, 61), 0.1)
+    coefficients = rng.normal(0.0, 2.0, (basis.size, 3))
+
+    def normal_at(coefficients: np.ndarray, stretch: Stretch) -> NormalEquations:
+        normal = NormalEquations.zero(stretch.size, 3, 1)
+        add_ranges(normal, basis, stretch, BOUNDS, basis.evaluate(coefficients, stretch.frames)[0])
+        return normal
+
+    whole = normal_at(coefficients, Stretch.whole(basis))
+    assert whole.cost > 1.0
+    step = 1e-7
+    for i, j in ((0, 0), (4, 1), (7, 0), (basis.size - 1, 1), (3, 2)):
+        there, back = coefficients.copy(), coefficients.copy()
+        there[i, j] += step
+        back[i, j] -= step
+        two = [normal_at(one, Stretch.whole(basis)) for one in (there, back)]
+        slope = (two[0].cost - two[1].cost) / (2 * step)
+        assert slope == pytest.approx(-whole.right[i, j], rel=1e-5, abs=1e-3)
+        bends = -(two[0].right - two[1].right)[i : i + 6] / (2 * step)
+        np.testing.assert_allclose(bends[:, j], whole.band[i, : len(bends), j, j], rtol=1e-4, atol=1e-3)
+    parts = stretches(basis, 6)
+    assert len(parts) > 1
+    assert sum(normal_at(coefficients, part).cost for part in parts) == pytest.approx(whole.cost)

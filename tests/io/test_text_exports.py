@@ -1,0 +1,29 @@
+"""A measured walk, written in the text formats of Qualisys and Vicon, is the walk of its C3D file."""
+
+import numpy as np
+import pytest
+
+import lab_files
+from kinertia.io.recording import read_recording
+
+
+@pytest.mark.parametrize("kind", ["tsv", "csv"])
+def test_a_measured_walk_comes_back(shared_data, tmp_path, monkeypatch, kind):
+    walk = read_recording(shared_data / "pig_c3d" / "subject_a_walk.c3d")
+    corners = np.stack([plate @ lab_files.LAB for plate in walk.plates.corners])
+    x, y = (
+        corners[:, one].mean(axis=1) - corners[:, two].mean(axis=1) for one, two in (([0, 3], [1, 2]), ([0, 1], [2, 3]))
+    )
+    axes = np.stack([x, y, np.cross(x, y)], axis=1)
+    monkeypatch.setattr(lab_files, "CORNERS_M", corners)
+    monkeypatch.setattr(lab_files, "AXES", axes / np.linalg.norm(axes, axis=2, keepdims=True))
+    path = tmp_path / f"walk.{kind}"
+    if kind == "tsv":
+        lab_files.write_qtm(path, walk, local=True)
+    else:
+        lab_files.write_nexus(path, walk, np.diag([1.0, -1.0, -1.0]))
+    found = read_recording(path)
+    assert found.markers.labels == walk.markers.labels
+    np.testing.assert_allclose(found.markers.positions, walk.markers.positions, atol=1e-6)
+    np.testing.assert_allclose(found.plates.force, walk.plates.force, atol=1e-5)
+    np.testing.assert_allclose(found.plates.moment, walk.plates.moment, atol=1e-4)

@@ -1,0 +1,53 @@
+"""A stature or a floor that the markers contradict is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.trial.data import Markers
+
+PEOPLE = {
+    "gait2354/subject01_static.trc": 1.803,
+    "rajagopal_walk/static_walk_1.trc": 1.83,
+    "pig_c3d/subject_a_static.c3d": 1.61,
+    "pig_c3d/subject_b_static.c3d": 1.505,
+}
+
+
+@pytest.fixture(params=PEOPLE.items(), ids=list(PEOPLE))
+def person(request, measured_recording):
+    name, height_m = request.param
+    static = measured_recording(name)
+    return static, choose_marker_set(static.markers.labels), height_m
+
+
+def test_the_own_stature_and_floor(person):
+    static, marker_set, height_m = person
+    assert stature_doubts(static, marker_set, height_m) == []
+    assert floor_doubts(static.markers, marker_set) == []
+
+
+@pytest.mark.parametrize("off_m", [-0.2, 0.2])
+def test_another_stature(person, off_m):
+    static, marker_set, height_m = person
+    (told,) = stature_doubts(static, marker_set, height_m + off_m)
+    by_markers = float(told.partition("a stature of about ")[2].split()[0])
+    assert by_markers == pytest.approx(height_m, abs=0.08)
+
+
+@pytest.mark.parametrize("rise_m", [-0.06, 0.06])
+def test_another_floor(person, rise_m):
+    static, marker_set, _ = person
+    markers = static.markers
+    raised = Markers(markers.time, markers.labels, markers.positions + np.array([0.0, rise_m, 0.0]))
+    (told,) = floor_doubts(raised, marker_set)
+    assert "above the floor" in told
+
+
+def test_feet_that_are_not_marked_enough(person):
+    static, marker_set, _ = person
+    without = replace(marker_set, landmarks={k: v for k, v in marker_set.landmarks.items() if "heel" not in k})
+    assert floor_doubts(static.markers, without) == []

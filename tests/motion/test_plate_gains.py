@@ -1,0 +1,44 @@
+"""A plate with a wrong gain is told by what other plates say of the same body."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.motion.plate_gains import gain_doubts
+from kinertia.trial.plate_assignment import build_trial
+
+WALKS = {
+    "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+    "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
+    "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
+}
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, measured_recording):
+    """A measured walk."""
+    return measured_recording(*WALKS[request.param])
+
+
+def told(walk):
+    marker_set = choose_marker_set(walk.markers.labels)
+    present = set(walk.markers.labels)
+    feet = {side: [one for one in labels if one in present] for side, labels in marker_set.foot_labels().items()}
+    owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    return gain_doubts(walk, build_trial(walk, feet), owners)
+
+
+def test_sound_plates(walk):
+    assert told(walk) == []
+
+
+@pytest.mark.parametrize("gain", [0.87, 1.15])
+def test_a_wrong_gain(walk, gain):
+    factors = np.array([1.0, gain])[:, None]
+    plates = walk.plates
+    wrong = replace(plates, force=plates.force * factors, moment=plates.moment * factors)
+    (sentence,) = told(replace(walk, plates=wrong))
+    apart = float(sentence.partition(" by the other (")[2].partition(" %")[0]) / 100
+    assert 1 + apart == pytest.approx(max(gain, 1 / gain), abs=0.04)

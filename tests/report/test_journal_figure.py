@@ -1,0 +1,93 @@
+"""Figures for papers: what matplotlib draws is what the report's figures say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.collections import FillBetweenPolyCollection
+from matplotlib.colors import to_hex
+
+from kinertia.errors import FileError, KinertiaError
+from kinertia.report.bsp_figures import change_figure
+from kinertia.report.cycle_figures import cycle_figure
+from kinertia.report.journal_figure import FIGURES, drawing
+
+
+def panel(figure, title):
+    """The panel of this title, and what the report's figure has there."""
+    drawn = drawing(figure)
+    titles = [note["text"].removeprefix("<b>").removesuffix("</b>") for note in figure.layout["annotations"]]
+    assert [axes.get_title(loc="left").replace("\n", " ") for axes in drawn.axes] == titles
+    k = titles.index(title)
+    return drawn.axes[k], [trace for trace in figure.data if trace["xaxis"] == (f"x{k + 1}" if k else "x")]
+
+
+def test_curves_are_those_of_the_report(fit):
+    axes, traces = panel(cycle_figure(fit, "moment"), "Knee moment, flexion + (N m/kg)")
+    whole = [line for line in axes.get_lines() if len(line.get_xdata()) == 101]
+    lines = {(to_hex(line.get_color()), line.get_linestyle()): line for line in whole}
+    for side, colour in (("right", "#0072b2"), ("left", "#d55e00")):
+        for name, dash in ((f"{side}, one stride", "-"), (f"{side}, literature values", ":")):
+            (trace,) = [one for one in traces if one["name"] == name]
+            line = lines[colour, dash]
+            np.testing.assert_array_equal(line.get_xdata(), np.arange(101))
+            np.testing.assert_array_equal(line.get_ydata(), trace["y"])
+    (band,) = [one for one in traces if one["name"] == "right, 95 % of the estimate"]
+    outline = next(patch for patch in axes.patches if to_hex(patch.get_facecolor()) == "#0072b2").get_xy()
+    y = np.asarray(band["y"], dtype=float)
+    assert set(np.round(outline[:, 1], 6)) == set(np.round(y[np.isfinite(y)], 6))
+    assert axes.get_xlim() == (0, 100)
+
+
+def test_error_bars_are_those_of_the_report(fit):
+    axes, traces = panel(change_figure(fit), "CoM forward (mm)")
+    (estimate,) = [one for one in traces if one["name"] == "estimate, 95 %"]
+    bars = next(one for one in axes.collections if to_hex(one.get_color()[0]) == "#0072b2")
+    for segment, x, y, half in zip(
+        bars.get_segments(), estimate["x"], estimate["y"], estimate["error_x"]["array"], strict=True
+    ):
+        np.testing.assert_allclose(segment, [(x - half, y), (x + half, y)], rtol=1e-6)
+    assert [label.get_text() for label in axes.get_yticklabels()][:2] == ["pelvis", "torso"]
+    assert axes.get_ylim()[0] > axes.get_ylim()[1], "downwards"
+
+
+@pytest.mark.parametrize(("ending", "begin"), [(".svg", b"<?xml"), (".pdf", b"%PDF"), (".PNG", b"\x89PNG")])
+def test_a_figure_is_a_file(fit, tmp_path, ending, begin):
+    path = fit.figure("forces", tmp_path / f"forces{ending}")
+    assert path.read_bytes().startswith(begin)
+    if ending == ".svg":
+        text = path.read_text(encoding="utf-8")
+        assert ">Upward + (% body weight)<" in text, "letters stay letters"
+        width, unit = float(text.partition('width="')[2].partition("pt")[0]), 25.4 / 72
+        assert width * unit == pytest.approx(180)
+
+
+def test_every_figure_is_drawn_with_and_without_error_bars(fit, two_level):
+    for one in (fit, two_level):
+        for name, make in FIGURES.items():
+            drawn = drawing(make(one))
+            assert all(axes.has_data() for axes in drawn.axes), name
+            drawn.draw_without_rendering()
+
+
+def test_without_strides_moments_are_over_time(fit, tmp_path):
+    standing = replace(fit.trials[0])
+    standing.__dict__["strides"] = ()
+    still = replace(fit, trials=(standing,))
+    drawn = drawing(FIGURES["moments"](still))
+    assert drawn.axes[0].get_xlabel() == "time (s)"
+    assert any(isinstance(one, FillBetweenPolyCollection) for one in drawn.axes[0].collections), "95 % bands"
+    with pytest.raises(KinertiaError, match="no trial of this fit has a stride"):
+        still.figure("powers", tmp_path / "powers.svg")
+
+
+def test_what_cannot_be_drawn_is_told(fit, tmp_path, without):
+    with pytest.raises(KinertiaError, match="no figure 'moment'; expected one of moments, angles"):
+        fit.figure("moment", tmp_path / "a.svg")
+    with pytest.raises(FileError, match=r"'\.docx' is no format of figures; expected one of \.svg"):
+        fit.figure("moments", tmp_path / "a.docx")
+    with pytest.raises(FileError, match=r"cannot be written: No such file"):
+        fit.figure("forces", tmp_path / "nowhere" / "a.png")
+    without("matplotlib")
+    with pytest.raises(KinertiaError, match=r"pip install 'kinertia\[plots\]'"):
+        fit.figure("moments", tmp_path / "a.svg")

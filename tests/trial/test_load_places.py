@@ -1,0 +1,140 @@
+"""Loads that are not under the feet, or not when they stand, are named by their cause; sound ones never are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import Markers
+from kinertia.trial.load_places import load_places_doubts, load_places_trouble
+from walk_on_plates import ALL_STEPS
+from walk_on_plates import FEET as SIMPLE_FEET
+from walk_on_plates import walk as simple_walk
+
+WALKS = {
+    "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+    "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
+    "plug-in gait a": ("pig_c3d/subject_a_walk.c3d", None),
+    "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
+}
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, measured_recording):
+    """A measured walk and the labels of its feet."""
+    markers, forces = WALKS[request.param]
+    found = measured_recording(markers, forces)
+    feet = choose_marker_set(found.markers.labels).foot_labels()
+    return found, {side: [one for one in labels if one in found.markers.labels] for side, labels in feet.items()}
+
+
+def moved(recording, offset_m, factor=1.0):
+    """Centres of pressure times a factor, and somewhere else."""
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    to = factor * point + np.array(offset_m)
+    return replace(recording, plates=replace(plates, moment=plates.moment + np.cross(to - point, plates.force)))
+
+
+def shifted(recording, by_s):
+    """Forces later by so much."""
+    plates = recording.plates
+    rows = round(by_s / float(plates.time[1] - plates.time[0]))
+    earlier = np.clip(np.arange(len(plates.time)) - rows, 0, len(plates.time) - 1)
+    late = replace(plates, force=plates.force[earlier], moment=plates.moment[earlier])
+    return replace(recording, plates=late)
+
+
+def test_sound_walks(walk):
+    assert load_places_trouble(*walk) == ""
+    assert load_places_doubts(*walk) == []
+
+
+@pytest.mark.parametrize("offset_m", [0.05, -0.05])
+def test_offsets_across_the_walk(walk, offset_m):
+    recording, feet = walk
+    (told,) = load_places_doubts(moved(recording, (0.0, 0.0, offset_m)), feet)
+    assert "centres of pressure of both feet are off" in told
+    found = float(told.partition("along X and ")[2].partition(" mm")[0])
+    assert found == pytest.approx(1e3 * offset_m, abs=10)
+
+
+@pytest.mark.parametrize("offset_m", [0.3, -0.3])
+def test_other_origins(walk, offset_m):
+    recording, feet = walk
+    told = load_places_trouble(moved(recording, (offset_m, 0.0, 0.0)), feet) or "".join(
+        load_places_doubts(moved(recording, (offset_m, 0.0, 0.0)), feet)
+    )
+    assert "entres of pressure" in told
+
+
+def test_points_in_mm(walk):
+    recording, feet = walk
+    assert "they are in mm" in load_places_trouble(moved(recording, (0.0, 0.0, 0.0), factor=1000.0), feet)
+
+
+@pytest.mark.parametrize("by_s", [-0.12, 0.09, 0.2])
+def test_clocks(walk, by_s):
+    recording, feet = walk
+    told = load_places_trouble(shifted(recording, by_s), feet)
+    assert told.startswith("the forces are ")
+    assert ("late" if by_s > 0 else "early") in told
+    found = float(told.partition("are ")[2].partition(" ms")[0])
+    assert found == pytest.approx(1e3 * abs(by_s), abs=35)
+
+
+@pytest.mark.parametrize("late_s", [-0.015, 0.015])
+def test_what_the_estimate_puts_right_is_not_refused(walk, late_s):
+    recording, feet = walk
+    assert load_places_trouble(shifted(moved(recording, (0.02, 0.0, 0.0)), late_s), feet) == ""
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_rates(walk, factor):
+    recording, feet = walk
+    markers = recording.markers
+    time = markers.time[0] + factor * (markers.time - markers.time[0])
+    told = load_places_trouble(replace(recording, markers=Markers(time, markers.labels, markers.positions)), feet)
+    found = float(told.partition("of one of them is wrong (by ")[2].partition(")")[0])
+    assert found == pytest.approx(factor, rel=0.1)
+
+
+@pytest.mark.parametrize("stride_m", [1.2, 0.9])
+def test_a_made_up_walk(stride_m):
+    recording = simple_walk(ALL_STEPS, stride_m=stride_m)
+    assert load_places_trouble(recording, SIMPLE_FEET) == ""
+    assert load_places_doubts(recording, SIMPLE_FEET) == []
+
+
+def test_plates_that_are_exchanged():
+    recording = simple_walk([("r", 0), ("l", 0)])
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    loaded = plates.force[..., 1] > 0
+    middle = [point[loaded[:, p], p].mean(axis=0) for p in range(2)]
+    size = 0.3 * np.array([[1, 0, 1], [-1, 0, 1], [-1, 0, -1], [1, 0, -1]])
+    corners = np.array([place + size for place in middle])
+    sound = replace(recording, plates=replace(plates, corners=corners))
+    assert load_places_trouble(sound, SIMPLE_FEET) == ""
+    there = np.array([middle[1] - middle[0], middle[0] - middle[1]])  # to the other plate's place
+    moment = plates.moment + np.cross(there, plates.force)
+    wrong = replace(plates, force=plates.force[:, ::-1], moment=moment[:, ::-1], corners=corners)
+    told = load_places_trouble(replace(recording, plates=wrong), SIMPLE_FEET)
+    assert "the loads of plate 1 and plate 2" in told
+    assert "exchanged" in told
+
+
+def test_both_feet_on_a_plate():
+    """The left foot lands on the right foot's plate, and comes to its own later."""
+    recording = simple_walk([("r", 0), ("l", 0)])
+    plates = recording.plates
+    time = plates.time
+    force, moment = plates.force.copy(), plates.moment.copy()
+    rows = (time >= 0.7) & (time < 0.78)  # both are down from 0.7 to 0.8 s
+    for part in (force, moment):
+        part[rows, 0] += part[rows, 1]
+        part[rows, 1] = 0.0
+    (told,) = load_places_doubts(replace(recording, plates=replace(plates, force=force, moment=moment)), SIMPLE_FEET)
+    assert "both feet are on it (plate 1 from 0.7" in told

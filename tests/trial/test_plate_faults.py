@@ -1,0 +1,53 @@
+"""What plates read while nobody stands on them: zeros and drift; loads too small for a person."""
+
+import numpy as np
+import pytest
+
+from kinertia.trial.data import PlateLoads
+from kinertia.trial.idle_plate import without_idle
+from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+
+TIME = np.arange(3000) / 1000
+
+
+def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0):
+    """A plate that is stood on from 1 to 1.6 s, with noise, as the readers leave it."""
+    vertical = np.where((TIME > 1) & (TIME < 1.6), 700.0 * np.sin(np.pi * (TIME - 1) / 0.6), 0.0)
+    force = np.outer(vertical, [0.0, 1.0, 0.0]) + np.array(offset) + np.outer(TIME / TIME[-1], [0.0, drift_n, 0.0])
+    force = factor * (force + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
+    load = without_idle(TIME, force, np.zeros_like(force))
+    each = (load.force[:, None], load.moment[:, None])
+    return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
+
+
+def test_a_sound_plate():
+    found = plates()
+    assert loads_trouble(found) == ""
+    assert loads_doubts(found) == []
+    assert found.idle[0].peak_n == pytest.approx(700, abs=5)
+
+
+@pytest.mark.parametrize(
+    ("axis", "words"), [(0, "+25 N along X"), (1, "+25 N along Y"), (2, "+25 N along Z")], ids="XYZ"
+)
+def test_zeros(axis, words):
+    (told,) = loads_doubts(plates(offset=25.0 * np.eye(3)[axis]))
+    assert words in told
+    assert ("its vertical force" if axis == 1 else "that axis") in told
+
+
+@pytest.mark.parametrize("drift_n", [-40.0, 25.0, 60.0])
+def test_drift(drift_n):
+    (told, *_) = [one for one in loads_doubts(plates(drift_n=drift_n)) if "drifts" in one]
+    found = float(told.partition("changes by ")[2].partition(" N")[0])
+    assert found == pytest.approx(drift_n, rel=0.1)
+
+
+def test_forces_in_kilonewtons():
+    assert "in kN" in loads_trouble(plates(factor=1e-3))
+
+
+def test_a_plate_that_nobody_stands_on():
+    idle = plates(factor=1e-9)
+    assert loads_trouble(idle) == ""
+    assert loads_doubts(idle) == []
