@@ -359,7 +359,7 @@ def test_trouble_of_the_system_without_a_file(monkeypatch, error, line):
 
 
 def test_trouble_with_the_disk_is_one_line(person, monkeypatch):
-    def denied(*_):
+    def denied(*_, **__):
         raise PermissionError(13, "Permission denied", "/somewhere")
 
     monkeypatch.setattr("kinertia.estimation.from_files.read_recording", denied)

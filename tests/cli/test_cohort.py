@@ -48,7 +48,7 @@ def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk,
     assert "did you mean 'mass_kg'" in told
     assert "Clara to fit 1" in told
     assert "3 people: 1 to fit, 0 as before, 2 without what a fit needs" in told
-    assert "On this computer, in 1 processes" in told
+    assert "On this computer, in 1 process, each with one thread" in told
     assert "very roughly 1 min" in told
     assert not (tmp_path / "out").exists()
 

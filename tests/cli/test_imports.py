@@ -43,7 +43,7 @@ def test_help_waits_for_nothing_slow():
     """One command after the other in one interpreter, since what one loads stays."""
     loaded = loaded_after(
         "from kinertia.cli.start import main\n"
-        "for command in ('demo', 'init', 'crossval', 'plan', 'study'):\n"
+        "for command in ('demo', 'init', 'crossval', 'plan', 'cohort', 'study'):\n"
         "    sys.argv = ['kinertia', command, '--help']\n"
         "    try:\n        main()\n"
         "    except SystemExit as end:\n        assert end.code in (0, None), end.code"

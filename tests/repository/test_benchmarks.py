@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import command_speed
+import field_trials
 import measured_trials
 from long_trials import document, in_own_process
 
@@ -80,3 +81,25 @@ def test_a_minute_takes_little_more_memory_than_a_walk():
     assert minute.frames == 6000
     assert minute.estimate_mb < 650
     assert f"| 1 min | 6000 | 100 | {minute.before_mb:.0f} |" in document([minute])
+
+
+def test_page_of_field_trials(fit_of):
+    summary = fit_of("gait2354").summary
+    told = {"command": "fit", "status": 1, "seconds": 12.3, "said": "", "fit": summary}
+    told["bsp"] = pd.read_csv(fit_of("gait2354").folder / "bsp.csv")
+    refused = {"command": "fit", "status": 2, "seconds": 1.0, "said": "error: no\nforces"}
+    checked = {
+        "command": "check",
+        "status": 1,
+        "seconds": 1.0,
+        "said": "markers\n\npass: a\nfail: b is\nlost\nassumed: c",
+    }
+    page = field_trials.document({"walk": told, "jump": refused, "x.c3d": checked})
+    (trial,) = summary["trials"]
+    residual = trial["residual_force_rms_N"]
+    begin = (
+        rf"\| walk \| 1 \| {trial['cutoff_hz']:.0f} \| {residual['literature']:.1f} \| {residual['estimate']:.1f} \|"
+    )
+    assert re.search(begin, page)
+    assert "- jump: error: no forces" in page
+    assert "| x.c3d | 1 | fail: b is lost |" in page

@@ -134,7 +134,7 @@ def _where(people: int, scheduler: str | None) -> str:
         return f"On the cluster of {scheduler}"
     size = local_size(people)
     each = f"each with one thread and at most {size.memory_bytes / 1024**3:.1f} GB of memory"
-    return f"On this computer, in {size.workers} processes, {each}"
+    return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
 
 
 def _report_plan(found: Sequence[Standing], scheduler: str | None) -> None:

@@ -82,7 +82,8 @@ def _sections(path: Path) -> Iterator[tuple[str, _Section]]:
     ]  # fmt: skip
     if not begins:
         raise FileError(
-            path, "no section of an ASCII export of Vicon Nexus in it (Trajectories, Devices); export it again"
+            path,
+            "no section of an ASCII export of Vicon Nexus in it; expected Trajectories and Devices, export it again",
         )
     for begin in begins:
         names = cells[begin + 3]

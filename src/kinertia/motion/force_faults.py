@@ -52,12 +52,14 @@ def direction_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
     if trouble := _time_scale_trouble(both):
         return trouble
     angle, strength = _turn(both)
-    against = {axis: one.correlation for axis, one in _agreement(both).items() if one.correlation < _OPPOSED}
+    found = _agreement(both)
+    against = {axis: one.correlation for axis, one in found.items() if one.correlation < _OPPOSED}
+    fitting = any(one.correlation > -_OPPOSED for one in found.values())
     evidence = ", ".join(f"correlation {value:.2f} along {axis}" for axis, value in against.items())
     if len(against) == len(_HORIZONTAL):
         cause = "the forces are turned by 180 degrees about the vertical"
         remedy = "turn the forces, or the markers, before export"
-    elif strength > _CLEAR_TURN and abs(angle) > _TURNED_DEG:
+    elif strength > _CLEAR_TURN and abs(angle) > _TURNED_DEG and not fitting:
         nearest = 90 * round(angle / 90)
         cause = f"the forces are turned by {nearest} degrees about the vertical"
         remedy = "turn the forces, or the markers, before export"

@@ -63,9 +63,10 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
 }
 """Columns of every table with their types, as pyarrow names them."""
 OF_A_PERSON = ("cohort", "trials", "cycles")
-_ROWS_AT_ONCE = 50_000
-"""Rows of one piece of a table, or of one person if these are more: a file keeps a line on each column of each piece,
-which for ten thousand people with a piece each would be more than the numbers."""
+_ROWS_AT_ONCE, _PEOPLE_AT_ONCE = 50_000, 200
+"""Whichever is reached first ends a piece of a table. A file keeps a line on each column of each piece, which for ten
+thousand people with a piece each would be more than the numbers; and small tables that wait take more memory than
+their rows."""
 
 
 def write_person(folder: Path, person: str, fit: Fit) -> None:
@@ -191,7 +192,8 @@ class _GrowingTable:
     def add(self, rows: pyarrow.Table) -> None:
         """Add rows; a full piece is written."""
         self._waiting.append(rows)
-        if sum(table.num_rows for table in self._waiting) >= _ROWS_AT_ONCE:
+        rows = sum(table.num_rows for table in self._waiting)
+        if rows >= _ROWS_AT_ONCE or len(self._waiting) >= _PEOPLE_AT_ONCE:
             self.write()
 
     def write(self) -> None:

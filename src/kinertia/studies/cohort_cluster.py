@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.provenance import VERSION
@@ -148,7 +149,8 @@ def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Jo
     """
     from distributed import as_completed
 
-    of_key = {f"kinertia-{k}-{job.inputs}": job for k, job in enumerate(jobs)}
+    run = uuid4().hex  # what two runs on one cluster submit must not be taken for the same
+    of_key = {f"kinertia-{run}-{k}": job for k, job in enumerate(jobs)}
     futures = [client.submit(fit_person, job, key=key, pure=False) for key, job in of_key.items()]
     for future in as_completed(futures):
         job = of_key[future.key]

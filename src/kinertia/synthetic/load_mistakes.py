@@ -73,8 +73,8 @@ def torques_in_n_mm(person: MeasuredPerson, rng: np.random.Generator) -> Measure
         about = plates.moment - np.cross(middle, plates.force)
         return person.with_plates(replace(plates, moment=1000.0 * about + np.cross(middle, plates.force)))
     force, point, torque = acting(plates)
-    loaded = force[..., 1] > LOAD_THRESHOLD_N
-    if np.abs(torque[loaded]).max() < 0.1:  # the file has none
+    loaded = force[..., 1] > 5 * LOAD_THRESHOLD_N
+    if np.median(np.abs(torque[..., 1][loaded])) < 0.01:  # the file has none
         return None
     return person.with_plates(loads_of(plates, force, point, 1000.0 * torque))
 

@@ -120,7 +120,9 @@ def write_person(folder: Path, person: MeasuredPerson) -> Path:
         trial = {"name": "walk", "markers": "walk.c3d"}
     else:
         write_trc(folder / "walk.trc", person.walk.markers)
-        write_sto(folder / "walk_grf.mot", force_table(person.plates), False, "walk_grf")
+        # by these names a reader knows which columns are torques
+        names = tuple(f"{k}_ground_force" for k in range(1, len(person.plates.names) + 1))
+        write_sto(folder / "walk_grf.mot", force_table(replace(person.plates, names=names)), False, "walk_grf")
     if person.window_s is not None:
         trial["window_s"] = list(person.window_s)
     tables.append(("[[trial]]", trial))

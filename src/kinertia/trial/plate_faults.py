@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -11,7 +13,8 @@ _FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
 _LONGEST_ARM_M = 0.15
 """Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
 _STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
-_ZERO_N, _DRIFT_N = 15.0, 15.0
+_ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
+"""Zeroed plates read a few newtons; 40 N are 5 % of a person's weight on every plate."""
 _WEAKEST_N = 0.3
 _IDLE_PERCENT = (2.0, 15.0)
 """A plate that somebody walks over is idle for at least so many percent of the record."""
@@ -26,7 +29,7 @@ def loads_trouble(plates: PlateLoads) -> str:
             f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is "
             f"up in the markers; export forces and markers in the same axes"
         )
-    if trouble := _never_unloaded(plates) or _hardly_loaded(plates):
+    if trouble := _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
         return trouble
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
     arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > _FIRM_LOAD_N]
@@ -46,27 +49,44 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
         return []
     found = []
     for name, idle in zip(plates.names, plates.idle, strict=True):
-        off = [(axis, value) for axis, value in zip("XYZ", idle.level_n, strict=True) if abs(value) > _ZERO_N]
-        if off:
-            told = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off)
-            vertical = any(axis == "Y" for axis, _ in off)
-            which = "the zero of its vertical force" if vertical else "the zero of that axis"
-            found.append(
-                f"{name} reads {told} while nobody stands on it: {which} is wrong, and the loads are off by as much; "
-                "zero the plates without load, or subtract it before export"
-            )
-        if abs(idle.drift_n) > _DRIFT_N:
+        drifts = abs(idle.drift_n) > _DRIFT_N
+        if drifts:
             found.append(
                 f"the zero of {name} drifts: its vertical force changes by {idle.drift_n:+.0f} N over the recording "
                 "while nobody stands on it; let the amplifiers warm up and zero them before each trial, or take the "
                 "drift off"
             )
+        level = [(axis, value) for axis, value in zip("XYZ", idle.level_n, strict=True) if abs(value) > _ZERO_N]
+        off = [(axis, value) for axis, value in level if not (drifts and axis == "Y")]
+        if off:
+            found.append(_wrong_zero(name, off))
     return found
+
+
+def _wrong_zero(name: str, off: Sequence[tuple[str, float]]) -> str:
+    told = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off)
+    vertical = any(axis == "Y" for axis, _ in off)
+    which = "the zero of its vertical force" if vertical else "the zero of that axis"
+    return (
+        f"{name} reads {told} while nobody stands on it: {which} is wrong, and the loads are off by as much; zero the "
+        f"plates without load, or subtract it before export"
+    )
+
+
+def _far_from_zero(plates: PlateLoads) -> str:
+    """A plate whose vertical force is off by so much that the body's mass is."""
+    for name, idle in zip(plates.names, plates.idle or (), strict=plates.idle is not None):
+        if abs(idle.level_n[1]) > _FAR_FROM_ZERO_N and not abs(idle.drift_n) > _DRIFT_N:
+            return _wrong_zero(name, [("Y", idle.level_n[1])])
+    return ""
 
 
 def _never_unloaded(plates: PlateLoads) -> str:
     """Which plate somebody walked over shows a small steady force where others show none; empty where none does."""
-    for name, vertical in zip(plates.names, plates.force[..., 1].T, strict=True):
+    drifts = [abs(idle.drift_n) > _DRIFT_N for idle in plates.idle or ()] or [False] * len(plates.names)
+    for name, vertical, drifting in zip(plates.names, plates.force[..., 1].T, drifts, strict=True):
+        if drifting:
+            continue
         low, high = np.percentile(vertical, _IDLE_PERCENT)
         steady = high - low < _STEADY_N
         if vertical.max() > _STEP_N and low > LOAD_THRESHOLD_N and high < _MOST_IDLE_N and steady:
