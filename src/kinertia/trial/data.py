@@ -138,7 +138,7 @@ class PlateLoads:
         corners: (p, 4, 3) m, or None where the file does not tell.
         noise_n: of each plate, deviation of its vertical force while nobody stands on it, N; None where it is unknown.
         idle: of each plate, what it read while nobody stood on it, before that was taken away; None where it is
-        unknown.
+            unknown.
 
     Examples:
         >>> force, moment = np.zeros((5, 1, 3)), np.zeros((5, 1, 3))
