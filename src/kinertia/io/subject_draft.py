@@ -45,7 +45,7 @@ def init_subject(folder: str | Path) -> str:
     trc = [file for file in files if file.suffix.lower() != ".c3d" and _holds_markers(file)]
     captures = c3d + [file for file in trc if file.stem not in [twin.stem for twin in c3d]]
     if not captures:
-        inside = [f.name for f in files if f.is_dir() and any(map(_is_capture, filter(Path.is_file, f.iterdir())))]
+        inside = [f.name for f in files if f.is_dir() and any(map(is_capture, filter(Path.is_file, f.iterdir())))]
         if inside:
             raise FileError(folder, f"holds no file of markers, but its folder {inside[0]} does; give that one")
         raise FileError(
@@ -139,7 +139,8 @@ def _head(file: Path) -> str:
         return stream.read(20_000).decode("utf-8", errors="replace")
 
 
-def _is_capture(file: Path) -> bool:
+def is_capture(file: Path) -> bool:
+    """Whether a file is a recording of markers, by its ending and, where that does not say, its head."""
     return file.suffix.lower() == ".c3d" or _holds_markers(file)
 
 
@@ -170,7 +171,7 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
         return found
     for other in (*files, *sorted(folder.parent.iterdir())):
         inside = sorted(file for file in other.iterdir() if file.is_file()) if other.is_dir() else []
-        if other != folder and not any(map(_is_capture, inside)):
+        if other != folder and not any(map(is_capture, inside)):
             found += [file for file in inside if holds(file)]
     return found
 

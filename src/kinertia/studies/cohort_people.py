@@ -9,9 +9,9 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere, path_from, same_name_key
+from kinertia.io.subject_draft import is_capture
 from kinertia.io.subject_file import subject_file_in
 
-_RECORDINGS = (".c3d", ".trc")
 _SEPARATORS = ",;\t"
 
 
@@ -62,13 +62,13 @@ def _of_folders(study: Path, output: Path) -> Iterator[Person]:
     for folder in sorted(study.iterdir()):
         if not folder.is_dir() or folder.name.startswith(".") or folder.resolve() == output:
             continue
-        kinds = {path.suffix.lower() for path in folder.iterdir()}
-        if ".toml" in kinds:
+        files = [path for path in folder.iterdir() if path.is_file()]
+        if any(path.suffix.lower() == ".toml" for path in files):
             try:
                 yield Person(folder.name, subject_file_in(folder))
             except FileError as error:
                 yield Person(folder.name, None, str(error))
-        elif kinds.intersection(_RECORDINGS):
+        elif any(is_capture(path) for path in files):
             yield Person(folder.name, None, f"no subject file; kinertia init {folder} drafts one")
 
 
