@@ -64,11 +64,11 @@ def measured(runs: int) -> tuple[dict[str, tuple[float, float]], int]:
 
 def command_section(runs: int) -> str:
     """Seconds of every command on the clock and of the processor, over those of the yardstick; the report's size."""
-    found, size = measured(runs)
-    clock, processor = next(iter(found.values()))
+    seconds, size = measured(runs)
+    clock, processor = next(iter(seconds.values()))
     rows = [
         [name, f"{one[0]:.2f}", f"{one[0] / clock:.2f}", f"{one[1]:.2f}", f"{one[1] / processor:.2f}"]
-        for name, one in found.items()
+        for name, one in seconds.items()
     ]
     heading = ["process", "clock (s)", "ratio", "processor (s)", "ratio"]
     return f"{table(heading, rows)}\n\nThe fit's report has {size / 1e6:.2f} MB."

@@ -63,5 +63,5 @@ def core_section(runs: int) -> str:
         ("all axes' forces and derivatives, `computeRNEADerivatives`", spent["all axes"], derivatives),
     ]
     scale = 1e6 / len(trial.time)
-    told = [[name, f"{scale * a:.1f}", f"{scale * b:.1f}", f"{a / b:.2f}"] for name, a, b in pairs]
-    return table(["task", "Kinertia (us)", "Pinocchio (us)", "Kinertia / Pinocchio"], told)
+    cells = [[name, f"{scale * a:.1f}", f"{scale * b:.1f}", f"{a / b:.2f}"] for name, a, b in pairs]
+    return table(["task", "Kinertia (us)", "Pinocchio (us)", "Kinertia / Pinocchio"], cells)

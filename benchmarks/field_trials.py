@@ -122,28 +122,28 @@ def run(arguments: list[str], folder: Path) -> dict[str, Any]:
             kinertia([*arguments, *more])
         except SystemExit as ended:
             status = int(ended.code or 0)
-    found = {"command": arguments[0], "status": status, "seconds": time.perf_counter() - started}
+    outcome = {"command": arguments[0], "status": status, "seconds": time.perf_counter() - started}
     # a path may be another one tomorrow
-    found["said"] = re.sub(r"(?<![\w.])/[^ :]*/", "", said.getvalue().strip())
+    outcome["said"] = re.sub(r"(?<![\w.])/[^ :]*/", "", said.getvalue().strip())
     if (folder / "fit.json").exists():
-        found |= {"fit": json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
-    return found
+        outcome |= {"fit": json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
+    return outcome
 
 
 def document(runs: dict[str, dict[str, Any]]) -> str:
     """The text of docs/field-trials.md."""
     rows, warnings, files = [], [], []
-    for title, found in runs.items():
-        begin = [title, str(found["status"])]
-        if found["command"] == "check":
-            files.append([*begin, conclusion(found["said"])])
+    for title, outcome in runs.items():
+        begin = [title, str(outcome["status"])]
+        if outcome["command"] == "check":
+            files.append([*begin, conclusion(outcome["said"])])
             continue
-        if "fit" not in found:
-            rows.append([*begin, *["-"] * 7, f"{found['seconds']:.0f}"])
-            warnings.append(f"- {title}: {' '.join(found['said'].split())}")
+        if "fit" not in outcome:
+            rows.append([*begin, *["-"] * 7, f"{outcome['seconds']:.0f}"])
+            warnings.append(f"- {title}: {' '.join(outcome['said'].split())}")
             continue
-        fit, (trial,) = found["fit"], found["fit"]["trials"]
-        bsp = found["bsp"].query("prior_sd > 0")
+        fit, (trial,) = outcome["fit"], outcome["fit"]["trials"]
+        bsp = outcome["bsp"].query("prior_sd > 0")
         beyond = int(((bsp["estimate"] - bsp["literature"]).abs() > CONTRADICTION_SD * bsp["prior_sd"]).sum())
         residuals = [
             f"{trial[key][stage]:.1f}"
@@ -158,7 +158,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
                 *residuals,
                 markers,
                 f"{'yes' if fit['converged'] else 'no'}, {beyond} ({farthest(bsp)})",
-                f"{found['seconds']:.0f}",
+                f"{outcome['seconds']:.0f}",
             ]
         )
         warnings += [f"- {title}: {warning}." for warning in fit["warnings"]]

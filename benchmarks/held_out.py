@@ -57,17 +57,19 @@ def held_out(text: str) -> list[dict[str, Any]]:
         return json.loads((out / "crossval.json").read_text())["held_out"]
 
 
-def document(found: dict[str, list[dict[str, Any]]]) -> str:
+def document(people: dict[str, list[dict[str, Any]]]) -> str:
     """The text of docs/held-out.md."""
     rows = []
-    for title, trials in found.items():
+    for title, trials in people.items():
         for trial in trials:
             pairs = [(trial["literature"][key], trial["estimate"][key]) for key in trial["literature"]]
             objective, force, moment, markers = pairs
             rows.append([title, trial["trial"], " -> ".join(f"{value:.0f}" for value in objective)])
             rows[-1] += [" -> ".join(f"{value:.1f}" for value in pair) for pair in (force, moment)]
             rows[-1].append(" -> ".join(f"{1e3 * value:.1f}" for value in markers))
-    better = sum(t["estimate"]["objective"] < t["literature"]["objective"] for trials in found.values() for t in trials)
+    better = sum(
+        t["estimate"]["objective"] < t["literature"]["objective"] for trials in people.values() for t in trials
+    )
     headings = ["person", "held out", "objective", "force (N)", "moment (N m)", "markers (mm)"]
     return f"""# Held-out trials
 

@@ -113,8 +113,8 @@ def measured(minutes: float, plates_hz: float) -> Long:
 def in_own_process(minutes: float, plates_hz: float = RATE_HZ) -> Long:
     """The same, where nothing else is in memory."""
     command = [sys.executable, __file__, "--alone", str(minutes), str(plates_hz)]
-    told = subprocess.run(command, check=True, stdout=subprocess.PIPE)
-    return Long(**json.loads(told.stdout))
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE)
+    return Long(**json.loads(done.stdout))
 
 
 def _most_mb() -> float:

@@ -134,12 +134,12 @@ def figures_table(titled: dict[str, list[Runs]]) -> str:
 
 def contacts(loads: Path, forces: Path) -> dict[str, list[tuple[float, float]]]:
     """Per side, when a foot was loaded: heel strike and toe-off of every stance that was measured (s)."""
-    measured, found = read_sto(forces), {}
+    measured, spans = read_sto(forces), {}
     for force in ET.parse(loads).iter("ExternalForce"):
         body = force.findtext("applied_to_body", "").strip()
         vertical = measured[force.findtext("force_identifier", "").strip() + "y"]
-        found[body[-1]] = stances(measured.index.to_numpy(), vertical.to_numpy())
-    return found
+        spans[body[-1]] = stances(measured.index.to_numpy(), vertical.to_numpy())
+    return spans
 
 
 def stances(time: np.ndarray, vertical: np.ndarray, shortest_s: float = 0.1) -> list[tuple[float, float]]:

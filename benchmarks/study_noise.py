@@ -65,9 +65,9 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     start, rng = drawn_start(trial, number)
     noisy = study_noise(trial.markers, rng)
     prior, calibration = start_prior(start, trial.bsp.total_mass_kg), held(trial.skeleton)
-    found = {"start": start}
+    estimates = {"start": start}
     if two_level:
-        found["two-level"] = estimate_two_level(trial.skeleton, start, [_window(trial, noisy)]).bsp
+        estimates["two-level"] = estimate_two_level(trial.skeleton, start, [_window(trial, noisy)]).bsp
 
     def simultaneous(
         observation: Observation, prior: BspPrior = prior, bandwidth: Bandwidth = BANDWIDTH
@@ -75,20 +75,20 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
         return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], bandwidth.spacing_s).bsp
 
     seen = observation_of(trial, noisy)
-    found["simultaneous"] = simultaneous(seen)
+    estimates["simultaneous"] = simultaneous(seen)
     white = np.full_like(seen.marker_sd, np.std(noisy.positions - trial.markers.positions))
-    found["noise taken as white"] = simultaneous(replace(seen, marker_sd=white, marker_frames=1.0))
-    found["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
+    estimates["noise taken as white"] = simultaneous(replace(seen, marker_sd=white, marker_frames=1.0))
+    estimates["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
     sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
-    found["forces three times as sure"] = simultaneous(sure)
-    found["20 Hz instead of 10 Hz"] = simultaneous(
+    estimates["forces three times as sure"] = simultaneous(sure)
+    estimates["20 Hz instead of 10 Hz"] = simultaneous(
         observation_of(trial, noisy, bandwidth=Bandwidth(20.0)), bandwidth=Bandwidth(20.0)
     )
-    found["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
+    estimates["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
     sharp = observation_of(trial, camera_noise(trial.markers, CAMERA_SD_M, rng))
     sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_frames=1.0)
-    found["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
-    return {name: errors(bsp, trial.bsp) for name, bsp in found.items()}
+    estimates["**0.1 mm of white noise instead of the study's**"] = simultaneous(sharp)
+    return {name: errors(bsp, trial.bsp) for name, bsp in estimates.items()}
 
 
 def _window(trial: SyntheticTrial, noisy: Markers) -> Window:

@@ -143,12 +143,12 @@ def write_standing(skeleton: Skeleton, static: Recording) -> None:
 
 def _contacts(time: np.ndarray, vertical: np.ndarray, period_s: float) -> list[tuple[float, float]]:
     """Start and end of contact of each foot, in shares of the stride."""
-    found = []
+    spans = []
     for foot in range(2):
         whole = [(a, b) for a, b in runs(vertical[:, foot] > 20.0) if a > 0 and b < len(time) - 1]
         start, end = whole[0]
-        found.append(((time[start] / period_s) % 1.0, (time[end] / period_s) % 1.0))
-    return found
+        spans.append(((time[start] / period_s) % 1.0, (time[end] / period_s) % 1.0))
+    return spans
 
 
 def _belt_speed(trial: Trial) -> float:

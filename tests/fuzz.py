@@ -146,33 +146,33 @@ READERS = {
 
 def damaged(content: bytes, rng: random.Random, text: bool) -> bytes:
     """The content after one to four accidents, most of them in its first part, where counts and names are."""
-    found = bytearray(content)
+    altered = bytearray(content)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        reach = max(1, min(len(found), rng.choice((400, 2500, len(found)))))
+        reach = max(1, min(len(altered), rng.choice((400, 2500, len(altered)))))
         at = rng.randrange(reach)
         match rng.randrange(8):
             case 0 | 1:
-                found[at : at + 1] = bytes([rng.randrange(256)])
+                altered[at : at + 1] = bytes([rng.randrange(256)])
             case 2:
-                found[at : at + 1] = bytes([rng.choice((0, 1, 127, 128, 255))])
+                altered[at : at + 1] = bytes([rng.choice((0, 1, 127, 128, 255))])
             case 3:
-                del found[at : at + rng.choice((1, 4, 40, 400))]
+                del altered[at : at + rng.choice((1, 4, 40, 400))]
             case 4:
-                found[at:at] = found[at : at + rng.choice((1, 4, 40, 400))]
+                altered[at:at] = altered[at : at + rng.choice((1, 4, 40, 400))]
             case 5 if rng.random() < 0.3:
-                del found[at:]
+                del altered[at:]
             case 6 if text:
                 token = rng.choice(TOKENS)
-                found[at:at] = token * (rng.choice((1, 1, 1, 300)))
+                altered[at:at] = token * (rng.choice((1, 1, 1, 300)))
             case 7 if text:
-                cells = bytes(found).split(b"\t")
+                cells = bytes(altered).split(b"\t")
                 cells[rng.randrange(len(cells))] = rng.choice(TOKENS)
-                found = bytearray(b"\t".join(cells))
+                altered = bytearray(b"\t".join(cells))
             case _:
-                found[at : at + 4] = rng.choice(
+                altered[at : at + 4] = rng.choice(
                     (b"\xff\xff\xff\xff", b"\x00\x00\x80\x7f", b"\x00\x00\xc0\x7f", b"\0\0\0\0")
                 )
-    return bytes(found)
+    return bytes(altered)
 
 
 def forked(path: Path) -> ezc3d_library.C3dContent:
@@ -214,7 +214,7 @@ def by_command(name: str) -> list[str]:
     return ["check", name, "-o", "out"]
 
 
-def told(name: str) -> None:
+def run_command(name: str) -> None:
     """Run the command; its status must be one of those that are not a failure of Kinertia."""
     text = io.StringIO()
     try:
@@ -246,7 +246,7 @@ def run(folder: Path, seed: int, first: int, cases: int, commands: int) -> int:
                 accepted += 1
             faulthandler.dump_traceback_later(SECONDS, exit=True)
             if case < first + commands and name != "table.mot":
-                told(name)
+                run_command(name)
         except BaseException:
             traceback.print_exc()
             print(f"seed {seed}, case {case}: {name}", file=sys.stderr)

@@ -10,11 +10,11 @@ from unittest import mock
 def _one_by_one(task, cases, workers=None, progress=lambda share: None):
     """In place of `in_parallel`."""
     progress(0.0)
-    found = []
+    results = []
     for case in cases:
-        found.append(task(case))
-        progress(len(found) / len(cases))
-    return found
+        results.append(task(case))
+        progress(len(results) / len(cases))
+    return results
 
 
 @contextmanager

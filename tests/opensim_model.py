@@ -48,8 +48,10 @@ class Oracle:
 
     def markers(self) -> np.ndarray:
         """(m, 3) m in ground."""
-        found = self.model.getMarkerSet()
-        return np.array([found.get(label).getLocationInGround(self.state).to_numpy() for label in self.skeleton.labels])
+        marker_set = self.model.getMarkerSet()
+        return np.array(
+            [marker_set.get(label).getLocationInGround(self.state).to_numpy() for label in self.skeleton.labels]
+        )
 
     def inverse_dynamics(self, qdd: np.ndarray) -> np.ndarray:
         """(c,) generalised forces without external loads."""

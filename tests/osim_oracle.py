@@ -23,10 +23,10 @@ class OsimOracle:
     def __init__(self, path: Path, ours: OsimModel) -> None:
         self.ours = ours
         self.model = osim.Model(str(path))
-        found = self.model.getCoordinateSet()
-        self.names = [found.get(i).getName() for i in range(found.getSize())]
+        coordinate_set = self.model.getCoordinateSet()
+        self.names = [coordinate_set.get(i).getName() for i in range(coordinate_set.getSize())]
         for name in self.names:
-            found.get(name).set_locked(False)
+            coordinate_set.get(name).set_locked(False)
         forces = self.model.updForceSet()
         for i in range(forces.getSize()):
             forces.get(i).set_appliesForce(False)
@@ -65,9 +65,9 @@ class OsimOracle:
 
     def markers(self) -> np.ndarray:
         """(m, 3) m in ground."""
-        found = self.model.getMarkerSet()
+        marker_set = self.model.getMarkerSet()
         labels = self.ours.skeleton.labels
-        return np.array([found.get(label).getLocationInGround(self.state).to_numpy() for label in labels])
+        return np.array([marker_set.get(label).getLocationInGround(self.state).to_numpy() for label in labels])
 
     def inverse_dynamics(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         """(c,) generalised forces without external loads, at the pose that was set."""

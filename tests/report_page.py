@@ -33,8 +33,8 @@ class Elements(HTMLParser):
 
 def figures_of(page):
     """The figures as plotly gets them, by the id of their element."""
-    found = re.findall(r'<script type="application/json" data-for="([^"]+)">(.*?)</script>', page, re.DOTALL)
-    return {name: json.loads(text) for name, text in found}
+    scripts = re.findall(r'<script type="application/json" data-for="([^"]+)">(.*?)</script>', page, re.DOTALL)
+    return {name: json.loads(text) for name, text in scripts}
 
 
 def numbers(array):

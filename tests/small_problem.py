@@ -66,10 +66,10 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
 def small_skin(skeleton: Skeleton, frames: int) -> SkinPatterns:
     """Two segments follow two patterns each, one of them with two markers; the others none."""
     values = np.random.default_rng(3).normal(0.0, 0.3, (frames, 4))
-    found = skeleton.marker_segments
-    one, other = found[0], found[-1]
-    first = np.select([found == one, found == other], [0, 2])
-    return SkinPatterns(values, first, first + 2 * np.isin(found, [one, other]))
+    segments = skeleton.marker_segments
+    one, other = segments[0], segments[-1]
+    first = np.select([segments == one, segments == other], [0, 2])
+    return SkinPatterns(values, first, first + 2 * np.isin(segments, [one, other]))
 
 
 def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
@@ -181,10 +181,10 @@ def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin
 def process_covariance(process: ErrorProcess, lags: np.ndarray) -> np.ndarray:
     """At these lags, of a second-order autoregressive process of unit variance (Yule and Walker)."""
     one, two = process.of_before
-    found = [1.0, one / (1.0 - two)]
-    while len(found) <= np.max(lags):
-        found.append(one * found[-1] + two * found[-2])
-    return np.array(found)[lags]
+    values = [1.0, one / (1.0 - two)]
+    while len(values) <= np.max(lags):
+        values.append(one * values[-1] + two * values[-2])
+    return np.array(values)[lags]
 
 
 def whitened(errors: np.ndarray, sd: np.ndarray, process: ErrorProcess) -> np.ndarray:

@@ -62,12 +62,12 @@ def workshop(demo_run, tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", CLASSES)
 @pytest.mark.usefixtures("workshop")
 def test_every_public_class_has_an_example_that_runs(name, fit):
-    found = doctest.DocTestFinder(recurse=False).find(
+    doctests = doctest.DocTestFinder(recurse=False).find(
         getattr(kinertia, name), name, globs={"kinertia": kinertia, "np": np, "fit": fit}
     )
-    assert found[0].examples, f"{name} has no example in its docstring"
+    assert doctests[0].examples, f"{name} has no example in its docstring"
     said = []
-    doctest.DocTestRunner().run(found[0], out=said.append)
+    doctest.DocTestRunner().run(doctests[0], out=said.append)
     assert not said, "".join(said)
 
 

@@ -42,19 +42,19 @@ class Block:
 
     def commands(self) -> Iterator[tuple[str, str]]:
         """Each command line behind `$`, and the output shown below it."""
-        for found in _COMMAND.finditer(self.text):
-            yield " ".join(found[1].replace("\\\n", " ").split()), found[2]
+        for match in _COMMAND.finditer(self.text):
+            yield " ".join(match[1].replace("\\\n", " ").split()), match[2]
 
 
 def blocks(text: str) -> list[Block]:
     """All fenced blocks of a page, in order."""
     marks = list(_MARK.finditer(text))
-    found = []
+    fenced = []
     for fence in _FENCE.finditer(text):
         above = [mark for mark in marks if mark.end() <= fence.start()]
         folder, slow = (above[-1][1], bool(above[-1][2])) if above else ("", False)
-        found.append(Block(fence[1], fence[2], folder, slow))
-    return found
+        fenced.append(Block(fence[1], fence[2], folder, slow))
+    return fenced
 
 
 def link_measured(name: str, folder: Path) -> None:

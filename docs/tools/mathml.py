@@ -16,7 +16,7 @@ def on_page_content(html_text: str, **_: Any) -> str:
     return _EQUATION.sub(_mathml, html_text)
 
 
-def _mathml(found: re.Match[str]) -> str:
-    tag, bracket, latex = found.groups()
+def _mathml(match: re.Match[str]) -> str:
+    tag, bracket, latex = match.groups()
     display = "block" if bracket == "[" else "inline"
     return f'<{tag} class="equation">{convert(html.unescape(latex), display=display)}</{tag}>'

@@ -183,11 +183,11 @@ class KnownSegment(Table):
 
     def parameters(self) -> dict[str, tuple[float, float]]:
         """Value and deviation by parameter (`PARAMETERS`), SI."""
-        found = {}
+        parameters = {}
         for key in type(self).model_fields:
             stated = getattr(self, key)
             if key != "source" and stated is not None:
                 parameter, unit = key.rsplit("_", 1)
                 factor = 1e-3 if unit == "mm" else 1.0
-                found[parameter] = (factor * stated[0], factor * stated[1])
-        return found
+                parameters[parameter] = (factor * stated[0], factor * stated[1])
+        return parameters

@@ -31,28 +31,28 @@ def changed(body, **values):
     return BodySegmentParameters.from_table(bsp.segments, table)
 
 
-def sentences(found, level):
-    return " | ".join(verdict.sentence for verdict in found.verdicts if verdict.level == level)
+def sentences(model_check, level):
+    return " | ".join(verdict.sentence for verdict in model_check.verdicts if verdict.level == level)
 
 
 def test_dumas_own_model_has_nothing_against_it():
-    found = check()
-    assert {verdict.level for verdict in found.verdicts} == {"pass"}, found.verdicts
-    assert found.left_out == ()
-    rows = found.rows()
+    model_check = check()
+    assert {verdict.level for verdict in model_check.verdicts} == {"pass"}, model_check.verdicts
+    assert model_check.left_out == ()
+    rows = model_check.rows()
     assert [row[:2] for row in rows[:3]] == [("pelvis", "model"), ("", "de Leva"), ("", "Dumas")]
     for model, dumas in zip(rows[::3], rows[2::3], strict=True):
         assert model[2:] == dumas[2:]
     assert not any(row[0].endswith("_l") for row in rows)  # the right side stands for both
-    assert dict(found.facts())["without mass"] == "toes_r, toes_l, hand_r, hand_l"
+    assert dict(model_check.facts())["without mass"] == "toes_r, toes_l, hand_r, hand_l"
 
 
 def test_what_is_not_known_of_the_person_is_left_out_and_said():
-    found = check(person=(None, None, None))
-    assert found.literature == {}
-    assert "it needs --height and --sex" in found.left_out[0]
-    assert "give --mass" in found.left_out[1]
-    assert [row[0] for row in found.rows()] == list(upright.bsp().segments)
+    model_check = check(person=(None, None, None))
+    assert model_check.literature == {}
+    assert "it needs --height and --sex" in model_check.left_out[0]
+    assert "give --mass" in model_check.left_out[1]
+    assert [row[0] for row in model_check.rows()] == list(upright.bsp().segments)
     assert "it needs --sex" in check(person=(75.0, 1.77, None)).left_out[0]
     own = check(person=(None, 1.77, "male"))
     assert own.literature
@@ -69,28 +69,32 @@ def test_what_is_not_known_of_the_person_is_left_out_and_said():
     ],
 )
 def test_physically_impossible_is_against(change, words):
-    found = check(changed("femur_r", **change))
-    assert f"physically impossible: {words}" in sentences(found, "fail")
+    model_check = check(changed("femur_r", **change))
+    assert f"physically impossible: {words}" in sentences(model_check, "fail")
 
 
 def test_without_thickness_is_only_okay():
-    found = check(changed("talus_r", ixx=0.0001, iyy=0.0002, izz=0.0001, ixy=0, ixz=0, iyz=0))
-    assert "without thickness" in sentences(found, "caution")
-    assert "talus_r" in sentences(found, "caution")
-    assert not stands_against(found.verdicts)
+    model_check = check(changed("talus_r", ixx=0.0001, iyy=0.0002, izz=0.0001, ixy=0, ixz=0, iyz=0))
+    assert "without thickness" in sentences(model_check, "caution")
+    assert "talus_r" in sentences(model_check, "caution")
+    assert not stands_against(model_check.verdicts)
 
 
 def test_unit_inertia():
-    found = check(changed("talus_l", ixx=1, iyy=1, izz=1, ixy=0, ixz=0, iyz=0))
-    assert "talus_l: " in sentences(found, "fail")
-    assert "would have to be 2.1 m wide" in sentences(found, "fail")
-    assert "three equal moments of inertia, as placeholders have: talus_l (1 kg m2)" in sentences(found, "caution")
+    model_check = check(changed("talus_l", ixx=1, iyy=1, izz=1, ixy=0, ixz=0, iyz=0))
+    assert "talus_l: " in sentences(model_check, "fail")
+    assert "would have to be 2.1 m wide" in sentences(model_check, "fail")
+    assert "three equal moments of inertia, as placeholders have: talus_l (1 kg m2)" in sentences(
+        model_check, "caution"
+    )
 
 
 @pytest.mark.parametrize(("values", "said"), [((0.0014, 0.0039, 0.0041), True), ((0.00141, 0.0039, 0.0041), False)])
 def test_rounded_inertia(values, said):
-    found = check(changed("talus_r", **dict(zip(("ixx", "iyy", "izz"), values, strict=True)), ixy=0, ixz=0, iyz=0))
-    assert ("rounded to two digits or less: talus_r" in sentences(found, "caution")) == said
+    model_check = check(
+        changed("talus_r", **dict(zip(("ixx", "iyy", "izz"), values, strict=True)), ixy=0, ixz=0, iyz=0)
+    )
+    assert ("rounded to two digits or less: talus_r" in sentences(model_check, "caution")) == said
 
 
 @pytest.mark.parametrize(("mass_kg", "level"), [(75.5, "pass"), (78.0, "caution"), (60.0, "fail")])
@@ -101,10 +105,10 @@ def test_total_mass(mass_kg, level):
 def test_left_and_right():
     bsp = upright.bsp()
     mass = bsp.mass_kg[bsp.segments.index("tibia_r")]
-    found = check(changed("tibia_r", mass=1.05 * mass, com_z=0.02))
-    assert "left and right differ: tibia (mass by 5 %, centre of mass by" in sentences(found, "caution")
-    assert not found.symmetric
-    assert any(row[0] == "shank_l" for row in found.rows())
+    model_check = check(changed("tibia_r", mass=1.05 * mass, com_z=0.02))
+    assert "left and right differ: tibia (mass by 5 %, centre of mass by" in sentences(model_check, "caution")
+    assert not model_check.symmetric
+    assert any(row[0] == "shank_l" for row in model_check.rows())
 
 
 def test_segments_unlike_the_literature():
@@ -113,10 +117,10 @@ def test_segments_unlike_the_literature():
     for side in "rl":
         i = bsp.segments.index(f"femur_{side}")
         table[i, [0, *range(4, 10)]] *= 2.5
-    found = check(BodySegmentParameters.from_table(bsp.segments, table))
-    told = sentences(found, "caution")
-    assert "unlike the literature: thigh_r, thigh_l: mass " in told
-    assert "shank" not in told
+    model_check = check(BodySegmentParameters.from_table(bsp.segments, table))
+    cautions = sentences(model_check, "caution")
+    assert "unlike the literature: thigh_r, thigh_l: mass " in cautions
+    assert "shank" not in cautions
 
 
 def test_torso_with_the_arms_inertia():
@@ -133,11 +137,11 @@ def test_without_arms_the_torso_weighs_torso_and_arms():
     whole = upright.bsp()
     mass = np.array(bsp.mass_kg)
     mass[bsp.segments.index("torso")] += whole.total_mass_kg - bsp.total_mass_kg
-    found = check(replace(bsp, mass_kg=mass), arms=False)
-    assert {verdict.level for verdict in found.verdicts} == {"pass"}
-    assert "no arms" in found.left_out[-1]
-    (torso,) = [k for k, row in enumerate(found.rows()) if row[0] == "torso"]
-    assert found.rows()[torso + 2][3:] == ("-",) * 6
+    model_check = check(replace(bsp, mass_kg=mass), arms=False)
+    assert {verdict.level for verdict in model_check.verdicts} == {"pass"}
+    assert "no arms" in model_check.left_out[-1]
+    (torso,) = [k for k, row in enumerate(model_check.rows()) if row[0] == "torso"]
+    assert model_check.rows()[torso + 2][3:] == ("-",) * 6
 
 
 def test_a_person_who_cannot_be():
@@ -161,10 +165,10 @@ def test_models_in_use(shared_data, name):
     """None is impossible; those with arms carry them twice, which is known of them."""
     person, arms_twice, words = KNOWN[name]
     model = read_osim(shared_data / name)
-    found = check_model(model.skeleton, model.bsp, *person)
-    assert not stands_against(found.verdicts)
-    assert words in sentences(found, "caution")
-    assert ("still seems to include the arms' inertia" in sentences(found, "caution")) == arms_twice
+    model_check = check_model(model.skeleton, model.bsp, *person)
+    assert not stands_against(model_check.verdicts)
+    assert words in sentences(model_check, "caution")
+    assert ("still seems to include the arms' inertia" in sentences(model_check, "caution")) == arms_twice
 
 
 MEASURED = {  # the static trial; how far the pelvis may be off, whose hips the model's scaling places otherwise
@@ -181,8 +185,8 @@ def test_literature_for_the_trunk_is_the_one_of_a_fit(shared_data, name, source)
     static = read_recording(shared_data / trial)
     own = build_gait27(static, choose_marker_set(static.markers.labels), *person[1:]).geometry
     model = read_osim(shared_data / name)
-    found = model_segments(model.skeleton, model.bsp, *person[1:])
-    bodies = [literature_bsp(*person, geometry, source).table() for geometry in (found.geometry, own)]
+    segments = model_segments(model.skeleton, model.bsp, *person[1:])
+    bodies = [literature_bsp(*person, geometry, source).table() for geometry in (segments.geometry, own)]
     pelvis, torso = SEGMENTS.index("pelvis"), SEGMENTS.index("torso")
     assert bodies[0][pelvis, 4:7] == pytest.approx(bodies[1][pelvis, 4:7], rel=off)
     assert bodies[0][torso, 4:7] == pytest.approx(bodies[1][torso, 4:7], rel=0.1)
@@ -201,12 +205,12 @@ def test_pelvis_and_torso_do_not_hang_on_where_the_lumbar_joint_is():
 
 def test_model_without_markers():
     bare = replace(upright.skeleton(), markers=())
-    found = check_model(bare, upright.bsp(), *PERSON)
-    assert "no markers in the model: kinertia fit refuses it" in sentences(found, "caution")
-    assert not stands_against(found.verdicts)
+    model_check = check_model(bare, upright.bsp(), *PERSON)
+    assert "no markers in the model: kinertia fit refuses it" in sentences(model_check, "caution")
+    assert not stands_against(model_check.verdicts)
 
 
 def test_small_moments_have_digits():
-    found = check(changed("talus_r", ixx=3.21e-5, iyy=4.32e-5, izz=0.00061), person=(None, None, None))
-    (row,) = (row for row in found.rows() if row[0] == "talus_r")
+    model_check = check(changed("talus_r", ixx=3.21e-5, iyy=4.32e-5, izz=0.00061), person=(None, None, None))
+    (row,) = (row for row in model_check.rows() if row[0] == "talus_r")
     assert row[6:9] == ("3.2e-05", "4.3e-05", "0.00061")

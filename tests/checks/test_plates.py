@@ -24,10 +24,10 @@ def trial_of(loads, start_s, end_s):
 )
 def test_mass_over_whole_strides(window, over):
     trial = trial_of(gait_loads(4.0), *window)
-    found = mass_by_strides(trial)
-    assert found.over == over
-    assert window[0] - 0.01 <= found.start_s < found.end_s <= window[1] + 0.01
-    assert found.mass_kg == pytest.approx(MASS_KG, rel=0.002)
+    mass = mass_by_strides(trial)
+    assert mass.over == over
+    assert window[0] - 0.01 <= mass.start_s < mass.end_s <= window[1] + 0.01
+    assert mass.mass_kg == pytest.approx(MASS_KG, rel=0.002)
     inside = (trial.loads.time >= window[0]) & (trial.loads.time <= window[1])
     plain = trial.loads.force[inside, :, 1].sum(axis=1).mean() / GRAVITY_M_S2
     assert abs(plain - MASS_KG) > 0.005 * MASS_KG  # what whole strides are needed for
@@ -40,9 +40,9 @@ def test_two_steps_where_no_foot_lands_twice():
     force[loads.time < 0.32, 1] = 0.0
     force[loads.time > 1.5, 0] = 0.0
     trial = trial_of(replace(loads, force=force), 0.33, 1.48)
-    found = mass_by_strides(trial)
-    assert found.over in ("two steps", "whole strides")
-    assert found.mass_kg == pytest.approx(MASS_KG, rel=0.01)
+    mass = mass_by_strides(trial)
+    assert mass.over in ("two steps", "whole strides")
+    assert mass.mass_kg == pytest.approx(MASS_KG, rel=0.01)
 
 
 def test_no_whole_step_no_mass():
@@ -99,6 +99,6 @@ def test_centre_of_pressure_off_the_plate(turned, reverse, height):
     time = np.arange(len(along)) / RATE_HZ
     plates = PlateLoads(time, ("plate 1",), force[:, None], np.cross(place, force)[:, None], (None,), corners[None])
     markers = Markers(time, ("A",), np.zeros((len(time), 1, 3)))
-    (found,) = check_plates(Recording("one", markers, plates), None)
-    assert found.outside_share == pytest.approx(3 / 9)
-    assert found.outside_m == pytest.approx(np.percentile([0.04, 0.14, 0.24], 95))
+    (plate,) = check_plates(Recording("one", markers, plates), None)
+    assert plate.outside_share == pytest.approx(3 / 9)
+    assert plate.outside_m == pytest.approx(np.percentile([0.04, 0.14, 0.24], 95))

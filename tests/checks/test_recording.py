@@ -30,8 +30,8 @@ def marker_set(lab):
     return common_marker_set([lab.static, lab.walk])
 
 
-def sentences(found, level):
-    return " | ".join(verdict.sentence for verdict in found.verdicts if verdict.level == level)
+def sentences(check, level):
+    return " | ".join(verdict.sentence for verdict in check.verdicts if verdict.level == level)
 
 
 def moved(recording, positions):
@@ -47,9 +47,9 @@ def without(recording, *labels):
 def test_a_good_laboratory(lab, marker_set):
     assert marker_set is not None
     static, walked = (check_recording(one, marker_set, 72.6) for one in (lab.static, lab.walk))
-    for found in (static, walked):
-        assert {verdict.level for verdict in found.verdicts} == {"pass"}, found.verdicts
-        assert found.marker_set.fits
+    for check in (static, walked):
+        assert {verdict.level for verdict in check.verdicts} == {"pass"}, check.verdicts
+        assert check.marker_set.fits
     assert static.travel.kind == "stands still"
     assert "landmarks that the model needs" in sentences(static, "pass")
     assert walked.travel.sentence().startswith("walks along +X")
@@ -71,28 +71,28 @@ def test_facts_say_what_is_in_it(lab, marker_set):
 def test_labels_of_nobody(lab):
     markers = lab.walk.markers
     strange = replace(lab.walk, markers=replace(markers, labels=tuple(f"P{k}" for k in range(len(markers.labels)))))
-    found = check_recording(strange)
-    assert "no marker set fits (no preset shares a label with the file)" in sentences(found, "fail")
-    assert not found.marker_set.fits
-    assert {contact.foot for plate in found.plates for contact in plate.contacts} == {None}
-    assert found.windows == ()
+    check = check_recording(strange)
+    assert "no marker set fits (no preset shares a label with the file)" in sentences(check, "fail")
+    assert not check.marker_set.fits
+    assert {contact.foot for plate in check.plates for contact in plate.contacts} == {None}
+    assert check.windows == ()
 
 
 def test_labels_misspelt_are_guessed(lab, marker_set):
     markers = lab.walk.markers
     folded = tuple(label.replace(".", "").lower() for label in markers.labels)
-    found = check_recording(replace(lab.walk, markers=replace(markers, labels=folded)))
-    assert found.marker_set.name == marker_set.name
-    assert found.marker_set.missing["R.ASIS"][0] == "rasis"
-    assert stands_against(found.verdicts)
+    check = check_recording(replace(lab.walk, markers=replace(markers, labels=folded)))
+    assert check.marker_set.name == marker_set.name
+    assert check.marker_set.missing["R.ASIS"][0] == "rasis"
+    assert stands_against(check.verdicts)
 
 
 @pytest.mark.parametrize(("pelvis_only", "words"), [(False, "no marker of foot_r"), (True, "R.ASIS")])
 def test_markers_that_a_fit_cannot_do_without(lab, marker_set, pelvis_only, words):
     gone = ["R.ASIS"] if pelvis_only else marker_set.segments["foot_r"]
-    found = check_recording(without(lab.walk, *gone), marker_set)
-    assert words in sentences(found, "fail")
-    assert bool(found.windows) == pelvis_only
+    check = check_recording(without(lab.walk, *gone), marker_set)
+    assert words in sentences(check, "fail")
+    assert bool(check.windows) == pelvis_only
 
 
 def test_never_seen_and_gaps(lab, marker_set):
@@ -103,21 +103,21 @@ def test_never_seen_and_gaps(lab, marker_set):
     positions[:, column("R.Heel")] = np.nan
     positions[(time > start) & (time < start + 0.3 * (end - start)), column("L.Elbow")] = np.nan
     positions[(time > start) & (time < start + 0.9 * (end - start)), column("Sternum")] = np.nan
-    found = check_recording(moved(lab.walk, positions), marker_set)
-    assert "visible in no frame, left out: R.Heel" in sentences(found, "caution")
-    assert "gaps longer than 0.1 s" in sentences(found, "caution")
-    assert "L.Elbow (" in sentences(found, "caution")
-    assert "seen in less than half of the frames" in sentences(found, "caution")
-    assert "Sternum (" in sentences(found, "caution")
+    check = check_recording(moved(lab.walk, positions), marker_set)
+    assert "visible in no frame, left out: R.Heel" in sentences(check, "caution")
+    assert "gaps longer than 0.1 s" in sentences(check, "caution")
+    assert "L.Elbow (" in sentences(check, "caution")
+    assert "seen in less than half of the frames" in sentences(check, "caution")
+    assert "Sternum (" in sentences(check, "caution")
 
 
 def test_gap_outside_the_measured_window_does_no_harm(lab, marker_set):
     (start, _), *_ = check_recording(lab.walk, marker_set).windows
     positions = lab.walk.markers.positions.copy()
     positions[lab.walk.markers.time < start - 0.05, lab.walk.markers.labels.index("Sternum")] = np.nan
-    found = check_recording(moved(lab.walk, positions), marker_set)
-    assert not sentences(found, "caution")
-    (sternum,) = [one for one in found.markers if one.label == "Sternum"]
+    check = check_recording(moved(lab.walk, positions), marker_set)
+    assert not sentences(check, "caution")
+    (sternum,) = [one for one in check.markers if one.label == "Sternum"]
     assert sternum.share < 1.0
 
 
@@ -132,14 +132,14 @@ def test_left_and_right_swapped_look_like_walking_backwards(lab, marker_set):
     markers = lab.walk.markers
     other = {"R": "L", "L": "R"}
     labels = tuple(other[x[0]] + x[1:] if x[:2] in ("R.", "L.") else x for x in markers.labels)
-    found = check_recording(replace(lab.walk, markers=replace(markers, labels=labels)), marker_set)
-    assert "walks backwards" in sentences(found, "caution")
+    check = check_recording(replace(lab.walk, markers=replace(markers, labels=labels)), marker_set)
+    assert "walks backwards" in sentences(check, "caution")
 
 
 @pytest.mark.parametrize(("mass_kg", "level"), [(72.6, "pass"), (76.0, "caution"), (90.0, "fail")])
 def test_mass_on_the_scale(lab, marker_set, mass_kg, level):
-    found = check_recording(lab.walk, marker_set, mass_kg)
-    assert f"stated mass {mass_kg:.1f} kg" in sentences(found, level)
+    check = check_recording(lab.walk, marker_set, mass_kg)
+    assert f"stated mass {mass_kg:.1f} kg" in sentences(check, level)
 
 
 def test_no_forces_and_no_measured_frame(lab, marker_set):
@@ -148,25 +148,25 @@ def test_no_forces_and_no_measured_frame(lab, marker_set):
     assert not stands_against(bare.verdicts)
     plates = lab.walk.plates
     quiet = replace(plates, force=np.zeros_like(plates.force), moment=np.zeros_like(plates.moment))
-    found = check_recording(replace(lab.walk, plates=quiet), marker_set)
-    assert "in no frame does every foot on the ground stand on a loaded plate" in sentences(found, "fail")
-    assert found.mass is None
+    check = check_recording(replace(lab.walk, plates=quiet), marker_set)
+    assert "in no frame does every foot on the ground stand on a loaded plate" in sentences(check, "fail")
+    assert check.mass is None
 
 
 def test_window_of_the_user(lab, marker_set):
     (start, end), *_ = check_recording(lab.walk, marker_set).windows
     middle = (start + end) / 2
-    found = check_recording(lab.walk, marker_set, window_s=(middle, middle + 0.2))
-    assert "the user's window goes from" in sentences(found, "pass")
-    assert re.search(r"\((20|21) frames\)", sentences(found, "pass"))
+    check = check_recording(lab.walk, marker_set, window_s=(middle, middle + 0.2))
+    assert "the user's window goes from" in sentences(check, "pass")
+    assert re.search(r"\((20|21) frames\)", sentences(check, "pass"))
     short = check_recording(lab.walk, marker_set, window_s=(middle, middle + 0.05))
     assert "a fit needs at least 11 frames" in sentences(short, "fail")
 
 
 def test_static_trial_without_a_landmark(lab, marker_set):
-    found = check_recording(without(lab.static, "V.Sacral"), marker_set)
-    assert "no model can be built from this static trial" in sentences(found, "fail")
-    assert "V.Sacral" in sentences(found, "fail")
+    check = check_recording(without(lab.static, "V.Sacral"), marker_set)
+    assert "no model can be built from this static trial" in sentences(check, "fail")
+    assert "V.Sacral" in sentences(check, "fail")
 
 
 WALKS = {
@@ -184,11 +184,11 @@ def test_measured_walks(measured_recording, name):
     recording = measured_recording(name, forces)
     own = Path(__file__).parents[1] / "subject4.toml"
     marker_set = read_marker_set(own) if "subject4" in name else common_marker_set([recording])
-    found = check_recording(recording, marker_set, mass_kg)
-    assert not stands_against(found.verdicts)
-    assert found.windows[0] == pytest.approx(window, abs=0.03)
-    assert "stated mass" in sentences(found, level)
-    assert found.mass.mass_kg == pytest.approx(mass_kg, rel=0.065)
+    check = check_recording(recording, marker_set, mass_kg)
+    assert not stands_against(check.verdicts)
+    assert check.windows[0] == pytest.approx(window, abs=0.03)
+    assert "stated mass" in sentences(check, level)
+    assert check.mass.mass_kg == pytest.approx(mass_kg, rel=0.065)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_measured_walks(measured_recording, name):
 )
 def test_files_of_other_laboratories(shared_data, name, unit, vertical):
     recording = read_recording(shared_data / "c3d_variety" / f"{name}.c3d")
-    found = check_recording(recording)
+    check = check_recording(recording)
     assert (recording.length_unit, recording.vertical) == (unit, vertical)
-    assert "no marker set fits" in sentences(found, "fail")
-    assert all(plate.outside_share in (None, 0.0) for plate in found.plates)
+    assert "no marker set fits" in sentences(check, "fail")
+    assert all(plate.outside_share in (None, 0.0) for plate in check.plates)

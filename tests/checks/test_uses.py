@@ -33,11 +33,11 @@ def test_every_output_has_a_line_with_a_number(fit, two_level):
 
 @pytest.mark.parametrize(("share", "expected"), [(0.0, "fail"), (0.25, "caution"), (1.0, "pass")])
 def test_segments_by_what_the_data_show(fit, share, expected):
-    found = by_output(informed(fit, share, slice(0, 1)))
-    assert found["segment masses"].level == expected
-    assert found["centres of mass"].level == found["moments of inertia"].level == "fail"
+    outputs = by_output(informed(fit, share, slice(0, 1)))
+    assert outputs["segment masses"].level == expected
+    assert outputs["centres of mass"].level == outputs["moments of inertia"].level == "fail"
     if expected == "caution":
-        assert found["segment masses"].reason.startswith("the data show 3 of 12 (0 of them well)")
+        assert outputs["segment masses"].reason.startswith("the data show 3 of 12 (0 of them well)")
 
 
 def test_a_doubted_segment_is_a_caution_for_its_own_output(fit):
@@ -46,10 +46,10 @@ def test_a_doubted_segment_is_a_caution_for_its_own_output(fit):
     row = clear.literature.segments.index("shank_l")
     table[row, 2] += 3.2 * clear.posterior.prior_sd[row, 2]
     moved = replace(clear, estimate=BodySegmentParameters.from_table(clear.literature.segments, table))
-    found = by_output(moved)
-    assert found["centres of mass"].level == "caution"
-    assert "shank_l" in found["centres of mass"].reason
-    assert found["segment masses"].level == "pass"
+    outputs = by_output(moved)
+    assert outputs["centres of mass"].level == "caution"
+    assert "shank_l" in outputs["centres of mass"].reason
+    assert outputs["segment masses"].level == "pass"
 
 
 def test_nothing_is_used_that_did_not_converge(fit):

@@ -18,8 +18,8 @@ BODY = BodySegmentParameters(
 def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes):
     """A fit whose residual has this length throughout; a pair is RMS-filling base and one frame's peak."""
     residual = np.zeros((FRAMES, 6))
-    for column, told in ((0, force_n), (4, moment_nm)):
-        base, peak = told if isinstance(told, tuple) else (told, told)
+    for column, size in ((0, force_n), (4, moment_nm)):
+        base, peak = size if isinstance(size, tuple) else (size, size)
         residual[:, column] = base
         residual[7, column] = -peak
     loads = np.zeros((FRAMES, 2, 6))
@@ -44,15 +44,15 @@ def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes
     return SimpleNamespace(**{**given, **changes})
 
 
-def level(found, start):
-    (verdict,) = [one for one in found if one.sentence.startswith(start)]
+def level(judged, start):
+    (verdict,) = [one for one in judged if one.sentence.startswith(start)]
     return verdict.level
 
 
 def test_a_good_fit_passes_every_check():
-    found = verdicts(fit(4.0, 20.0))
-    assert {one.level for one in found} == {"pass"}
-    assert not stands_against(found)
+    judged = verdicts(fit(4.0, 20.0))
+    assert {one.level for one in judged} == {"pass"}
+    assert not stands_against(judged)
 
 
 @pytest.mark.parametrize(
@@ -61,9 +61,9 @@ def test_a_good_fit_passes_every_check():
      ((3.0, 25.0), "caution"), ((3.0, 25.1), "fail")],
 )  # fmt: skip
 def test_force_by_the_guideline(force, expected):
-    found = verdicts(fit(force))
-    assert level(found, "walk: residual force") == expected
-    assert stands_against(found) == (expected == "fail")
+    judged = verdicts(fit(force))
+    assert level(judged, "walk: residual force") == expected
+    assert stands_against(judged) == (expected == "fail")
 
 
 def test_residuals_are_judged_at_the_motions_bandwidth_and_told_at_both():
@@ -80,9 +80,9 @@ def test_residuals_are_judged_at_the_motions_bandwidth_and_told_at_both():
             "RMS 60.0 N m",
         ),
     ):
-        (told,) = [one.sentence for one in verdicts(fit(4.0, 20.0)) if one.sentence.startswith(start)]
-        assert told.startswith(f"{start} at the motion's bandwidth (12 Hz) {expected}")
-        assert told.endswith(f"with forces at full bandwidth {full}")
+        (sentence,) = [one.sentence for one in verdicts(fit(4.0, 20.0)) if one.sentence.startswith(start)]
+        assert sentence.startswith(f"{start} at the motion's bandwidth (12 Hz) {expected}")
+        assert sentence.endswith(f"with forces at full bandwidth {full}")
 
 
 @pytest.mark.parametrize(("markers_m", "expected"), [(0.012, "pass"), (0.013, "caution"), (0.021, "fail")])
@@ -90,8 +90,8 @@ def test_markers_by_the_guideline(markers_m, expected):
     start = "walk: model and measured markers"
     assert level(verdicts(fit(markers_m=markers_m)), start) == expected
     of_model = verdicts(fit(markers_m=markers_m, file=object()))
-    (told,) = [one.sentence for one in of_model if one.sentence.startswith(start)]
-    assert ("--calibrate" in told) == (expected == "fail")
+    (sentence,) = [one.sentence for one in of_model if one.sentence.startswith(start)]
+    assert ("--calibrate" in sentence) == (expected == "fail")
 
 
 @pytest.mark.parametrize(
@@ -111,22 +111,22 @@ def test_moment_by_the_guideline(moment, expected):
 
 def test_five_percent_of_the_external_force():
     """A child of 20 kg: 12 N are within OpenSim's newtons, and too much for 200 N."""
-    found = verdicts(fit((3.0, 12.0), external_n=200.0))
-    assert level(found, "walk: residual force") == "caution"
-    assert level(found, "walk: the peak residual force is 6.0 % of") == "fail"
+    judged = verdicts(fit((3.0, 12.0), external_n=200.0))
+    assert level(judged, "walk: residual force") == "caution"
+    assert level(judged, "walk: the peak residual force is 6.0 % of") == "fail"
 
 
 def test_not_converged():
-    found = verdicts(fit(converged=False))
-    assert level(found, "the estimate did not converge") == "fail"
+    judged = verdicts(fit(converged=False))
+    assert level(judged, "the estimate did not converge") == "fail"
 
 
 def test_impossible_segments_are_named_and_bodies_without_mass_are_not():
     table = BODY.table()
     table[1, 4:7] = 0.1, 0.5, 0.1
     wrong = BodySegmentParameters.from_table((*BODY.segments, "patella_r"), np.vstack([table, np.zeros(10)]))
-    found = verdicts(fit(estimate=wrong, literature=wrong))
-    assert level(found, "physically impossible segments: 1 of 3 (thigh_r)") == "fail"
+    judged = verdicts(fit(estimate=wrong, literature=wrong))
+    assert level(judged, "physically impossible segments: 1 of 3 (thigh_r)") == "fail"
 
 
 def test_a_body_without_thickness_is_let_pass():
@@ -139,8 +139,8 @@ def test_a_body_without_thickness_is_let_pass():
 
 def test_centre_of_mass_far_from_the_literature():
     moved = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.12]]) * [0, 1, 0])
-    found = verdicts(fit(estimate=moved))
-    assert level(found, "1 centre of mass lies more than 100 mm from the literature (farthest: thigh_r, 120") == "fail"
+    judged = verdicts(fit(estimate=moved))
+    assert level(judged, "1 centre of mass lies more than 100 mm from the literature (farthest: thigh_r, 120") == "fail"
     near = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.09]]) * [0, 1, 0])
     assert not stands_against(verdicts(fit(estimate=near)))
 
@@ -149,10 +149,10 @@ def test_centre_of_mass_far_from_the_literature():
 def test_parameters_by_prior_deviations(away, expected):
     sd = np.full((2, 10), 0.01)
     estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + np.eye(2, 10) * away * 0.01)
-    found = verdicts(fit(estimate=estimate, posterior=SimpleNamespace(prior_sd=sd)))
-    (told,) = [one for one in found if "3 prior SDs from" in one.sentence]
-    assert told.level == expected
-    assert "mass of pelvis" in told.sentence or "com_x of thigh_r" in told.sentence
+    judged = verdicts(fit(estimate=estimate, posterior=SimpleNamespace(prior_sd=sd)))
+    (verdict,) = [one for one in judged if "3 prior SDs from" in one.sentence]
+    assert verdict.level == expected
+    assert "mass of pelvis" in verdict.sentence or "com_x of thigh_r" in verdict.sentence
 
 
 @pytest.mark.parametrize(("doubted", "expected"), [(1, "caution"), (2, "caution"), (3, "fail")])
@@ -164,7 +164,7 @@ def test_more_than_two_doubted_segments_contradict_the_model(doubted, expected):
     away[:doubted, :3] += 0.031
     before, after = (BodySegmentParameters.from_table(segments, one) for one in (table, away))
     posterior = SimpleNamespace(prior_sd=np.full((4, 10), 0.01))
-    found = verdicts(fit(literature=before, estimate=after, posterior=posterior))
-    (told,) = [one for one in found if "3 prior SDs from" in one.sentence]
-    assert told.level == expected
-    assert ("take pelvis" in told.sentence) == (expected == "caution")
+    judged = verdicts(fit(literature=before, estimate=after, posterior=posterior))
+    (verdict,) = [one for one in judged if "3 prior SDs from" in one.sentence]
+    assert verdict.level == expected
+    assert ("take pelvis" in verdict.sentence) == (expected == "caution")

@@ -171,8 +171,8 @@ def test_page_is_one_file_that_needs_nothing_else(lab):
     assert "url(" not in written.read_text()
     words = " ".join(" ".join(page.words).split())
     assert "<script>alert(1)<script>.trc" in words
-    for told in ("stated mass 72.6 kg", "walks along +X", "R.Heel", "foot on plate", "2 plates at 1000 Hz"):
-        assert told in words
+    for phrase in ("stated mass 72.6 kg", "walks along +X", "R.Heel", "foot on plate", "2 plates at 1000 Hz"):
+        assert phrase in words
 
 
 def test_page_goes_only_where_it_may(lab):
@@ -250,11 +250,11 @@ def test_subject_file_with_a_model(shared_data, tmp_path):
         f'[[trial]]\nmarkers = "{data / "walking1.trc"}"\nforces = "{data / "walking1_grf.mot"}"\n'
         f'loads = "{data / "walking1_external_forces.xml"}"\n'
     )
-    told = text(run("check", tmp_path / "subject.toml"))
-    assert re.search(r"marker set addbiomechanics_scaled\.osim: \d+ of its \d+ labels", told)
-    assert "no marker set fits" not in told
-    assert "unknown foot" not in told
-    assert "pass: every foot on the ground stands on a plate from" in told
+    printed = text(run("check", tmp_path / "subject.toml"))
+    assert re.search(r"marker set addbiomechanics_scaled\.osim: \d+ of its \d+ labels", printed)
+    assert "no marker set fits" not in printed
+    assert "unknown foot" not in printed
+    assert "pass: every foot on the ground stands on a plate from" in printed
 
 
 def test_model_of_other_markers_in_a_subject_file(lab, shared_data):

@@ -54,8 +54,8 @@ def test_a_fit_leaves_out_what_it_has_said_itself(session, measured_walk, tmp_pa
         text = text.replace(known, f"of somebody else: {known}")
     (tmp_path / "others.toml").write_text(text, encoding="utf-8")
     helped = prepare_subject(subject_with(tmp_path, measured_walk, 'session = "others.toml"'))
-    (told,) = helped.uncertainty.instruments.session
-    np.testing.assert_array_equal(told.information, person.information)
+    (information,) = helped.uncertainty.instruments.session
+    np.testing.assert_array_equal(information.information, person.information)
     (tmp_path / "elsewhere.toml").write_text(text.replace('"plate 1", "plate 2"', '"left", "right"'), encoding="utf-8")
     with pytest.raises(SessionError, match="none of the session's plates"):
         prepare_subject(subject_with(tmp_path, measured_walk, 'session = "elsewhere.toml"'))
@@ -79,10 +79,10 @@ def test_people_who_contradict_each_other_are_named():
 
     alike = session_instruments([person("A", 0.010), person("B", 0.0101)], Instruments())
     assert alike.contradictions == ()
-    assert alike.found["clock"]["late"][0] == pytest.approx(0.010, abs=1e-4)
-    assert alike.found["clock"]["late"][1] == pytest.approx(1e-4 / np.sqrt(2.0), rel=0.01)
-    (told,) = session_instruments([person("A", 0.010), person("B", 0.002)], Instruments()).contradictions
-    assert told.startswith("clock: late: +10.0 ms by the trials of A, +2.0 by those of the others")
+    assert alike.values["clock"]["late"][0] == pytest.approx(0.010, abs=1e-4)
+    assert alike.values["clock"]["late"][1] == pytest.approx(1e-4 / np.sqrt(2.0), rel=0.01)
+    (contradiction,) = session_instruments([person("A", 0.010), person("B", 0.002)], Instruments()).contradictions
+    assert contradiction.startswith("clock: late: +10.0 ms by the trials of A, +2.0 by those of the others")
 
 
 def test_columns_of_force_files_are_plates_only_where_somebody_says_so(shared_data, tmp_path):
@@ -109,7 +109,7 @@ loads = "{walk.as_posix()}_grf.xml"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "words"),
     [
         (["walk.c3d"], "expected a subject file"),
         (["subject.toml", "-o", "."], "a folder; give the name of a file"),
@@ -117,8 +117,8 @@ loads = "{walk.as_posix()}_grf.xml"
         (["subject.toml", "-o", "subject.toml"], "not a file that kinertia instruments wrote"),
     ],
 )
-def test_what_cannot_be_is_refused_first(arguments, told, measured_walk, monkeypatch):
+def test_what_cannot_be_is_refused_first(arguments, words, measured_walk, monkeypatch):
     monkeypatch.chdir(measured_walk)
     outcome = run("instruments", *arguments)
     assert outcome.status == 2
-    assert told in outcome.err
+    assert words in outcome.err

@@ -56,14 +56,14 @@ def words(text):
 def test_files_are_small_and_name_source_and_licence(measured_walk):
     assert {path.name for path in measured_walk.iterdir()} == LAB
     assert sum(path.stat().st_size for path in measured_walk.iterdir()) < 3_000_000
-    told = (measured_walk / "README.txt").read_text()
+    readme = (measured_walk / "README.txt").read_text()
     for needed in (
         "github.com/mitkof6/opensim_automated_pipeline",
         "Copyright 2021 Dimitar Stanev",
         "Version 2.0",
         "cut",
     ):
-        assert needed in told
+        assert needed in readme
     assert "Apache License" in (measured_walk / "LICENSE.txt").read_text()
 
 
@@ -178,9 +178,9 @@ def test_results_are_those_of_a_fit(measured_demo):
     folder = measured_demo.folder
     assert {path.name for path in folder.glob("[!.]*")} == {*RESULTS, "lab"}
     assert {path.name for path in (folder / "lab").glob("[!.]*")} == LAB
-    told = json.loads((folder / "fit.json").read_text())
-    assert (told["method"], told["subject"]["name"]) == ("simultaneous", "Plug-in Gait, subject A")
-    (trial,) = told["trials"]
+    summary = json.loads((folder / "fit.json").read_text())
+    assert (summary["method"], summary["subject"]["name"]) == ("simultaneous", "Plug-in Gait, subject A")
+    (trial,) = summary["trials"]
     assert trial["window_s"] == pytest.approx(WINDOW_S, abs=0.025)
     bsp = pd.read_csv(folder / "bsp.csv")
     assert len(bsp) == 120
@@ -196,29 +196,29 @@ def test_fit_repeats_the_demo(measured_demo, tmp_path):
     # these say when and how fast it was
     for name in RESULTS - {"report.html", "fit.json", "fit.npz"}:
         assert (again.folder / name).read_bytes() == (measured_demo.folder / name).read_bytes(), name
-    report, told = (words(outcome.out) for outcome in (again.outcome, measured_demo.outcome))
-    assert report[: report.index(" (--verbose")] in told
+    report, printed = (words(outcome.out) for outcome in (again.outcome, measured_demo.outcome))
+    assert report[: report.index(" (--verbose")] in printed
 
 
 def test_report_has_the_fit_and_says_where_it_is_from(measured_demo):
     page = (measured_demo.folder / "report.html").read_text()
-    told = Elements(page).text
-    assert "Plug-in Gait, subject A" in told
-    assert f"kinertia demo --measured -o {measured_demo.folder}" in told
+    shown = Elements(page).text
+    assert "Plug-in Gait, subject A" in shown
+    assert f"kinertia demo --measured -o {measured_demo.folder}" in shown
     for name in ("static.c3d", "walk.c3d"):
-        assert hashlib.sha256((measured_demo.folder / "lab" / name).read_bytes()).hexdigest() in told
+        assert hashlib.sha256((measured_demo.folder / "lab" / name).read_bytes()).hexdigest() in shown
     assert len(figures_of(page)) >= 5
 
 
 def test_terminal_says_what_it_is_and_judges_as_fit_does(measured_demo):
     outcome = measured_demo.outcome
-    told = words(outcome.out)
+    printed = words(outcome.out)
     for needed in ("nobody knows the truth", "opensim_automated_pipeline", "Apache License 2.0", "README.txt"):
-        assert needed in told
-    assert "2.760 to 3.580 s used, 83 of 364 frames" in told
+        assert needed in printed
+    assert "2.760 to 3.580 s used, 83 of 364 frames" in printed
     assert re.search(r"torso +literature +16\.5", outcome.out)
     for warning in measured_demo.fit.warnings:
-        assert words(warning) in told
+        assert words(warning) in printed
     assert outcome.status == int(stands_against(verdicts(measured_demo.fit)))
     for stage in ("reading", "calibration", "inverse kinematics", "estimate"):
         assert stage in outcome.err
@@ -227,9 +227,9 @@ def test_terminal_says_what_it_is_and_judges_as_fit_does(measured_demo):
 def test_check_of_the_walk(measured_walk):
     outcome = run("check", measured_walk / "subject.toml")
     assert outcome.status == 0, outcome.err
-    told = words(outcome.out)
+    printed = words(outcome.out)
     for needed in ("2 plates at 1000 Hz", "33 of its 33 labels", "all contact measured 2.760 to 3.580 s"):
-        assert needed in told
+        assert needed in printed
     assert re.search(r"plate 1 +left", outcome.out)
     assert re.search(r"plate 2 +right", outcome.out)
 

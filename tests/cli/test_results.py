@@ -26,8 +26,8 @@ def test_the_report_is_written_again_as_it_was(results):
     before = (results / "report.html").read_text(encoding="utf-8")
     others = sorted(path.name for path in results.iterdir())
     (results / "report.html").unlink()
-    told = run("report", results)
-    assert told.status == 0, told.err
+    outcome = run("report", results)
+    assert outcome.status == 0, outcome.err
     assert (results / "report.html").read_text(encoding="utf-8") == before
     assert sorted(path.name for path in results.iterdir()) == others  # nothing else is touched
     assert "<code>kinertia " in before  # command and files stay known
@@ -39,26 +39,26 @@ def test_the_report_with_norms(fit, results):
     assert len(grouped) > 500
     file = results.parent / "adults.csv"
     grouped.reset_index().to_csv(file, index=False)
-    told = run("report", results, "--norms", file)
-    assert told.status == 0, told.err
-    assert "note" not in told.out
+    outcome = run("report", results, "--norms", file)
+    assert outcome.status == 0, outcome.err
+    assert "note" not in outcome.out
     page = (results / "report.html").read_text(encoding="utf-8")
     assert page.count("norm, mean ") > 20
     file.write_text("quantity,percent,mean,sd\nknee_angle_moment,0,0,1\nkneecap,0,0,1\n")
-    told = run("report", results, "--norms", file)
-    assert told.status == 0
-    assert "note: norms that this fit has no curve for: kneecap" in told.out
+    outcome = run("report", results, "--norms", file)
+    assert outcome.status == 0
+    assert "note: norms that this fit has no curve for: kneecap" in outcome.out
     file.write_text("quantity,percent,mean,sd\nkneecap,0,0,1\n")
-    told = run("report", results, "--norms", file)
-    assert told.status == 2
-    assert "no quantity of it is among the curves of this fit (the first is kneecap)" in told.err
+    outcome = run("report", results, "--norms", file)
+    assert outcome.status == 2
+    assert "no quantity of it is among the curves of this fit (the first is kneecap)" in outcome.err
 
 
 def test_export_says_what_the_tables_say(fit, results):
     folder = results.parent / "export"
     for _ in range(2):  # its own results are replaced
-        told = run("export", results, "--csv", "--json", "--mat", "-o", folder)
-        assert told.status == 0, told.err
+        outcome = run("export", results, "--csv", "--json", "--mat", "-o", folder)
+        assert outcome.status == 0, outcome.err
     (trial,) = fit.trials
     csv = pd.read_csv(folder / "cycles.csv")
     pd.testing.assert_frame_equal(csv, fit.cycles(), check_dtype=False, rtol=1e-15, atol=0)
@@ -77,31 +77,31 @@ def test_export_says_what_the_tables_say(fit, results):
 
 
 def test_export_asks_for_a_form(results):
-    told = run("export", results, "-o", results.parent / "export")
-    assert told.status == 2
-    assert "--csv, --json or --mat" in " ".join(told.err.split())
+    outcome = run("export", results, "-o", results.parent / "export")
+    assert outcome.status == 2
+    assert "--csv, --json or --mat" in " ".join(outcome.err.split())
 
 
 @pytest.mark.parametrize("command", [["report"], ["export", "--csv", "-o", "tables"]])
 def test_a_folder_without_results_is_told(tmp_path, monkeypatch, command):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    told = run(command[0], tmp_path / "here", *command[1:])
-    assert told.status == 2
-    assert "no results of kinertia fit are there" in " ".join(told.err.split())
+    outcome = run(command[0], tmp_path / "here", *command[1:])
+    assert outcome.status == 2
+    assert "no results of kinertia fit are there" in " ".join(outcome.err.split())
     assert not list((tmp_path / "here").iterdir())
 
 
 def test_fit_takes_a_folder_with_a_subject_file(tmp_path):
-    told = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert told.status == 2
-    assert "holds no subject file; draft one with: kinertia init" in " ".join(told.err.split())
+    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "holds no subject file; draft one with: kinertia init" in " ".join(outcome.err.split())
     (tmp_path / "subject.toml").write_text("[subject]\nmas_kg = 60.0\n")
-    told = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert "subject.toml, line 2" in told.err
+    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert "subject.toml, line 2" in outcome.err
     (tmp_path / "subject.toml").rename(tmp_path / "a.toml")
-    told = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert "a.toml, line 2" in told.err
+    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert "a.toml, line 2" in outcome.err
     (tmp_path / "b.toml").write_text("")
-    told = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert "several .toml files (a.toml, b.toml)" in " ".join(told.err.split())
+    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
+    assert "several .toml files (a.toml, b.toml)" in " ".join(outcome.err.split())

@@ -43,11 +43,11 @@ def test_correction_and_estimate_lower_the_residual(fit_of, name):
 
 @walks
 def test_total_mass_is_the_scale_s_or_a_warning_says_why(fit_of, name):
-    told = fit_of(name).summary
-    mass = told["total_mass_kg"]
+    summary = fit_of(name).summary
+    mass = summary["total_mass_kg"]
     assert mass["literature"] == pytest.approx(mass["measured"], rel=1e-6)
     off = abs(mass["estimate"] / mass["measured"] - 1) > 0.03
-    warned = any(warning.startswith("the estimated total mass is") for warning in told["warnings"])
+    warned = any(warning.startswith("the estimated total mass is") for warning in summary["warnings"])
     assert warned == off
 
 
@@ -86,8 +86,8 @@ def test_an_impossible_body_is_warned_about(fit_of, name):
     moments = {p: table["estimate"][table["parameter"] == p] for p in ("ixx", "iyy", "izz")}
     largest = np.maximum.reduce(list(moments.values()))
     impossible = int((2 * largest > sum(moments.values())).sum())
-    told = any("physically impossible" in warning for warning in fit.summary["warnings"])
-    assert told == (impossible > 0)
+    warned = any("physically impossible" in warning for warning in fit.summary["warnings"])
+    assert warned == (impossible > 0)
 
 
 def test_mass_and_height_come_from_the_c3d_file(short_fit):

@@ -25,10 +25,10 @@ def trial(made, force=lambda time, force: force, name="walk") -> Trial:
 
 
 def test_it_is_the_mass_of_the_body(made):
-    found = force_mass(made.skeleton, trial(made))
-    assert found.mass_kg == pytest.approx(made.bsp.total_mass_kg, abs=2 * found.sd_kg)
-    assert 0.005 < found.sd_kg / found.mass_kg < 0.03
-    np.testing.assert_allclose(found.carried, found.mass_kg, rtol=0.15)
+    mass = force_mass(made.skeleton, trial(made))
+    assert mass.mass_kg == pytest.approx(made.bsp.total_mass_kg, abs=2 * mass.sd_kg)
+    assert 0.005 < mass.sd_kg / mass.mass_kg < 0.03
+    np.testing.assert_allclose(mass.carried, mass.mass_kg, rtol=0.15)
 
 
 def test_no_motion_of_ours_is_asked(made):
@@ -41,8 +41,8 @@ def test_no_motion_of_ours_is_asked(made):
 def test_gaps_change_little(made):
     positions = made.markers.positions.copy()
     positions[::7] = np.nan
-    found = force_mass(made.skeleton, replace(trial(made), markers=replace(made.markers, positions=positions)))
-    assert found.mass_kg == pytest.approx(force_mass(made.skeleton, trial(made)).mass_kg, rel=0.01)
+    mass = force_mass(made.skeleton, replace(trial(made), markers=replace(made.markers, positions=positions)))
+    assert mass.mass_kg == pytest.approx(force_mass(made.skeleton, trial(made)).mass_kg, rel=0.01)
 
 
 def said(made, force) -> str:

@@ -23,12 +23,12 @@ def reactions(cutoff_hz, impact_n):
 @pytest.mark.parametrize(("given", "cutoff_hz", "impact_n", "which", "before"), CASES)
 def test_which_forces(given, cutoff_hz, impact_n, which, before):
     settings = Settings(**given)
-    found = forces_used(reactions(cutoff_hz, impact_n), settings, 12.0)
-    assert found.which == which
-    assert "=" not in found.which
+    used = forces_used(reactions(cutoff_hz, impact_n), settings, 12.0)
+    assert used.which == which
+    assert "=" not in used.which
     assert forces_before(reactions(cutoff_hz, impact_n), settings) == before
-    assert ("Bisseling" in found.why) == (impact_n > 0.5)
-    assert ('force_cutoff_hz = "none"' in found.why) == ("less" in which)
+    assert ("Bisseling" in used.why) == (impact_n > 0.5)
+    assert ('force_cutoff_hz = "none"' in used.why) == ("less" in which)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ def trial(person):
 
 
 @pytest.fixture(scope="module")
-def found(person, trial):
+def base(person, trial):
     prior = literature_prior(person.literature)
     return base_parameters(trial.skeleton, person.literature, prior.sd, [trial.motion], [ROOT_SD])
 
@@ -41,15 +41,15 @@ def test_evidence(information, word):
     assert evidence(information) == word
 
 
-def test_count_is_what_joints_hide(found):
+def test_count_is_what_joints_hide(base):
     """One per joint with intersecting axes (hips, back, shoulders), three per pin joint (knees, elbows); the two ankle
     axes do not meet and hide nothing.
     """
-    assert found.count == 120 - 5 - 3 * 4
-    assert len(found.never) == 9
-    assert "mass moving between pelvis and thigh_r at the centre of their joint" in found.never
+    assert base.count == 120 - 5 - 3 * 4
+    assert len(base.never) == 9
+    assert "mass moving between pelvis and thigh_r at the centre of their joint" in base.never
     knee = "mass moving between thigh_l and shank_l on the axis of their joint, however it is spread along it"
-    assert knee in found.never
+    assert knee in base.never
 
 
 def test_mass_at_the_hip_centre_moves_between_thigh_and_pelvis_unseen(person, trial):
@@ -71,32 +71,32 @@ def test_a_joint_held_still_hides_all_that_moves_across_it(person, trial):
     kept = [i for i, name in enumerate(trial.skeleton.coordinates) if name != "elbow_flex_r"]
     motion = Motion(*(part[:, kept] for part in (trial.motion.q, trial.motion.qd, trial.motion.qdd)))
     prior = literature_prior(person.literature)
-    found = base_parameters(held, person.literature, prior.sd, [motion], [ROOT_SD])
-    assert found.count == 103 - 7
-    assert "anything moving between upper_arm_r and forearm_r: their joint is held still" in found.never
+    base = base_parameters(held, person.literature, prior.sd, [motion], [ROOT_SD])
+    assert base.count == 103 - 7
+    assert "anything moving between upper_arm_r and forearm_r: their joint is held still" in base.never
 
 
-def test_gain_is_the_prior_deviation_over_that_of_least_squares(person, trial, found):
+def test_gain_is_the_prior_deviation_over_that_of_least_squares(person, trial, base):
     """One prior deviation along the combination changes the load by `gain` noise deviations, over all frames."""
     prior = literature_prior(person.literature)
     chain = block_diagonal(dynamic_by_table(person.literature.mass_kg, person.literature.com_m)) * prior.sd.ravel()
     rows = root_regressor(trial.skeleton, person.literature.segments, trial.motion) / ROOT_SD[:, None]
-    for combination in found.best:
+    for combination in base.best:
         weights = np.array(list(combination.weights.values()))
         assert np.square(weights).sum() == pytest.approx(1.0)
         assert np.linalg.norm(rows @ (chain @ weights)) == pytest.approx(combination.gain, rel=1e-6)
-    assert list(found.best[0].weights)[:2] == [f"pelvis.{name}" for name in PARAMETERS[:2]]
+    assert list(base.best[0].weights)[:2] == [f"pelvis.{name}" for name in PARAMETERS[:2]]
 
 
-def test_words_name_the_largest_weight_and_join_the_sides(found):
-    combination = max(found.best, key=lambda c: abs(c.weights["thigh_r.mass"]))
+def test_words_name_the_largest_weight_and_join_the_sides(base):
+    combination = max(base.best, key=lambda c: abs(c.weights["thigh_r.mass"]))
     assert combination.words.startswith("mass of the right thigh and not of the left")
-    assert any("mass of both thighs" in c.words for c in found.best)
+    assert any("mass of both thighs" in c.words for c in base.best)
 
 
-def test_two_trials_show_more_than_one(person, trial, found):
+def test_two_trials_show_more_than_one(person, trial, base):
     prior = literature_prior(person.literature)
     both = base_parameters(trial.skeleton, person.literature, prior.sd, [trial.motion] * 2, [ROOT_SD] * 2)
-    assert both.best[0].gain == pytest.approx(np.sqrt(2) * found.best[0].gain)
-    assert both.condition == pytest.approx(found.condition, rel=1e-3)
-    assert both.shown >= found.shown
+    assert both.best[0].gain == pytest.approx(np.sqrt(2) * base.best[0].gain)
+    assert both.condition == pytest.approx(base.condition, rel=1e-3)
+    assert both.shown >= base.shown

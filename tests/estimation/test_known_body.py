@@ -31,20 +31,20 @@ def test_a_measured_mass_weighs_by_how_well_it_is_known(ready):
     before = ready.prior
     row = before.mean.segments.index("thigh_r")
     expected, own = before.mean.mass_kg[row], before.sd[row, 0]
-    found = informed(ready, thigh_r=KnownSegment(mass_kg=f"{expected + own} +- {own}", source="DXA"))
-    assert found.prior.mean.mass_kg[row] == pytest.approx(expected + own / 2)
-    assert found.prior.sd[row, 0] == pytest.approx(own / np.sqrt(2.0))
-    assert "DXA" in found.notes[0]
-    assert not found.warnings
+    after = informed(ready, thigh_r=KnownSegment(mass_kg=f"{expected + own} +- {own}", source="DXA"))
+    assert after.prior.mean.mass_kg[row] == pytest.approx(expected + own / 2)
+    assert after.prior.sd[row, 0] == pytest.approx(own / np.sqrt(2.0))
+    assert "DXA" in after.notes[0]
+    assert not after.warnings
     left = before.mean.segments.index("thigh_l")
-    moved = found.prior.mean.mass_kg[left] - before.mean.mass_kg[left]
+    moved = after.prior.mean.mass_kg[left] - before.mean.mass_kg[left]
     assert moved == pytest.approx(0.9 * own / 2)
 
 
 def test_several_measurements_are_those_of_the_information_form(ready):
     """Inverse covariances add up."""
     known = KnownSegment(mass_kg="9 +- 0.3", com_y_mm="-180 +- 5", ixx_kgm2="0.15 +- 0.02")
-    found = informed(ready, thigh_r=known, torso=KnownSegment(mass_kg="30 +- 1"))
+    after = informed(ready, thigh_r=known, torso=KnownSegment(mass_kg="30 +- 1"))
     before, segments = ready.prior, ready.prior.mean.segments
     at = [10 * segments.index("thigh_r") + PARAMETERS.index(name) for name in ("mass", "com_y", "ixx")]
     at.append(10 * segments.index("torso"))
@@ -56,14 +56,14 @@ def test_several_measurements_are_those_of_the_information_form(ready):
         information[k, k] += 1.0 / sd**2
         right[k] += value / sd**2
     covariance = np.linalg.inv(information)
-    np.testing.assert_allclose(found.prior.covariance, covariance, atol=1e-9 * np.abs(covariance).max())
-    np.testing.assert_allclose(found.prior.mean.table().ravel(), covariance @ right, atol=1e-9)
+    np.testing.assert_allclose(after.prior.covariance, covariance, atol=1e-9 * np.abs(covariance).max())
+    np.testing.assert_allclose(after.prior.mean.table().ravel(), covariance @ right, atol=1e-9)
 
 
 def test_a_value_far_from_the_tables_is_warned_about(ready):
     """Grams for kilograms."""
-    found = informed(ready, foot_r=KnownSegment(mass_kg="900 +- 10"))
-    assert "is its unit right" in found.warnings[0]
+    after = informed(ready, foot_r=KnownSegment(mass_kg="900 +- 10"))
+    assert "is its unit right" in after.warnings[0]
 
 
 def test_an_earlier_estimate_takes_the_place_of_the_literature(ready):
@@ -71,9 +71,9 @@ def test_an_earlier_estimate_takes_the_place_of_the_literature(ready):
     order = tuple(reversed(prior.mean.segments))
     rows = [prior.mean.segments.index(name) for name in order]
     earlier = BspTable("bsp.csv", order, 1.1 * prior.mean.table()[rows], 0.5 * prior.sd[rows])
-    found = informed(ready, earlier=earlier)
-    np.testing.assert_allclose(found.prior.mean.table(), 1.1 * prior.mean.table())
-    np.testing.assert_allclose(found.prior.covariance, 0.25 * prior.covariance)
+    after = informed(ready, earlier=earlier)
+    np.testing.assert_allclose(after.prior.mean.table(), 1.1 * prior.mean.table())
+    np.testing.assert_allclose(after.prior.covariance, 0.25 * prior.covariance)
     other = replace(earlier, segments=("femur_r", *order[1:]))
     with pytest.raises(PriorError, match=f"has no {order[0]}.*femur_r.*another model"):
         informed(ready, earlier=other)

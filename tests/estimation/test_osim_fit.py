@@ -21,8 +21,8 @@ def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndar
     loaded = opensim.Model(str(model))
     state = loaded.initSystem()
     table = read_sto(motion)
-    found = loaded.getCoordinateSet()
-    coordinates = [found.get(i) for i in range(found.getSize())]
+    coordinate_set = loaded.getCoordinateSet()
+    coordinates = [coordinate_set.get(i) for i in range(coordinate_set.getSize())]
     assert {c.getName() for c in coordinates} == set(table.columns)
     turns = {c.getName() for c in coordinates if c.getMotionType() == opensim.Coordinate.Rotational}
     for coordinate in coordinates:
@@ -42,17 +42,17 @@ def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndar
 def test_opensim_sees_the_markers_where_the_fit_says(opensim, shared_data, fit_with_model, name, calibrate):
     """Model and motion as written: all coordinates, locked and coupled ones too, and calibrated markers and joints."""
     folder = fit_with_model(name, calibrate)
-    told = json.loads((folder / "fit.json").read_text())["trials"][0]
+    trial = json.loads((folder / "fit.json").read_text())["trials"][0]
     (markers_file,) = osim_models.PEOPLE[name].trials
     measured = read_trc(shared_data / f"{markers_file}.trc")
-    labels = list(told_labels(folder))
+    labels = list(used_labels(folder))
     time, modelled = opensim_markers(opensim, folder / "model.osim", folder / "kinematics.mot", labels)
     frames = np.searchsorted(measured.time, time - 1e-6)
     distance = np.linalg.norm(measured.select(labels).positions[frames] - modelled, axis=-1)
-    assert np.sqrt(np.nanmean(distance**2)) == pytest.approx(told["marker_rms_m"]["final"], abs=1e-6)
+    assert np.sqrt(np.nanmean(distance**2)) == pytest.approx(trial["marker_rms_m"]["final"], abs=1e-6)
 
 
-def told_labels(folder: Path):
+def used_labels(folder: Path):
     """Labels of the markers that the fit used."""
     return json.loads((folder / "fit.json").read_text())["marker_noise"].popitem()[1]["sd_m"]
 
@@ -80,9 +80,9 @@ def test_changes_are_what_was_asked_for(fit_with_model, name, calibrate):
 
 def assert_targets(folder: Path) -> None:
     """Residual RMS at most 5 N and 3 N m, markers at most 12 mm, no silent departure of a parameter."""
-    told = json.loads((folder / "fit.json").read_text())
-    assert told["converged"]
-    for trial in told["trials"]:
+    summary = json.loads((folder / "fit.json").read_text())
+    assert summary["converged"]
+    for trial in summary["trials"]:
         assert trial["residual_force_rms_N"]["estimate"] <= 5.0
         assert trial["residual_moment_rms_Nm"]["estimate"] <= 3.0
         assert trial["marker_rms_m"]["final"] <= 0.012
@@ -90,7 +90,7 @@ def assert_targets(folder: Path) -> None:
     far = bsp[(bsp["estimate"] - bsp["literature"]).abs() > 3 * bsp["prior_sd"]]
     for _, row in far.iterrows():
         named = f"{row['parameter']} of {row['segment']} "
-        assert any("contradict" in warning and named in warning for warning in told["warnings"]), named
+        assert any("contradict" in warning and named in warning for warning in summary["warnings"]), named
 
 
 @pytest.mark.parametrize("name", ["gait2354", "rajagopal"])
@@ -102,9 +102,9 @@ def test_residuals_markers_and_parameters(fit_with_model, name):
 def test_walks_and_squats_pooled(fit_with_model):
     folder = fit_with_model("subject4", True)
     assert_targets(folder)
-    told = json.loads((folder / "fit.json").read_text())
-    assert [trial["name"] for trial in told["trials"]] == ["walking1", "walking2", "squats1"]
-    assert any("ForcePlate2" in note and "left foot" in note for note in told["notes"])
+    summary = json.loads((folder / "fit.json").read_text())
+    assert [trial["name"] for trial in summary["trials"]] == ["walking1", "walking2", "squats1"]
+    assert any("ForcePlate2" in note and "left foot" in note for note in summary["notes"])
     assert (folder / "walking2" / "kinematics.mot").is_file()
 
 
@@ -115,13 +115,13 @@ def test_page_of_the_benchmark(fit_with_model):
         bsp = pd.read_csv(folder / "bsp.csv")
         runs["gait2354", calibrate] = {**json.loads((folder / "fit.json").read_text()), "bsp": bsp}
     page = osim_models.document(runs)
-    for (_, calibrate), told in runs.items():
-        (trial,) = told["trials"]
+    for (_, calibrate), summary in runs.items():
+        (trial,) = summary["trials"]
         title = f"gait2354, {'calibrated' if calibrate else 'as it is'}"
         residual = trial["residual_force_rms_N"]["estimate"], trial["residual_moment_rms_Nm"]["estimate"]
         cells = rf"\| {trial['marker_rms_m']['final'] * 1e3:.1f} \|.*\| {residual[0]:.1f} \|.*\| {residual[1]:.1f} \|"
         assert re.search(rf"\| {title}: subject01_walk1 .*{cells}", page)
-        for warning in told["warnings"]:
+        for warning in summary["warnings"]:
             assert f"- {title}: {warning}." in page
 
 

@@ -13,10 +13,10 @@ GOOD = "".join(["segment,parameter,unit,literature,estimate,sd\n", *ROWS])
 def test_estimates_and_deviations(tmp_path):
     path = tmp_path / "bsp.csv"
     path.write_text(GOOD)
-    found = read_bsp(path)
-    assert found.segments == ("thigh_r", "thigh_l")
-    np.testing.assert_allclose(found.estimate, [[0.1 * k for k in range(10)]] * 2)
-    np.testing.assert_allclose(found.sd[1], [0.01 * (k + 1) for k in range(10)])
+    table = read_bsp(path)
+    assert table.segments == ("thigh_r", "thigh_l")
+    np.testing.assert_allclose(table.estimate, [[0.1 * k for k in range(10)]] * 2)
+    np.testing.assert_allclose(table.sd[1], [0.01 * (k + 1) for k in range(10)])
 
 
 def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
@@ -26,7 +26,7 @@ def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "words"),
     [
         (",sd\n", ",other\n", r"line 1: has no column sd; expected the bsp.csv of a simultaneous fit"),
         ("thigh_r,mass", "thigh_r,weight", r"line 2: unknown parameter 'weight'; expected one of mass, com_x"),
@@ -38,11 +38,11 @@ def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
         (GOOD[GOOD.index("\n") + 1 :], "", "holds no rows"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_line(tmp_path, old, new, told):
+def test_what_cannot_be_is_told_with_its_line(tmp_path, old, new, words):
     path = tmp_path / "bsp.csv"
     assert old in GOOD
     path.write_text(GOOD.replace(old, new))
-    with pytest.raises(FileError, match=told):
+    with pytest.raises(FileError, match=words):
         read_bsp(path)
 
 

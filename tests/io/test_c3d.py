@@ -247,20 +247,20 @@ def test_plate_somewhere_else_is_noted(tmp_path):
     assert "centre of pressure of plate 1 lies" in read_c3d(path).notes[-1]
 
 
-@pytest.mark.parametrize("told", ["+Z", "-Y", "+X", "-X", "+Y", "-Z"])
-def test_vertical_axis(tmp_path, told):
+@pytest.mark.parametrize("vertical", ["+Z", "-Y", "+X", "-X", "+Y", "-Z"])
+def test_vertical_axis(tmp_path, vertical):
     points, labels = standing()
     up = np.zeros(3)
-    up["XYZ".index(told[1])] = -1 if told[0] == "-" else 1
+    up["XYZ".index(vertical[1])] = -1 if vertical[0] == "-" else 1
     side = np.roll(up, 1)
     to_lab = np.column_stack((side, np.cross(up, side), up))  # columns: lab axes of our X, Y, Z
-    path = write_c3d(tmp_path / "x.c3d", points @ to_lab.T, labels, parameters={"POINT": {"Y_SCREEN": [told]}})
+    path = write_c3d(tmp_path / "x.c3d", points @ to_lab.T, labels, parameters={"POINT": {"Y_SCREEN": [vertical]}})
     recording = read_c3d(path)
     np.testing.assert_allclose(recording.markers.positions[0, :, 1], points[0, :, 2] / 1000, atol=1e-6)
     assert not [note for note in recording.notes if "believed" in note]
     blind = read_c3d(write_c3d(tmp_path / "y.c3d", points @ to_lab.T, labels))
     np.testing.assert_allclose(blind.markers.positions, recording.markers.positions, atol=1e-6)
-    assert f"no vertical axis given (POINT:Y_SCREEN); {told} was found from the markers' extents" in blind.notes[0]
+    assert f"no vertical axis given (POINT:Y_SCREEN); {vertical} was found from the markers' extents" in blind.notes[0]
     gaps = np.linalg.norm(np.diff(recording.markers.positions[0], axis=0), axis=1)
     np.testing.assert_allclose(gaps, np.linalg.norm(np.diff(points[0], axis=0), axis=1) / 1000, atol=1e-6)
 
@@ -383,12 +383,12 @@ def test_a_stated_length_unit_goes_before_what_the_file_says(tmp_path, told):
 def test_an_empty_length_unit_is_inferred_from_the_size_of_a_person(tmp_path, unit, metres):
     person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (0.6, 0.5, 1.8), (4, 9, 3))
     file = write_c3d(tmp_path / "x.c3d", person / metres, [f"M{k}" for k in range(9)], unit="")
-    found = read_c3d(file)
-    assert found.length_unit == unit
+    recording = read_c3d(file)
+    assert recording.length_unit == unit
     np.testing.assert_allclose(
-        np.ptp(found.markers.positions[..., 1], axis=1), np.ptp(person[..., 2], axis=1), atol=1e-6
+        np.ptp(recording.markers.positions[..., 1], axis=1), np.ptp(person[..., 2], axis=1), atol=1e-6
     )
-    assert f"POINT:UNITS is empty; taken as {unit}" in " ".join(found.notes)
+    assert f"POINT:UNITS is empty; taken as {unit}" in " ".join(recording.notes)
     ant = write_c3d(tmp_path / "y.c3d", 0.1 * person, [f"M{k}" for k in range(9)], unit="")
     with pytest.raises(FileError, match=r"POINT:UNITS is empty, and its markers, which reach 0\.1"):
         read_c3d(ant)

@@ -76,9 +76,9 @@ def test_a_name_with_umlauts_is_read_on_windows(measured_walk, tmp_path, monkeyp
     shutil.copyfile(measured_walk / "static.c3d", folder / "Stehen größer.c3d")
     monkeypatch.chdir(tmp_path)
     name = "Müller/Stehen größer.c3d"
-    found, expected = read_c3d(name if relative else tmp_path / name), read_c3d(measured_walk / "static.c3d")
-    np.testing.assert_array_equal(found.markers.positions, expected.markers.positions)
-    assert found.name == "Stehen größer"
+    recording, expected = read_c3d(name if relative else tmp_path / name), read_c3d(measured_walk / "static.c3d")
+    np.testing.assert_array_equal(recording.markers.positions, expected.markers.positions)
+    assert recording.name == "Stehen größer"
 
 
 def test_a_name_with_umlauts_is_written_on_windows(measured_walk, tmp_path, like_windows):

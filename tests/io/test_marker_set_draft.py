@@ -15,21 +15,21 @@ def drafted(tmp_path, labels):
 @pytest.mark.parametrize("name", preset_names())
 def test_a_presets_labels_draft_its_segments(tmp_path, name):
     preset = read_marker_set(name)
-    found, text = drafted(tmp_path, preset.labels)
-    placed = {label: segment for segment, labels in found.segments.items() for label in labels}
+    draft, text = drafted(tmp_path, preset.labels)
+    placed = {label: segment for segment, labels in draft.segments.items() for label in labels}
     expected = {label: segment for segment, labels in preset.segments.items() for label in labels}
     assert {label for label in expected if placed.get(label) != expected[label]} == set()
     single = {entry: labels for entry, labels in preset.landmarks.items() if len(labels) == 1}
-    assert {entry for entry in single if found.landmarks.get(entry) != single[entry]} == set()
+    assert {entry for entry in single if draft.landmarks.get(entry) != single[entry]} == set()
     assert "Not placed" not in text or set(preset.labels) - set(expected)
 
 
 def test_names_that_are_nearly_known_are_found_and_others_listed(tmp_path):
     labels = ["R ASIS", "L_ASIS", "R-PSIS", "LPSIS", "RHeel", "LHeel", "R_Kneee", "Banana"]
-    found, text = drafted(tmp_path, labels)
-    assert found.landmarks["asis_r"] == ("R ASIS",)
-    assert found.landmarks["heel_l"] == ("LHeel",)
-    assert "R_Kneee" in found.segments["thigh_r"]
+    draft, text = drafted(tmp_path, labels)
+    assert draft.landmarks["asis_r"] == ("R ASIS",)
+    assert draft.landmarks["heel_l"] == ("LHeel",)
+    assert "R_Kneee" in draft.segments["thigh_r"]
     assert "FILL IN where they belong: Banana" in text
     assert '# ankle_lateral_r = ""  # FILL IN' in text
 

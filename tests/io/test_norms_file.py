@@ -30,9 +30,9 @@ def norms(tmp_path, text, encoding="utf-8"):
     ids=["as documented", "Windows", "decimal commas", "tabs", "blank lines", "other columns"],
 )
 def test_norms_are_read_in_the_order_of_percent(tmp_path, text, encoding):
-    found = norms(tmp_path, text, encoding)
-    assert [name.lower() for name in found] == ["knee_angle_angle", "hip_flexion_moment"]
-    knee = found["knee_angle_angle"]
+    by_quantity = norms(tmp_path, text, encoding)
+    assert [name.lower() for name in by_quantity] == ["knee_angle_angle", "hip_flexion_moment"]
+    knee = by_quantity["knee_angle_angle"]
     np.testing.assert_array_equal([knee.percent, knee.mean, knee.sd], [[0, 50], [5.25, 10.5], [3.5, 4.0]])
 
 

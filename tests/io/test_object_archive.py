@@ -28,7 +28,7 @@ class Pair(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Tree:
     leaves: tuple[Leaf, ...]
-    told: Mapping[str, Any]
+    by_name: Mapping[str, Any]
 
 
 KINDS = (Leaf, Tree, Pair)
@@ -85,10 +85,10 @@ def test_a_tree_with_shared_parts(tmp_path):
     leaf = Leaf(values, spline)
     tree = Tree((leaf, leaf, Leaf(values)), {"a": np.float64(0.1), "again": leaf, "where": Path("b") / "c"})
     back, path = there_and_back(tree, tmp_path)
-    assert back.leaves[0] is back.leaves[1] is back.told["again"]
+    assert back.leaves[0] is back.leaves[1] is back.by_name["again"]
     assert back.leaves[2].values is back.leaves[0].values
-    assert back.told["a"] == 0.1
-    assert back.told["where"] == Path("b") / "c"
+    assert back.by_name["a"] == 0.1
+    assert back.by_name["where"] == Path("b") / "c"
     at = np.linspace(3, 6, 20)
     np.testing.assert_array_equal(back.leaves[0].spline(at, 1), spline(at, 1))
     with np.load(path) as plain:  # NumPy alone reads it

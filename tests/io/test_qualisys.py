@@ -19,28 +19,28 @@ def walk():
 @pytest.mark.parametrize("counted", [False, True], ids=["bare rows", "frame and time"])
 def test_a_trial_comes_back(tmp_path, walk, local, counted):
     path = write_qtm(tmp_path / "walk.tsv", walk, local=local, counted=counted)
-    found = read_recording(path)
-    assert found.markers.labels == walk.markers.labels
-    np.testing.assert_allclose(found.markers.positions, walk.markers.positions, atol=1e-6)
-    np.testing.assert_allclose(found.markers.time, walk.markers.time, atol=1e-9)
-    np.testing.assert_allclose(found.plates.force, walk.plates.force, atol=1e-6)
-    np.testing.assert_allclose(found.plates.moment, walk.plates.moment, atol=1e-3)
-    np.testing.assert_allclose(found.plates.corners, CORNERS_M @ LAB.T, atol=1e-6)
-    assert (found.length_unit, found.vertical) == ("mm", "+Z")
-    assert any("plates from walk_f_1.tsv, walk_f_2.tsv" in note for note in found.notes)
+    recording = read_recording(path)
+    assert recording.markers.labels == walk.markers.labels
+    np.testing.assert_allclose(recording.markers.positions, walk.markers.positions, atol=1e-6)
+    np.testing.assert_allclose(recording.markers.time, walk.markers.time, atol=1e-9)
+    np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-6)
+    np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
+    np.testing.assert_allclose(recording.plates.corners, CORNERS_M @ LAB.T, atol=1e-6)
+    assert (recording.length_unit, recording.vertical) == ("mm", "+Z")
+    assert any("plates from walk_f_1.tsv, walk_f_2.tsv" in note for note in recording.notes)
 
 
 def test_a_plate_named_brings_the_others(tmp_path, walk):
     path = write_qtm(tmp_path / "walk.tsv", walk)
-    found = read_recording(path, tmp_path / "walk_f_2.tsv")
-    np.testing.assert_allclose(found.plates.force, walk.plates.force, atol=1e-6)
+    recording = read_recording(path, tmp_path / "walk_f_2.tsv")
+    np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-6)
 
 
 def test_forces_on_the_plate_are_reversed(tmp_path, walk):
     down = replace(walk, plates=replace(walk.plates, force=-walk.plates.force, moment=-walk.plates.moment))
-    found = read_recording(write_qtm(tmp_path / "walk.tsv", down, local=True))
-    np.testing.assert_allclose(found.plates.force, walk.plates.force, atol=1e-6)
-    np.testing.assert_allclose(found.plates.moment, walk.plates.moment, atol=1e-3)
+    recording = read_recording(write_qtm(tmp_path / "walk.tsv", down, local=True))
+    np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-6)
+    np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
 
 
 def test_moments_that_contradict_the_centre_of_pressure_are_not_used(tmp_path, walk):
@@ -49,9 +49,9 @@ def test_moments_that_contradict_the_centre_of_pressure_are_not_used(tmp_path, w
     rows = plate.read_text().split("\n")
     rows = [line if not line[:1].lstrip("-").isdigit() else swapped(line) for line in rows]
     plate.write_text("\n".join(rows))
-    found = read_recording(path)
-    assert any("walk_f_1.tsv: moments and centre of pressure contradict each other" in note for note in found.notes)
-    np.testing.assert_allclose(found.plates.moment[..., [0, 2]], walk.plates.moment[..., [0, 2]], atol=1e-3)
+    recording = read_recording(path)
+    assert any("walk_f_1.tsv: moments and centre of pressure contradict each other" in note for note in recording.notes)
+    np.testing.assert_allclose(recording.plates.moment[..., [0, 2]], walk.plates.moment[..., [0, 2]], atol=1e-3)
 
 
 def swapped(line):
@@ -66,9 +66,9 @@ def test_missing_markers_are_missing(tmp_path, walk):
     positions[3, 1] = np.nan
     gap = replace(walk, markers=replace(walk.markers, positions=positions))
     for hole in ("", "0.000", "NULL"):
-        found = read_recording(write_qtm(tmp_path / "walk.tsv", gap, hole=hole))
-        assert np.isnan(found.markers.positions[3, 1]).all()
-        assert np.isfinite(found.markers.positions[4]).all()
+        recording = read_recording(write_qtm(tmp_path / "walk.tsv", gap, hole=hole))
+        assert np.isnan(recording.markers.positions[3, 1]).all()
+        assert np.isfinite(recording.markers.positions[4]).all()
 
 
 BAD = {

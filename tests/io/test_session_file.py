@@ -31,7 +31,7 @@ def test_people_read_millimetres_and_milliseconds(written):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "words"),
     [
         ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 11 rows"),
         ("right = [0.1", 'right = ["0.1"', "not what kinertia instruments wrote"),
@@ -39,7 +39,7 @@ def test_people_read_millimetres_and_milliseconds(written):
         ("kinertia = ", "x = ", "not what kinertia instruments wrote"),
     ],
 )
-def test_another_file_is_refused(written, old, new, told):
+def test_another_file_is_refused(written, old, new, words):
     written.write_text(written.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    with pytest.raises(FileError, match=told):
+    with pytest.raises(FileError, match=words):
         read_session(written)

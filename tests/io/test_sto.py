@@ -80,18 +80,18 @@ def test_empty_cell_is_nan(write):
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "told"),
+    ("right", "wrong", "words"),
     [
         ("nRows=2", "nRows=901", "line 3 of its header announces 901 rows, the file has 2"),
         ("nRows=2", "datarows 1", "line 3 of its header announces 1 rows, the file has 2"),
         ("nColumns=3", "nColumns=4", "line 4 of its header announces 4 columns, the file has 3"),
     ],
 )
-def test_a_header_that_miscounts_is_a_note(write, right, wrong, told):
+def test_a_header_that_miscounts_is_a_note(write, right, wrong, words):
     table = read_table(write(HEADER.replace(right, wrong) + TABLE))
     np.testing.assert_array_equal(table.values, [[1, 2], [3, 4]])
     assert len(table.notes) == 1
-    assert told in table.notes[0]
+    assert words in table.notes[0]
     assert read_table(write(HEADER + TABLE)).notes == ()
 
 

@@ -388,8 +388,8 @@ def test_init_matches_one_force_file_to_each_trial(tmp_path):
         (tmp_path / name).write_text("x\nendheader\ntime\tground_force_vx\tground_force_vy\n")
     (tmp_path / "run_12_ik.mot").write_text("x\nendheader\ntime\tpelvis_tilt\n")
     result = draft(tmp_path, completed(init_subject(tmp_path)))
-    found = {trial.name: trial.forces and trial.forces.name for trial in result.trials}
-    assert found == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
+    forces = {trial.name: trial.forces and trial.forces.name for trial in result.trials}
+    assert forces == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
 
 
 def laboratory(tmp_path, force_folder):

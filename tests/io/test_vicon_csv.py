@@ -27,14 +27,14 @@ def walk():
 @pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS.keys())
 @pytest.mark.parametrize("mark", [",", "\t"], ids=["CSV", "TXT"])
 def test_a_trial_comes_back_whatever_axes_its_forces_are_in(tmp_path, walk, turn, mark):
-    found = read_recording(write_nexus(tmp_path / "walk.csv", walk, turn, mark))
-    assert found.markers.labels == walk.markers.labels
-    np.testing.assert_allclose(found.markers.positions, walk.markers.positions, atol=1e-6)
-    np.testing.assert_allclose(found.markers.time, walk.markers.time, atol=1e-9)
-    np.testing.assert_allclose(found.plates.time, walk.plates.time, atol=1e-9)
-    np.testing.assert_allclose(found.plates.force, walk.plates.force, atol=1e-5)
-    np.testing.assert_allclose(found.plates.moment, walk.plates.moment, atol=1e-3)
-    turned = [note for note in found.notes if "in the plate's axes" in note]
+    recording = read_recording(write_nexus(tmp_path / "walk.csv", walk, turn, mark))
+    assert recording.markers.labels == walk.markers.labels
+    np.testing.assert_allclose(recording.markers.positions, walk.markers.positions, atol=1e-6)
+    np.testing.assert_allclose(recording.markers.time, walk.markers.time, atol=1e-9)
+    np.testing.assert_allclose(recording.plates.time, walk.plates.time, atol=1e-9)
+    np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-5)
+    np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
+    turned = [note for note in recording.notes if "in the plate's axes" in note]
     assert len(turned) == (0 if np.array_equal(turn, np.eye(3)) else 2)
 
 
@@ -42,9 +42,9 @@ def test_an_empty_cell_is_a_missing_marker(tmp_path, walk):
     positions = walk.markers.positions.copy()
     positions[3, 1] = np.nan
     gap = replace(walk, markers=replace(walk.markers, positions=positions))
-    found = read_recording(write_nexus(tmp_path / "walk.csv", gap))
-    assert np.isnan(found.markers.positions[3, 1]).all()
-    assert np.isfinite(np.delete(found.markers.positions, 3, axis=0)).all()
+    recording = read_recording(write_nexus(tmp_path / "walk.csv", gap))
+    assert np.isnan(recording.markers.positions[3, 1]).all()
+    assert np.isfinite(np.delete(recording.markers.positions, 3, axis=0)).all()
 
 
 BAD = {

@@ -19,23 +19,23 @@ def test_segment_by_name(body, segment):
     assert segment_of(body) == segment
 
 
-def assert_literature(found):
+def assert_literature(segments):
     literature = upright.literature()
-    for name, row in zip(found.bsp.segments, found.bsp.table(), strict=True):
+    for name, row in zip(segments.bsp.segments, segments.bsp.table(), strict=True):
         expected = literature.table()[literature.segments.index(name)]
         np.testing.assert_allclose(row, expected, atol=1e-9, err_msg=name)
 
 
 def test_segments_come_out_in_the_axes_of_the_literature():
-    found = model_segments(upright.skeleton(), upright.bsp(), upright.HEIGHT_M, upright.SEX)
-    assert found.bsp.segments == upright.literature().segments
-    assert found.bodies["foot_r"] == ("talus_r",)
-    assert found.unknown == ()
-    assert_literature(found)
+    segments = model_segments(upright.skeleton(), upright.bsp(), upright.HEIGHT_M, upright.SEX)
+    assert segments.bsp.segments == upright.literature().segments
+    assert segments.bodies["foot_r"] == ("talus_r",)
+    assert segments.unknown == ()
+    assert_literature(segments)
     wanted = upright.geometry()
-    assert found.geometry.lumbar_joint_m == pytest.approx(wanted.lumbar_joint_m)
-    assert found.geometry.mid_hip_m == pytest.approx(wanted.mid_hip_m)
-    assert dict(found.geometry.lengths_m) == pytest.approx(dict(wanted.lengths_m))
+    assert segments.geometry.lumbar_joint_m == pytest.approx(wanted.lumbar_joint_m)
+    assert segments.geometry.mid_hip_m == pytest.approx(wanted.mid_hip_m)
+    assert dict(segments.geometry.lengths_m) == pytest.approx(dict(wanted.lengths_m))
 
 
 def test_frames_of_bodies_do_not_matter():
@@ -61,15 +61,15 @@ def test_bodies_are_put_together():
         row = foot.copy()
         row[0], row[1:4], row[4:] = foot[0] / 2, foot[1:4] - origin, foot[4:] / 2
         rows[table.segments.index(body)] = row
-    found = model_segments(upright.skeleton(), BodySegmentParameters.from_table(table.segments, rows))
-    assert found.bodies["foot_r"] == ("talus_r", "toes_r")
-    assert_literature(found)
+    segments = model_segments(upright.skeleton(), BodySegmentParameters.from_table(table.segments, rows))
+    assert segments.bodies["foot_r"] == ("talus_r", "toes_r")
+    assert_literature(segments)
 
 
 def test_models_without_arms_or_without_known_names():
-    found = model_segments(upright.skeleton(arms=False), upright.bsp(arms=False))
-    assert not any("arm" in segment for segment in found.bsp.segments)
-    assert found.geometry is not None
+    segments = model_segments(upright.skeleton(arms=False), upright.bsp(arms=False))
+    assert not any("arm" in segment for segment in segments.bsp.segments)
+    assert segments.geometry is not None
     names = {"femur_r": "rod_r", "tibia_r": "bar_r"}
     table = upright.bsp()
     renamed = BodySegmentParameters.from_table([names.get(n, n) for n in table.segments], table.table())
@@ -78,9 +78,9 @@ def test_models_without_arms_or_without_known_names():
         type(j)(names.get(j.parent, j.parent), names.get(j.child, j.child), j.rotation, j.translation, j.axes)
         for j in skeleton.joints
     ]
-    found = model_segments(type(skeleton)("odd", tuple(joints), ()), renamed)
-    assert set(found.unknown) == {"rod_r", "bar_r"}
-    assert found.geometry is None
+    segments = model_segments(type(skeleton)("odd", tuple(joints), ()), renamed)
+    assert set(segments.unknown) == {"rod_r", "bar_r"}
+    assert segments.geometry is None
 
 
 @pytest.mark.parametrize(
@@ -90,10 +90,10 @@ def test_models_without_arms_or_without_known_names():
 def test_measured_models_keep_their_mass_and_whole_body_centre(shared_data, name):
     """All bodies have a segment, and femurs, whose frames nearly are the segment's, stay as they are."""
     model = read_osim(shared_data / name)
-    found = model_segments(model.skeleton, model.bsp)
-    assert found.unknown == ()
-    assert found.bsp.total_mass_kg == pytest.approx(model.bsp.total_mass_kg)
+    segments = model_segments(model.skeleton, model.bsp)
+    assert segments.unknown == ()
+    assert segments.bsp.total_mass_kg == pytest.approx(model.bsp.total_mass_kg)
     femur = model.bsp.segments.index("femur_r")
-    thigh = found.bsp.segments.index("thigh_r")
-    assert found.bsp.com_m[thigh] == pytest.approx(model.bsp.com_m[femur], abs=0.008)
-    assert found.geometry.lengths_m["thigh_r"] == pytest.approx(found.geometry.lengths_m["thigh_l"])
+    thigh = segments.bsp.segments.index("thigh_r")
+    assert segments.bsp.com_m[thigh] == pytest.approx(model.bsp.com_m[femur], abs=0.008)
+    assert segments.geometry.lengths_m["thigh_r"] == pytest.approx(segments.geometry.lengths_m["thigh_l"])

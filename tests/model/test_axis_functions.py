@@ -69,8 +69,8 @@ def test_polynomial_is_opensims(opensim):
     reference = opensim.PolynomialFunction(vector)
     for x in (-1.7, 0.0, 0.4, 2.5):
         for order in range(3):
-            found = polynomial(coefficients)(np.array([x]), order)[0]
-            assert found == pytest.approx(theirs(opensim, reference, x, order))
+            ours = polynomial(coefficients)(np.array([x]), order)[0]
+            assert ours == pytest.approx(theirs(opensim, reference, x, order))
 
 
 FUNCTIONS = {

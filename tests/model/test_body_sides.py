@@ -52,10 +52,10 @@ def test_a_turned_person_is_the_same_person(recorded):
 def test_mirrored_axes(recorded, axis):
     markers, marker_set = recorded
     mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
-    told = sides_trouble(Markers(markers.time, markers.labels, markers.positions * mirror), marker_set)
-    assert "left and right" in told
-    assert "all" in told
-    assert "mirrored" in told
+    trouble = sides_trouble(Markers(markers.time, markers.labels, markers.positions * mirror), marker_set)
+    assert "left and right" in trouble
+    assert "all" in trouble
+    assert "mirrored" in trouble
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_swapped_labels(recorded, pairs, words):
     swapped = exchanged(markers, marker_set, *pairs)
     if swapped is None:
         pytest.skip("the trial does not have these markers, one label each")
-    told = sides_trouble(swapped, marker_set)
-    assert words in told
-    assert all(label in told for label in marker_set.landmarks[pairs[0][0]])
-    assert "correct" in told
+    trouble = sides_trouble(swapped, marker_set)
+    assert words in trouble
+    assert all(label in trouble for label in marker_set.landmarks[pairs[0][0]])
+    assert "correct" in trouble

@@ -36,8 +36,8 @@ def test_forces_do_the_work_of_the_axes(state):
     q, qd, qdd = state
     forces = np.random.default_rng(1).normal(size=(6, 5))
     rate = CURVED.motion(q, qd, qdd)[1]
-    found = CURVED.to_coordinates(forces, CURVED.slopes(q))
-    np.testing.assert_allclose((found * qd).sum(axis=1), (forces * rate).sum(axis=1))
+    generalised = CURVED.to_coordinates(forces, CURVED.slopes(q))
+    np.testing.assert_allclose((generalised * qd).sum(axis=1), (forces * rate).sum(axis=1))
 
 
 def test_derivatives_by_coordinates_are_finite_differences(state):
@@ -52,7 +52,7 @@ def test_derivatives_by_coordinates_are_finite_differences(state):
 
     inside = sum(np.einsum("ra,na->nr", w, p) for w, p in zip(weights, CURVED.motion(*state), strict=True))
     by_axes = tuple(np.cos(inside)[:, :, None] * w for w in weights)
-    found = CURVED.derivatives_to_coordinates(by_axes, *state)
+    derivatives = CURVED.derivatives_to_coordinates(by_axes, *state)
     h = 1e-6
     for order in range(3):
         for column in range(3):
@@ -60,7 +60,7 @@ def test_derivatives_by_coordinates_are_finite_differences(state):
             step = h * np.eye(3)[column]
             ahead[order], behind[order] = state[order] + step, state[order] - step
             slope = (function(*ahead) - function(*behind)) / (2 * h)
-            np.testing.assert_allclose(found[order][:, :, column], slope, atol=1e-6)
+            np.testing.assert_allclose(derivatives[order][:, :, column], slope, atol=1e-6)
 
 
 def test_a_plain_model_costs_nothing():

@@ -86,8 +86,8 @@ def test_landmarks_are_medians_over_the_frames_that_show_them():
     column = static.markers.labels.index("R.Heel")
     static.markers.positions[0, column] = np.nan
     static.markers.positions[1, column] += 1.0
-    found = jc.find_landmarks(static, read_marker_set("cleveland-clinic"))
-    np.testing.assert_allclose(found["heel_r"], standing_positions()["R.Heel"])
+    landmarks = jc.find_landmarks(static, read_marker_set("cleveland-clinic"))
+    np.testing.assert_allclose(landmarks["heel_r"], standing_positions()["R.Heel"])
 
 
 def test_plug_in_gait_without_widths_says_what_would_help():

@@ -46,9 +46,9 @@ def q():
 
 def test_coordinates_place_the_segment(root, q):
     rotation, translation = map(np.array, zip(*(place(root, row) for row in q), strict=True))
-    found = root.coordinates(rotation, translation)
-    np.testing.assert_allclose(found[:, :3], q[:, :3], atol=1e-12)
-    np.testing.assert_allclose((found[:, 3:] - q[:, 3:] + np.pi) % (2 * np.pi), np.pi, atol=1e-9)
+    coordinates = root.coordinates(rotation, translation)
+    np.testing.assert_allclose(coordinates[:, :3], q[:, :3], atol=1e-12)
+    np.testing.assert_allclose((coordinates[:, 3:] - q[:, 3:] + np.pi) % (2 * np.pi), np.pi, atol=1e-9)
 
 
 def test_axes_and_centre_are_those_of_the_motion(root, q):
@@ -78,8 +78,8 @@ def test_a_load_about_the_centre_does_the_same_work(root, q):
 
 def test_what_the_centre_adds_to_a_load_when_it_moves(root, q):
     load = np.random.default_rng(2).normal(size=(9, 6))
-    found = root.centre_moves(load)
+    change = root.centre_moves(load)
     h = 1e-6
     for k in range(3):
         ahead, behind = (root.about_centre(q + s * h * np.eye(6)[k], load) for s in (1, -1))
-        np.testing.assert_allclose(-found[:, :, k], ((ahead - behind) / (2 * h))[:, 3:], atol=1e-7)
+        np.testing.assert_allclose(-change[:, :, k], ((ahead - behind) / (2 * h))[:, 3:], atol=1e-7)

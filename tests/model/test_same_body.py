@@ -31,17 +31,17 @@ def test_the_own_static_trial(person):
 def test_the_static_trial_of_a_person_of_another_size(person, size):
     static, walk, marker_set = person
     other = Markers(static.time, static.labels, size * static.positions)
-    told = body_trouble(other, walk, marker_set)
-    assert ("longer" if size < 1 else "shorter") in told
-    assert "another person" in told
+    trouble = body_trouble(other, walk, marker_set)
+    assert ("longer" if size < 1 else "shorter") in trouble
+    assert "another person" in trouble
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_markers_put_on_anew(person, seed):
     static, walk, marker_set = person
     offsets = np.random.default_rng(seed).normal(0.0, 0.012, (len(static.labels), 3))
-    (told,) = session_doubts(Markers(static.time, static.labels, static.positions + offsets), walk, marker_set)
-    assert "of another session" in told
+    (doubt,) = session_doubts(Markers(static.time, static.labels, static.positions + offsets), walk, marker_set)
+    assert "of another session" in doubt
 
 
 def test_one_marker_that_was_moved(person):
@@ -51,9 +51,9 @@ def test_one_marker_that_was_moved(person):
     places = walk.positions.copy()
     away = places[:, walk.labels.index(label)] - places[:, [walk.labels.index(one) for one in mates]].mean(axis=1)
     places[:, walk.labels.index(label)] += 0.06 * away / np.linalg.norm(away, axis=1, keepdims=True)
-    (told,) = session_doubts(static, Markers(walk.time, walk.labels, places), marker_set)
-    assert f"the marker {label}" in told
-    assert "elsewhere" in told
+    (doubt,) = session_doubts(static, Markers(walk.time, walk.labels, places), marker_set)
+    assert f"the marker {label}" in doubt
+    assert "elsewhere" in doubt
 
 
 def test_labels_that_were_exchanged(person):
@@ -63,5 +63,5 @@ def test_labels_that_were_exchanged(person):
         pytest.skip("the walk has no such markers")
     other = {knee: ankle, ankle: knee}
     labels = tuple(other.get(label, label) for label in walk.labels)
-    told = body_trouble(static, Markers(walk.time, labels, walk.positions), marker_set)
-    assert f"{knee} and {ankle} look swapped" in told or f"{ankle} and {knee} look swapped" in told
+    trouble = body_trouble(static, Markers(walk.time, labels, walk.positions), marker_set)
+    assert f"{knee} and {ankle} look swapped" in trouble or f"{ankle} and {knee} look swapped" in trouble

@@ -33,8 +33,8 @@ def test_the_own_stature_and_floor(person):
 @pytest.mark.parametrize("off_m", [-0.2, 0.2])
 def test_another_stature(person, off_m):
     static, marker_set, height_m = person
-    (told,) = stature_doubts(static, marker_set, height_m + off_m)
-    by_markers = float(told.partition("a stature of about ")[2].split()[0])
+    (doubt,) = stature_doubts(static, marker_set, height_m + off_m)
+    by_markers = float(doubt.partition("a stature of about ")[2].split()[0])
     assert by_markers == pytest.approx(height_m, abs=0.08)
 
 
@@ -43,8 +43,8 @@ def test_another_floor(person, rise_m):
     static, marker_set, _ = person
     markers = static.markers
     raised = Markers(markers.time, markers.labels, markers.positions + np.array([0.0, rise_m, 0.0]))
-    (told,) = floor_doubts(raised, marker_set)
-    assert "above the floor" in told
+    (doubt,) = floor_doubts(raised, marker_set)
+    assert "above the floor" in doubt
 
 
 def test_feet_that_are_not_marked_enough(person):

@@ -37,7 +37,7 @@ def with_force(walk, change, torque=1.0):
     return replace(walk, plates=replace(plates, force=force, moment=np.cross(point, force) + free))
 
 
-def told(walk):
+def trouble_of(walk):
     """What is said of the forces of a walk."""
     if trouble := loads_trouble(walk.plates):
         return trouble
@@ -52,7 +52,7 @@ def sorted_by_foot(walk):
 
 
 def test_sound_walks_are_not_doubted(walk):
-    assert told(walk) == ""
+    assert trouble_of(walk) == ""
 
 
 @pytest.mark.parametrize(
@@ -64,41 +64,43 @@ def test_sound_walks_are_not_doubted(walk):
     ],
 )
 def test_signs(walk, signs, words):
-    assert told(with_force(walk, lambda force: force * signs)).startswith(words)
+    assert trouble_of(with_force(walk, lambda force: force * signs)).startswith(words)
 
 
 @pytest.mark.parametrize(("axis", "name"), [(0, "X"), (2, "Z")])
 @pytest.mark.parametrize("offset", [-50.0, 50.0])
 def test_horizontal_offsets(walk, axis, name, offset):
     push = offset * np.eye(3)[axis]
-    found = told(with_force(walk, lambda force: force + (force[..., 1:2] > 0) * push))
-    assert f"N along {name} on average that do not accelerate the body" in found
-    assert f"show {'+' if offset > 0 else '-'}" in found
+    trouble = trouble_of(with_force(walk, lambda force: force + (force[..., 1:2] > 0) * push))
+    assert f"N along {name} on average that do not accelerate the body" in trouble
+    assert f"show {'+' if offset > 0 else '-'}" in trouble
 
 
 @pytest.mark.parametrize("offset", [30.0, 50.0, 100.0])
 def test_vertical_offsets(walk, offset):
-    found = told(with_force(walk, lambda force: force + offset * np.eye(3)[1]))
-    assert f"a steady {offset:.0f} N while nobody stands on it" in found
-    assert "zero" in found
+    trouble = trouble_of(with_force(walk, lambda force: force + offset * np.eye(3)[1]))
+    assert f"a steady {offset:.0f} N while nobody stands on it" in trouble
+    assert "zero" in trouble
 
 
 def test_torques_in_newton_millimetres(walk):
-    assert "they are in N mm" in told(with_force(walk, lambda force: force, torque=1000.0))
+    assert "they are in N mm" in trouble_of(with_force(walk, lambda force: force, torque=1000.0))
 
 
 def test_forces_with_another_axis_up(walk):
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     plates = walk.plates
     up = replace(walk, plates=replace(plates, force=plates.force @ turn.T, moment=plates.moment @ turn.T))
-    assert "the largest forces point along Z" in told(up)
+    assert "the largest forces point along Z" in trouble_of(up)
 
 
 @pytest.mark.parametrize("angle", [90, -90])
 def test_forces_turned(walk, angle):
     cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-    assert told(with_force(walk, lambda force: force @ turn.T)).startswith(f"the forces are turned by {angle} degrees")
+    assert trouble_of(with_force(walk, lambda force: force @ turn.T)).startswith(
+        f"the forces are turned by {angle} degrees"
+    )
 
 
 @pytest.mark.parametrize(("factor", "words"), [(2.0, "less than their true rate"), (0.5, "more than their true rate")])
@@ -110,8 +112,8 @@ def test_a_file_at_another_rate(walk, factor, words):
 
     markers, plates = walk.markers, replace(walk.plates, time=stretched(walk.plates.time))
     slow = replace(walk, markers=Markers(stretched(markers.time), markers.labels, markers.positions), plates=plates)
-    found = told(slow)
+    trouble = trouble_of(slow)
     if factor < 1 and np.ptp(sorted_by_foot(slow).windows()[0]) < 0.45:
         pytest.skip("too short at twice the rate")
-    assert words in found
-    assert float(found.partition("a factor of about ")[2].split(";")[0]) == pytest.approx(2.0, rel=0.2)
+    assert words in trouble
+    assert float(trouble.partition("a factor of about ")[2].split(";")[0]) == pytest.approx(2.0, rel=0.2)

@@ -44,9 +44,9 @@ def contacts(walked, side) -> list[tuple[float, float]]:
 
 
 def test_strides_run_from_contact_to_contact(walked, measured):
-    found = strides_of(walked.skeleton, measured)
-    assert {stride.side for stride in found} == set(FEET)
-    for stride in found:
+    strides = strides_of(walked.skeleton, measured)
+    assert {stride.side for stride in strides} == set(FEET)
+    for stride in strides:
         assert stride.on_plates
         starts = [start for start, _ in contacts(walked, stride.side)]
         assert min(abs(stride.start_s - start) for start in starts) < 1e-9
@@ -54,7 +54,7 @@ def test_strides_run_from_contact_to_contact(walked, measured):
         assert stride.toe_off_s == off
         assert stride.opposite_toe_off_s < stride.opposite_strike_s < stride.toe_off_s < stride.end_s
     for side in FEET:
-        own = [stride for stride in found if stride.side == side]
+        own = [stride for stride in strides if stride.side == side]
         assert [stride.number for stride in own] == list(range(1, len(own) + 1))
         assert all(a.end_s == b.start_s for a, b in pairwise(own))
 
@@ -64,12 +64,12 @@ def test_where_no_plate_sees_a_contact_the_motion_tells_it(walked, trial, measur
     blind = trial.loads.time > 1.6
     force, moment = (np.where(blind[:, None, None], 0.0, part) for part in (trial.loads.force, trial.loads.moment))
     few = replace(trial, loads=replace(trial.loads, force=force, moment=moment), measured=trial.markers.time < 1.5)
-    found, known = (strides_of(walked.skeleton, k) for k in (kinematics_of(walked, few), measured))
-    assert [(s.side, s.number) for s in found] == [(s.side, s.number) for s in known]
-    assert not all(stride.on_plates for stride in found)
+    strides, known = (strides_of(walked.skeleton, k) for k in (kinematics_of(walked, few), measured))
+    assert [(s.side, s.number) for s in strides] == [(s.side, s.number) for s in known]
+    assert not all(stride.on_plates for stride in strides)
     gaps = [
         getattr(a, name) - getattr(b, name)
-        for a, b in zip(found, known, strict=True)
+        for a, b in zip(strides, known, strict=True)
         for name in ("start_s", "end_s", "toe_off_s")
     ]
     assert np.abs(gaps).max() < 2.5 * FRAME
@@ -100,10 +100,10 @@ def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, bel
     slid = rotated.markers.positions - (turn @ [belt_m_s, 0.0, 0.0]) * walked.time[:, None, None]
     kinematics = kinematics_of(walked, replace(rotated, markers=replace(rotated.markers, positions=slid)))
     strides = strides_of(walked.skeleton, kinematics)
-    found = spatiotemporal(feet_under_pelvis(walked.skeleton, kinematics), strides)
-    assert len(found) >= 4
+    measures = spatiotemporal(feet_under_pelvis(walked.skeleton, kinematics), strides)
+    assert len(measures) >= 4
     pelvis = walked.motion.q[:, 0]
-    for stride, one in zip(strides, found, strict=True):
+    for stride, one in zip(strides, measures, strict=True):
         start, end = np.interp([stride.start_s, stride.end_s], walked.time, pelvis)
         speed = (end - start) / (stride.end_s - stride.start_s)
         # this walker's standing heel slides by 0.02 m/s, which on a belt cannot be told from the belt
@@ -113,19 +113,19 @@ def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, bel
         assert 0.4 * one.stride_length_m < one.step_length_m < 0.6 * one.stride_length_m
         assert 0.02 < one.step_width_m < 0.25
     for side in FEET:
-        own = [one for stride, one in zip(strides, found, strict=True) if stride.side == side]
+        own = [one for stride, one in zip(strides, measures, strict=True) if stride.side == side]
         loaded = [(end - start) for start, end in contacts(walked, side)]
         assert own[0].stance_percent == pytest.approx(100 * loaded[0] / own[0].stride_time_s, abs=1.5)
     both = (walked.foot_loads[:, :, 1] > LOAD_THRESHOLD_N).all(axis=1)
     first = strides[0]
     inside = (walked.time >= first.start_s) & (walked.time < first.end_s)
-    assert found[0].double_support_percent == pytest.approx(100 * both[inside].mean(), abs=3.0)
+    assert measures[0].double_support_percent == pytest.approx(100 * both[inside].mean(), abs=3.0)
 
 
 def test_turning_points_are_maxima_that_rise_enough():
     time = np.arange(0, 10, 0.01)
     wave = np.sin(2 * np.pi * 0.5 * time) + 0.04 * np.sin(2 * np.pi * 9 * time)
-    found = turning_points(wave, 0.5)
-    np.testing.assert_allclose(time[found], [0.5, 2.5, 4.5, 6.5, 8.5], atol=0.06)
+    maxima = turning_points(wave, 0.5)
+    np.testing.assert_allclose(time[maxima], [0.5, 2.5, 4.5, 6.5, 8.5], atol=0.06)
     assert turning_points(wave, 3.0) == []
     assert turning_points(np.arange(5.0), 0.5) == []  # still rising at its end

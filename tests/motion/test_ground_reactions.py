@@ -45,36 +45,36 @@ def struck() -> np.ndarray:
 
 def test_what_one_foot_passes_to_the_other_stays_as_sharp_as_it_is():
     wrench = passed_on()
-    found = ground_reactions(kinematics(wrench), 12.0)
-    assert found.cutoff_hz is None
-    np.testing.assert_allclose(found.wrench, wrench, atol=1e-9)
-    assert found.impact_n == pytest.approx(0.0, abs=1e-9)
+    reactions = ground_reactions(kinematics(wrench), 12.0)
+    assert reactions.cutoff_hz is None
+    np.testing.assert_allclose(reactions.wrench, wrench, atol=1e-9)
+    assert reactions.impact_n == pytest.approx(0.0, abs=1e-9)
 
 
 def test_an_impact_is_taken_off_the_foot_that_makes_it():
     wrench = struck()
-    found = ground_reactions(kinematics(wrench), 12.0)
-    assert found.impact_n > 10.0
+    reactions = ground_reactions(kinematics(wrench), 12.0)
+    assert reactions.impact_n > 10.0
     at = np.argmax(wrench[:, 0, 1])
     slow = smooth(TIME, wrench[..., :3].sum(axis=1), 12.0)(TIME)[at]
-    left = found.wrench[at, :, :3].sum(axis=0) - slow
+    left = reactions.wrench[at, :, :3].sum(axis=0) - slow
     assert np.linalg.norm(left) < 0.1 * np.linalg.norm(wrench[at, :, :3].sum(axis=0) - slow)
-    assert np.abs(found.wrench - wrench)[at, 1, 1] < 0.05 * np.abs(found.wrench - wrench)[at, 0, 1]
-    np.testing.assert_allclose(centre_of_pressure(found.wrench[at]), PLACES, atol=1e-6)
+    assert np.abs(reactions.wrench - wrench)[at, 1, 1] < 0.05 * np.abs(reactions.wrench - wrench)[at, 0, 1]
+    np.testing.assert_allclose(centre_of_pressure(reactions.wrench[at]), PLACES, atol=1e-6)
 
 
 def test_the_user_may_keep_impacts_and_still_hears_of_them():
     wrench = struck()
-    found = ground_reactions(kinematics(wrench), 12.0, "none")
-    np.testing.assert_array_equal(found.wrench, wrench)
-    assert found.impact_n > 10.0
+    reactions = ground_reactions(kinematics(wrench), 12.0, "none")
+    np.testing.assert_array_equal(reactions.wrench, wrench)
+    assert reactions.impact_n > 10.0
 
 
 def test_the_user_may_ask_for_a_low_pass():
-    found = ground_reactions(kinematics(passed_on()), 12.0, 8.0)
-    assert found.cutoff_hz == 8.0
+    reactions = ground_reactions(kinematics(passed_on()), 12.0, 8.0)
+    assert reactions.cutoff_hz == 8.0
     expected = smooth(TIME, passed_on().reshape(-1, 12), 8.0)(TIME).reshape(-1, 2, 6)
-    np.testing.assert_allclose(found.wrench, expected)
+    np.testing.assert_allclose(reactions.wrench, expected)
 
 
 @pytest.mark.parametrize(("noise_n", "cutoff_hz"), [(0.9, None), (4.0, 31.25), (30.0, 10.0)])
@@ -82,22 +82,22 @@ def test_noisy_plates_are_low_passed_as_far_as_their_noise_wants(noise_n, cutoff
     rng = np.random.default_rng(0)
     wrench = passed_on()
     noisy = wrench + rng.normal(0.0, noise_n, wrench.shape)
-    found = measured_reactions(kinematics(noisy, noise_n))
-    assert found.cutoff_hz == cutoff_hz
+    reactions = measured_reactions(kinematics(noisy, noise_n))
+    assert reactions.cutoff_hz == cutoff_hz
     if cutoff_hz == 31.25:
         calm = slice(300, 700)
-        assert np.std((found.wrench - wrench)[calm, 1, 1]) < 1.3
+        assert np.std((reactions.wrench - wrench)[calm, 1, 1]) < 1.3
 
 
 def test_between_samples_loads_are_splines_of_force_point_and_torque():
-    found = measured_reactions(kinematics(passed_on()))
-    np.testing.assert_allclose(found.at(TIME[5:-5]), found.wrench[5:-5], atol=1e-9)
+    reactions = measured_reactions(kinematics(passed_on()))
+    np.testing.assert_allclose(reactions.at(TIME[5:-5]), reactions.wrench[5:-5], atol=1e-9)
     h, at = 1e-6, TIME[100:-100:50] + 0.0003
-    slope = (found.at(at + h) - found.at(at - h)) / (2 * h)
-    np.testing.assert_allclose(found.rate(at), slope, atol=1e-4 * np.abs(slope).max())
+    slope = (reactions.at(at + h) - reactions.at(at - h)) / (2 * h)
+    np.testing.assert_allclose(reactions.rate(at), slope, atol=1e-4 * np.abs(slope).max())
 
 
 def test_a_foot_off_the_ground_keeps_its_last_centre_of_pressure():
-    found = measured_reactions(kinematics(passed_on()))
-    np.testing.assert_allclose(found.point[:, 0], np.broadcast_to(PLACES[0], (len(TIME), 3)), atol=1e-9)
-    assert not found.wrench[:900, 0].any()
+    reactions = measured_reactions(kinematics(passed_on()))
+    np.testing.assert_allclose(reactions.point[:, 0], np.broadcast_to(PLACES[0], (len(TIME), 3)), atol=1e-9)
+    assert not reactions.wrench[:900, 0].any()

@@ -87,9 +87,9 @@ def test_a_clamped_range_holds_and_another_one_does_not(skeleton):
     markers = markers_of(skeleton, q)
     for clamped, expected in ((False, q[:, elbow]), (True, np.maximum(q[:, elbow], 0.0))):
         ranges = {**skeleton.ranges, "elbow_flex_r": Range(0.0, 2.6, clamped)}
-        found = solve_ik(replace(skeleton, ranges=ranges), markers)
-        np.testing.assert_allclose(found.q[:, elbow], expected, atol=1e-6)
-        assert found.converged.all()
+        ik = solve_ik(replace(skeleton, ranges=ranges), markers)
+        np.testing.assert_allclose(ik.q[:, elbow], expected, atol=1e-6)
+        assert ik.converged.all()
 
 
 def test_an_arm_that_swings_through_more_than_half_a_turn_stays_on_its_branch(skeleton):
@@ -101,8 +101,8 @@ def test_an_arm_that_swings_through_more_than_half_a_turn_stays_on_its_branch(sk
         [2.8 * np.sin(5.0 * time) ** 2, -0.5 * np.sin(4.0 * time), 1.2 + 0.9 * np.sin(7.0 * time)]
     )
     markers = noisy(markers_of(skeleton, q), 0.005)
-    found = solve_ik(skeleton, markers).q
-    assert np.abs(found - q)[:, columns].max() < 0.15
+    solved = solve_ik(skeleton, markers).q
+    assert np.abs(solved - q)[:, columns].max() < 0.15
 
 
 @pytest.mark.parametrize(
@@ -222,8 +222,8 @@ def test_markers_unknown_to_the_skeleton_are_ignored(skeleton):
 def test_turning_round_twice_gives_a_continuous_angle(skeleton):
     q = np.zeros((60, len(skeleton.coordinates)))
     q[:, 5] = np.linspace(0.0, 4 * np.pi, 60)
-    found = solve_ik(skeleton, markers_of(skeleton, q)).q[:, 5]
-    np.testing.assert_allclose(np.diff(found), 4 * np.pi / 59, atol=1e-6)
+    angle = solve_ik(skeleton, markers_of(skeleton, q)).q[:, 5]
+    np.testing.assert_allclose(np.diff(angle), 4 * np.pi / 59, atol=1e-6)
 
 
 def test_too_few_pelvis_markers_name_the_trial(skeleton):
@@ -274,11 +274,11 @@ def opensim_ik(model, markers: Markers) -> tuple[np.ndarray, float]:
     coordinates = [oracle.getCoordinateSet().get(name) for name in skeleton.coordinates]
     for coordinate, value in zip(coordinates, [0, 1] + [0] * 25, strict=True):
         coordinate.setValue(state, float(value))
-    found = []
+    rows = []
     for k, time in enumerate(markers.time):
         state.setTime(float(time))
         solver.assemble(state) if k == 0 else solver.track(state)
-        found.append([coordinate.getValue(state) for coordinate in coordinates])
-    q = np.array(found)
+        rows.append([coordinate.getValue(state) for coordinate in coordinates])
+    q = np.array(rows)
     distance = np.linalg.norm(markers.positions - skeleton.marker_positions(skeleton.pose(q)), axis=-1)
     return q, float(np.sqrt(np.mean(distance**2)))

@@ -73,48 +73,48 @@ def test_facing_needs_both_asis(trial):
 
 
 def test_smoothed_coordinates_and_derivatives_are_near_the_truth(skeleton, trial, motion):
-    found = solve_kinematics(skeleton, trial, 0.0, "gcv")
-    here = found.frames
+    kinematics = solve_kinematics(skeleton, trial, 0.0, "gcv")
+    here = kinematics.frames
     for name, share in (("q", 0.01), ("qd", 0.05), ("qdd", 0.15)):
         truth = getattr(motion, name)[here]
-        error = getattr(found.motion, name) - truth
+        error = getattr(kinematics.motion, name) - truth
         assert np.sqrt(np.mean(error**2)) < share * np.sqrt(np.mean(truth**2))
-    assert found.notes[0] == "read from nowhere"
-    assert "smoothed at 6.0 Hz, where the search" in found.notes[1]
-    assert "beyond the usual range of a joint, by at most: knee_angle_r (20 deg)" in found.notes[2]
-    assert len(found.notes) == 3
-    assert found.ik.converged.all()
+    assert kinematics.notes[0] == "read from nowhere"
+    assert "smoothed at 6.0 Hz, where the search" in kinematics.notes[1]
+    assert "beyond the usual range of a joint, by at most: knee_angle_r (20 deg)" in kinematics.notes[2]
+    assert len(kinematics.notes) == 3
+    assert kinematics.ik.converged.all()
 
 
 def test_the_window_keeps_off_the_ends_by_half_a_period(skeleton, trial):
-    found = solve_kinematics(skeleton, trial, 0.0, 10.0)
-    assert found.window_s == pytest.approx((0.05, 1.95))
-    np.testing.assert_allclose(found.time, trial.markers.time[5:196])
-    assert found.cutoff_hz == 10.0
+    kinematics = solve_kinematics(skeleton, trial, 0.0, 10.0)
+    assert kinematics.window_s == pytest.approx((0.05, 1.95))
+    np.testing.assert_allclose(kinematics.time, trial.markers.time[5:196])
+    assert kinematics.cutoff_hz == 10.0
 
 
 def test_loads_are_smoothed_at_the_cutoff_and_sampled_at_the_frames(skeleton, trial):
-    found = solve_kinematics(skeleton, trial, 0.0, 10.0)
-    expected = 350.0 + 100.0 * np.sin(6.0 * found.time)[:, None] * [1, -1]
-    np.testing.assert_allclose(found.foot_loads[:, :, 1], expected, atol=1.0)
-    assert found.foot_loads.shape == (len(found.time), 2, 6)
+    kinematics = solve_kinematics(skeleton, trial, 0.0, 10.0)
+    expected = 350.0 + 100.0 * np.sin(6.0 * kinematics.time)[:, None] * [1, -1]
+    np.testing.assert_allclose(kinematics.foot_loads[:, :, 1], expected, atol=1.0)
+    assert kinematics.foot_loads.shape == (len(kinematics.time), 2, 6)
 
 
 def test_a_short_gap_is_bridged(skeleton, trial, motion):
     gapped = hidden(trial, ["shank_r", "foot_r"], 1.0, 1.05)
-    found = solve_kinematics(skeleton, gapped, 0.0, 10.0)
+    kinematics = solve_kinematics(skeleton, gapped, 0.0, 10.0)
     knee = skeleton.coordinates.index("knee_angle_r")
-    assert np.isnan(found.ik.q[100:106, knee]).all()
-    assert found.window_s == pytest.approx((0.05, 1.95))
-    assert np.abs(found.motion.q[:, knee] - motion.q[found.frames, knee]).max() < np.radians(1.0)
+    assert np.isnan(kinematics.ik.q[100:106, knee]).all()
+    assert kinematics.window_s == pytest.approx((0.05, 1.95))
+    assert np.abs(kinematics.motion.q[:, knee] - motion.q[kinematics.frames, knee]).max() < np.radians(1.0)
 
 
 @pytest.mark.parametrize(("start", "window"), [(0.6, (0.91, 1.95)), (1.2, (0.05, 1.19))])
 def test_a_long_gap_ends_the_window(skeleton, trial, start, window):
     gapped = hidden(trial, ["shank_r", "foot_r"], start, start + 0.3)
-    found = solve_kinematics(skeleton, gapped, 0.0, 10.0)
-    assert found.window_s == pytest.approx(window)
-    assert any("only the measured stretch with most motion" in note for note in found.notes)
+    kinematics = solve_kinematics(skeleton, gapped, 0.0, 10.0)
+    assert kinematics.window_s == pytest.approx(window)
+    assert any("only the measured stretch with most motion" in note for note in kinematics.notes)
 
 
 def test_a_walk_is_taken_rather_than_a_longer_stand(skeleton, trial, motion):
@@ -135,8 +135,8 @@ def test_the_foot_alone_tells_where_the_shank_is(skeleton, trial):
 def test_frames_without_measured_contact_are_left_out(skeleton, trial):
     measured = np.ones(201, dtype=bool)
     measured[80:90] = False
-    found = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
-    assert found.window_s == pytest.approx((0.90, 1.95))
+    kinematics = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
+    assert kinematics.window_s == pytest.approx((0.90, 1.95))
 
 
 def test_no_usable_frame_names_trial_and_counts(skeleton, trial):

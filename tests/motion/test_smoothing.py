@@ -135,9 +135,9 @@ def test_gcv_attains_the_minimum_of_the_dense_gcv():
         return 80 * (residual @ residual) / (80 - np.trace(influence)) ** 2
 
     for column in range(3):
-        found = dense_gcv(spline.p[column], column)
+        attained = dense_gcv(spline.p[column], column)
         around = [dense_gcv(spline.p[column] * factor, column) for factor in np.geomspace(1e-4, 1e4, 33)]
-        assert found <= min(around) * (1 + 1e-6)
+        assert attained <= min(around) * (1 + 1e-6)
 
 
 def test_gcv_finds_noise_and_derivatives():

@@ -20,11 +20,11 @@ def changed(fit, segment, column, change):
 
 def outlines(figure):
     """Traces of the segments by their names; one per drawing that shows it, left to right."""
-    found = {}
+    traces = {}
     for trace in figure.data:
         if trace.get("fill"):
-            found.setdefault(trace["text"].partition(":")[0], []).append(trace)
-    return found
+            traces.setdefault(trace["text"].partition(":")[0], []).append(trace)
+    return traces
 
 
 def centres(figure, name):

@@ -22,15 +22,15 @@ def moved(fit, segment, column, sds):
 
 def test_what_changed_beyond_its_error_bars_is_found(fit):
     other = moved(moved(fit, "thigh_r", 0, 2.1), "shank_l", 3, -1.8)
-    found = {(one.segment, one.parameter): one for one in differences(fit, other)}
-    assert len(found) == 120
-    assert [key for key, one in found.items() if one.changed] == [("thigh_r", "mass")]
-    one = found["shank_l", "com_z"]
+    compared = {(one.segment, one.parameter): one for one in differences(fit, other)}
+    assert len(compared) == 120
+    assert [key for key, one in compared.items() if one.changed] == [("thigh_r", "mass")]
+    one = compared["shank_l", "com_z"]
     assert one.change / one.sd == pytest.approx(-1.8)
     columns = pd.DataFrame(comparison_columns({"before": fit, "after": other}))
     assert columns[columns.changed].segment.tolist() == ["thigh_r"]
-    told = Elements(render_comparison({"before": fit, "after": other})).text
-    assert "1 of 120 parameters changed beyond their error bars" in told
+    shown = Elements(render_comparison({"before": fit, "after": other})).text
+    assert "1 of 120 parameters changed beyond their error bars" in shown
     assert "None of 120" in Elements(render_comparison({"before": fit, "again": fit})).text
 
 
@@ -68,9 +68,9 @@ def test_moments_are_those_of_cycles(fit):
 
 def test_the_command(fit, demo_run, tmp_path):
     save_fit(moved(fit, "torso", 0, 3.0), tmp_path / "again")
-    told = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
-    assert told.status == 0, told.err
-    assert "1 of 120 parameters changed beyond their error bars (mass of torso)" in " ".join(told.out.split())
+    outcome = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
+    assert outcome.status == 0, outcome.err
+    assert "1 of 120 parameters changed beyond their error bars (mass of torso)" in " ".join(outcome.out.split())
     assert {path.name for path in (tmp_path / "comparison").glob("[!.]*")} == {"compare.html", "compare.csv"}
     again = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
     assert again.status == 0, again.err  # its own results are replaced

@@ -72,7 +72,7 @@ def rms(vectors) -> float:
 @EVERY_CASE
 def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_path, name):
     case, folder = CASES[name], folder_of(CASES[name])
-    told = json.loads((folder / "fit.json").read_text())["trials"][0]
+    trial = json.loads((folder / "fit.json").read_text())["trials"][0]
     theirs = inverse_dynamics_tool(
         opensim, folder / "model.osim", folder / "kinematics.mot", folder / LOADS_FILE, tmp_path
     )
@@ -80,8 +80,8 @@ def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_p
     np.testing.assert_allclose(theirs.index, ours.index, atol=1e-6)
     force = theirs[[f"pelvis_t{axis}_force" for axis in "xyz"]]
     moment = theirs[[f"pelvis_{turn}_moment" for turn in ("tilt", "list", "rotation")]]
-    assert rms(force) == pytest.approx(told["full_residual_force_rms_N"]["estimate"], rel=case.residual)
-    assert rms(moment) == pytest.approx(told["full_residual_moment_rms_Nm"]["estimate"], rel=case.residual)
+    assert rms(force) == pytest.approx(trial["full_residual_force_rms_N"]["estimate"], rel=case.residual)
+    assert rms(moment) == pytest.approx(trial["full_residual_moment_rms_Nm"]["estimate"], rel=case.residual)
     joints = [column for column in ours if not column.startswith("pelvis_")]
     assert len(joints) >= 15
     gap = (ours[joints] - theirs[joints]).abs().max() / ours[joints].abs().max()
@@ -148,10 +148,10 @@ def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_pa
     again = fitted(tmp_path / "out", *arguments, "--forces", folder / FORCES_FILE, "--loads", folder / LOADS_FILE)
     first = json.loads((folder / "fit.json").read_text())
     assert again.trial["window_s"] == pytest.approx(first["trials"][0]["window_s"])
-    instruments = {name: told for name, told in again.summary["calibration"].items() if ":" in name}
+    instruments = {name: entry for name, entry in again.summary["calibration"].items() if ":" in name}
     assert len(instruments) == 9
-    for name, told in instruments.items():
-        assert abs(told["value"]) < told["sd"], name
+    for name, entry in instruments.items():
+        assert abs(entry["value"]) < entry["sd"], name
     for kind, unit in (("force", "N"), ("moment", "Nm")):
         key = f"residual_{kind}_rms_{unit}"
         assert again.trial[key]["estimate"] < 1.1 * first["trials"][0][key]["estimate"]

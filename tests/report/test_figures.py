@@ -58,10 +58,10 @@ def test_names_of_bodies_are_shown_as_they_are(fit):
     evil = replace(fit, **bodies, skeleton=replace(fit.skeleton, joints=tuple(joints), markers=tuple(worn)))
     figures = [change_figure(evil), departure_figure(evil), information_figure(evil), body_figure(evil)]
     for figure in figures:
-        told = Figure(figure.data, {**figure.layout, "meta": {}}).to_json()  # plotly shows nothing of meta
-        assert "&lt;b&gt;" in told
-        assert "<b>=cmd" not in told
-        assert "<a href" not in told
+        text = Figure(figure.data, {**figure.layout, "meta": {}}).to_json()  # plotly shows nothing of meta
+        assert "&lt;b&gt;" in text
+        assert "<b>=cmd" not in text
+        assert "<a href" not in text
 
 
 def test_a_figure_is_written_with_its_gaps_and_nothing_else_that_json_does_not_know():
@@ -154,13 +154,13 @@ def estimates(figure):
 def test_intervals_are_those_of_the_posterior(fit):
     figure = as_plotly(departure_figure(fit, range(10)))
     away, posterior = departures(fit), fit.posterior
-    found = estimates(figure)
-    assert len(found) == away.size
+    intervals = estimates(figure)
+    assert len(intervals) == away.size
     np.testing.assert_allclose(
-        found["x", 3], (away[3, 0], 1.96 * posterior.sd[3, 0] / posterior.prior_sd[3, 0]), rtol=1e-5
+        intervals["x", 3], (away[3, 0], 1.96 * posterior.sd[3, 0] / posterior.prior_sd[3, 0]), rtol=1e-5
     )
     lowest, highest = figure.layout.xaxis.range
-    assert all(lowest < x - half and x + half < highest for x, half in found.values())
+    assert all(lowest < x - half and x + half < highest for x, half in intervals.values())
 
 
 def test_changes_are_in_kg_mm_and_kg_m2(fit, two_level):
@@ -170,12 +170,12 @@ def test_changes_are_in_kg_mm_and_kg_m2(fit, two_level):
         *(f"<b>CoM {way} (mm)</b>" for way in ("forward", "upward", "to the right")),
         "<b>Ixx (kg m2)</b>",
     ]
-    change, sd, found = fit.estimate.table() - fit.literature.table(), fit.posterior.sd, estimates(figure)
-    assert len(found) == 12 * 7
+    change, sd, shown = fit.estimate.table() - fit.literature.table(), fit.posterior.sd, estimates(figure)
+    assert len(shown) == 12 * 7
     for place, k, factor in (("x", 0, 1.0), ("x3", 2, 1e3), ("x7", 6, 1.0)):
         for row in range(12):
             expected = np.array([change[row, k], 1.96 * sd[row, k]]) * factor
-            np.testing.assert_allclose(found[place, row], expected, rtol=1e-5)
+            np.testing.assert_allclose(shown[place, row], expected, rtol=1e-5)
     prior = next(trace for trace in figure.data if trace.xaxis == "x2" and trace.name == "literature, 95 %")
     np.testing.assert_allclose(prior.error_x.array, 1960 * fit.posterior.prior_sd[:, 1], rtol=1e-5)
     plain = as_plotly(change_figure(two_level))

@@ -39,25 +39,25 @@ def test_files(saved):
 
 def test_fit_json_keeps_its_contract(saved):
     fit, folder = saved
-    told = json.loads((folder / "fit.json").read_text())
-    assert told["kinertia"] == version("kinertia")
-    assert told["method"] == "two-level"
-    assert told["subject"] == {
+    fit_summary = json.loads((folder / "fit.json").read_text())
+    assert fit_summary["kinertia"] == version("kinertia")
+    assert fit_summary["method"] == "two-level"
+    assert fit_summary["subject"] == {
         "name": "A",
         "sex": "male",
         "mass_kg": fit.subject.mass_kg,
         "height_m": fit.subject.height_m,
     }
-    assert told["settings"] == Settings(method="two-level").model_dump()
-    assert told["total_mass_kg"] == {
+    assert fit_summary["settings"] == Settings(method="two-level").model_dump()
+    assert fit_summary["total_mass_kg"] == {
         "measured": fit.subject.mass_kg,
         "literature": fit.literature.mass_kg.sum(),
         "estimate": fit.estimate.mass_kg.sum(),
     }
-    assert told["warnings"] == list(fit.warnings)
-    assert told["notes"] == list(fit.notes)
-    assert told["converged"] == fit.converged
-    (trial,) = told["trials"]
+    assert fit_summary["warnings"] == list(fit.warnings)
+    assert fit_summary["notes"] == list(fit.notes)
+    assert fit_summary["converged"] == fit.converged
+    (trial,) = fit_summary["trials"]
     assert trial["name"] == "early"
     assert trial["n_frames"] == 364
     assert trial["n_dynamic_frames"] == len(fit.trials[0].time) == 31
@@ -127,13 +127,13 @@ def test_opensim_reads_the_joint_loads(saved, opensim, file, stage):
 def test_opensim_reads_residuals_that_give_the_numbers_of_fit_json(saved, opensim):
     _, folder = saved
     _, labels, values = table(opensim, folder / "residuals.sto")
-    told = json.loads((folder / "fit.json").read_text())["trials"][0]
+    trial = json.loads((folder / "fit.json").read_text())["trials"][0]
     assert len(labels) == 24
     for stage in (*STAGES, "estimate_full"):
         for kind, unit in (("force", "N"), ("moment", "Nm")):
             size = np.linalg.norm(values[:, [labels.index(f"{stage}_{kind}_{axis}") for axis in "xyz"]], axis=1)
             which, name = ("full_", "estimate") if stage == "estimate_full" else ("", stage)
-            rms, largest = (told[f"{which}residual_{kind}_{value}_{unit}"][name] for value in ("rms", "max"))
+            rms, largest = (trial[f"{which}residual_{kind}_{value}_{unit}"][name] for value in ("rms", "max"))
             assert rms == pytest.approx(np.sqrt(np.mean(size**2)), rel=1e-5)
             assert largest == pytest.approx(size.max(), rel=1e-5)
 
@@ -164,8 +164,8 @@ def test_marker_rms_is_over_visible_markers(short_fit):
     errors = {stage: values.copy() for stage, values in trial.marker_errors_m.items()}
     errors["ik"][:, 0] = np.nan
     errors["ik"][:, 1:] = 0.003
-    told = summary(replace(short_fit, trials=(replace(trial, marker_errors_m=errors),)))
-    assert told["trials"][0]["marker_rms_m"]["ik"] == pytest.approx(0.003)
+    fit_summary = summary(replace(short_fit, trials=(replace(trial, marker_errors_m=errors),)))
+    assert fit_summary["trials"][0]["marker_rms_m"]["ik"] == pytest.approx(0.003)
 
 
 def test_several_trials_have_a_folder_each(short_fit, tmp_path):

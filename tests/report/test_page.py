@@ -39,11 +39,11 @@ def page(fit):
 @pytest.mark.parametrize("which", ["fit", "two_level"])
 def test_headline_follows_the_worst_judgement(which, request):
     fit = request.getfixturevalue(which)
-    told = words(fit)
+    page_words = words(fit)
     levels = [verdict.level for verdict in verdicts(fit)]
-    assert told.judgements == tuple(verdicts(fit))
+    assert page_words.judgements == tuple(verdicts(fit))
     worst = "fail" if "fail" in levels else "caution" if "caution" in levels else "pass"
-    assert told.level == ("caution" if worst == "pass" and fit.warnings else worst)
+    assert page_words.level == ("caution" if worst == "pass" and fit.warnings else worst)
     assert words(replace(fit, warnings=("a plate is off",))).level != "pass"
     stopped = words(replace(fit, converged=False))
     assert stopped.level == "fail"
@@ -72,17 +72,17 @@ def test_what_the_data_say_is_counted(fit, two_level):
     sd = fit.posterior.prior_sd.copy()
     sd[0] *= np.sqrt(1 - 0.8)
     sd[1] *= np.sqrt(1 - 0.5)
-    told = words(replace(fit, posterior=replace(fit.posterior, sd=sd))).knowledge
-    assert "10 are measured " in told[0]
-    assert "10 informed by the data;" in told[0]
-    assert "100 are hardly informed" in told[0]
-    assert "essentially the literature's" in told[0]
-    assert told[1:4] == (
+    knowledge = words(replace(fit, posterior=replace(fit.posterior, sd=sd))).knowledge
+    assert "10 are measured " in knowledge[0]
+    assert "10 informed by the data;" in knowledge[0]
+    assert "100 are hardly informed" in knowledge[0]
+    assert "essentially the literature's" in knowledge[0]
+    assert knowledge[1:4] == (
         "masses measured: pelvis",
         "masses informed by the data: torso",
         "masses hardly informed by the data, not to be read as this person's: thigh; shank; foot; upper arm; forearm",
     )
-    assert told[4].startswith("17 combinations cannot be seen in any motion")
+    assert knowledge[4].startswith("17 combinations cannot be seen in any motion")
     (only,) = words(two_level).knowledge
     assert "no error bars" in only
 
@@ -102,10 +102,10 @@ def of_model(fit):
 
 
 def test_held_segments_are_named_and_not_counted(of_model):
-    told = words(of_model).knowledge
-    assert told[0].startswith("of 100 parameters")
-    assert "kept as the model has them, not estimated: forearm" in told
-    assert not any("forearm" in sentence for sentence in told if sentence.startswith("masses"))
+    knowledge = words(of_model).knowledge
+    assert knowledge[0].startswith("of 100 parameters")
+    assert "kept as the model has them, not estimated: forearm" in knowledge
+    assert not any("forearm" in sentence for sentence in knowledge if sentence.startswith("masses"))
     page = render(of_model)
     figures = figures_of(page)
     for figure in ("changes", "bsp-change", "bsp-departure", "products-change"):
@@ -173,42 +173,42 @@ def test_the_change_of_motion_is_told_against_inverse_kinematics(fit):
 
 
 def test_page_has_all_parts_and_is_small_enough(page):
-    told = Elements(page)
-    sections = [attrs["id"] for attrs in told.named("section")]
+    elements = Elements(page)
+    sections = [attrs["id"] for attrs in elements.named("section")]
     assert sections == PARTS
     assert len(page.encode()) <= MOST_BYTES
     assert page.count("* plotly.js (basic - minified) v") == 1
-    ids = [attrs["id"] for _, attrs in told.tags if "id" in attrs]
+    ids = [attrs["id"] for _, attrs in elements.tags if "id" in attrs]
     assert len(set(ids)) == len(ids)
-    links = {attrs["href"] for attrs in told.named("a")}
+    links = {attrs["href"] for attrs in elements.named("a")}
     assert links == {f"#{name}" for name in (*PARTS, "main")}
 
 
 def test_plotly_is_the_file_that_its_readme_names():
     folder = Path(page_module.__file__).parent / "templates" / "plotly"
-    told, script = (folder / "README.txt").read_text(), (folder / "plotly-basic.min.js").read_bytes()
-    assert hashlib.sha256(script).hexdigest() in told
-    assert re.search(rb"plotly\.js \(basic - minified\) v([\d.]+)", script)[1].decode() in told
+    readme, script = (folder / "README.txt").read_text(), (folder / "plotly-basic.min.js").read_bytes()
+    assert hashlib.sha256(script).hexdigest() in readme
+    assert re.search(rb"plotly\.js \(basic - minified\) v([\d.]+)", script)[1].decode() in readme
     assert "MIT License" in (folder / "LICENSE.txt").read_text()
 
 
 def test_every_picture_has_words_and_data(page):
-    told = Elements(page)
-    pictures = [attrs for tag, attrs in told.tags if attrs.get("class") == "plot" or tag == "canvas"]
+    elements = Elements(page)
+    pictures = [attrs for tag, attrs in elements.tags if attrs.get("class") == "plot" or tag == "canvas"]
     assert len(pictures) >= 7
     for attrs in pictures:
         assert attrs["role"] == "img"
         assert len(attrs["aria-label"]) > 40
-    drawn = {attrs["id"] for attrs in told.named("div") if attrs.get("class") == "plot"}
+    drawn = {attrs["id"] for attrs in elements.named("div") if attrs.get("class") == "plot"}
     assert drawn == set(figures_of(page))
 
 
 def test_page_asks_for_nothing_outside_itself(page):
-    told = Elements(page)
-    for _, attrs in told.tags:
+    elements = Elements(page)
+    for _, attrs in elements.tags:
         assert not attrs.get("src")
         assert attrs.get("href", "#").startswith("#")
-    (policy,) = [attrs["content"] for attrs in told.named("meta") if "http-equiv" in attrs]
+    (policy,) = [attrs["content"] for attrs in elements.named("meta") if "http-equiv" in attrs]
     assert policy.startswith("default-src 'none'")
     assert "http" not in policy
     styles = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
@@ -253,18 +253,18 @@ def test_names_cannot_become_markup(fit, page):
 
 
 def test_report_tells_warnings_assumptions_and_settings(fit):
-    told = Elements(render(replace(fit, warnings=("beware of the dog",), notes=("the dog bites",)))).text
+    shown = Elements(render(replace(fit, warnings=("beware of the dog",), notes=("the dog bites",)))).text
     for text in ("beware of the dog", "the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name):
-        assert text in told
+        assert text in shown
     for name in fit.posterior.calibration:
-        assert name in told
+        assert name in shown
 
 
 def test_two_level_report_says_that_it_has_no_error_bars(two_level):
-    told = Elements(render(two_level))
-    assert "no error bars" in told.text
-    assert "evidence" not in told.text
-    assert {attrs["id"] for attrs in told.named("section")} == set(PARTS)
+    elements = Elements(render(two_level))
+    assert "no error bars" in elements.text
+    assert "evidence" not in elements.text
+    assert {attrs["id"] for attrs in elements.named("section")} == set(PARTS)
 
 
 def prolonged(trial, times):
@@ -308,20 +308,20 @@ def test_many_long_trials_stay_below_the_limit(fit):
     posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 30)
     made = render(replace(fit, trials=(long,) * 30, posterior=posterior))
     assert len(made.encode()) <= MOST_BYTES_OF_MANY
-    told = Elements(made)
-    assert len(told.named("canvas")) == MOST_TRIALS
-    assert f"first {MOST_TRIALS} of 30 trials" in told.text
+    elements = Elements(made)
+    assert len(elements.named("canvas")) == MOST_TRIALS
+    assert f"first {MOST_TRIALS} of 30 trials" in elements.text
     assert len(render(replace(fit, trials=(long,))).encode()) <= MOST_BYTES_OF_MANY
 
 
 def test_command_and_hashes_are_in_the_report(demo_run):
     demo, folder = demo_run
     text = (folder / "report.html").read_text()
-    told = Elements(text).text
-    assert f"kinertia demo -o {folder}" in told
+    shown = Elements(text).text
+    assert f"kinertia demo -o {folder}" in shown
     for name in ("static.trc", "walk.trc", "walk_grf.mot"):
-        assert hashlib.sha256((folder / "lab" / name).read_bytes()).hexdigest() in told
-    assert "neither command nor files" not in told
+        assert hashlib.sha256((folder / "lab" / name).read_bytes()).hexdigest() in shown
+    assert "neither command nor files" not in shown
     assert "neither command nor files" in render(demo.fit)
 
 
@@ -331,8 +331,8 @@ def test_the_command_in_a_report_repeats_the_fit(demo_run, tmp_path):
     given = ("fit", lab / "walk.trc", "--forces", lab / "walk_grf.mot", "--static", lab / "static.trc")
     given = (*given, "--mass", 72.6, "--height", 1.803, "--sex", "male", "-o", folder)
     assert run(*given).status in (0, 1)
-    told = Elements((folder / "report.html").read_text()).text
-    command = next(line for line in told.splitlines() if "kinertia fit" in line)
+    shown = Elements((folder / "report.html").read_text()).text
+    command = next(line for line in shown.splitlines() if "kinertia fit" in line)
     again = shlex.split(command[command.index("kinertia fit") :])
     assert sorted(again[1:]) == sorted(map(str, given))
     results = (folder / "bsp.csv").read_text()
@@ -355,21 +355,21 @@ def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
 
 def test_fit_trial_and_parameters_show_themselves(fit, two_level):
     for one in (fit, two_level):
-        told = Elements(one._repr_html_())
-        assert one.subject.name in told.text
-        assert words(one).headline in told.text
-        assert len(told.named("tr")) == 1 + 4 + 1 + 120
+        shown = Elements(one._repr_html_())
+        assert one.subject.name in shown.text
+        assert words(one).headline in shown.text
+        assert len(shown.named("tr")) == 1 + 4 + 1 + 120
     trial = fit.trials[0].kinematics.trial
-    told = Elements(trial._repr_html_()).text
-    assert f"{len(trial.markers.time)} frames at 100 Hz" in told
+    shown = Elements(trial._repr_html_()).text
+    assert f"{len(trial.markers.time)} frames at 100 Hz" in shown
     start, end = trial.windows()[0]
-    assert f"{start:.3f} to {end:.3f} s" in told
-    assert f"right foot {trial.loads.force[:, 0, 1].max():.0f} N" in told
+    assert f"{start:.3f} to {end:.3f} s" in shown
+    assert f"right foot {trial.loads.force[:, 0, 1].max():.0f} N" in shown
     fitted = fit.trials[0]
-    told = Elements(fitted._repr_html_())
-    assert fitted.name in told.text
-    assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in told.text
-    assert len(told.named("tr")) == 5
+    shown = Elements(fitted._repr_html_())
+    assert fitted.name in shown.text
+    assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in shown.text
+    assert len(shown.named("tr")) == 5
     table = Elements(fit.estimate._repr_html_())
     assert len(table.named("tr")) == 2 + 12
     assert f"{fit.estimate.mass_kg[1]:.4g}" in table.text
@@ -383,9 +383,9 @@ def test_recording_shows_itself():
     force = np.zeros((4, 1, 3))
     force[2, 0, 1] = 812.0
     plates = PlateLoads(time, ("FP1",), force, np.zeros((4, 1, 3)), (None,))
-    told = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
+    shown = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
     for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", "beware"):
-        assert text in told
+        assert text in shown
     still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
     assert "1 frames" not in still
     assert "no force plates" in still

@@ -43,10 +43,10 @@ def test_the_page_carries_the_scene_to_half_a_millimetre(fit):
     shown = scene(fit, fit.trials[0], 1000)
     hidden = shown.measured.copy()
     hidden[3, 1] = np.nan
-    told = packed(replace(shown, measured=hidden))
+    content = packed(replace(shown, measured=hidden))
     back = {
-        name: np.frombuffer(base64.b64decode(text), "<i2").reshape(len(told["time"]), told["count"][name], 3)
-        for name, text in told["data"].items()
+        name: np.frombuffer(base64.b64decode(text), "<i2").reshape(len(content["time"]), content["count"][name], 3)
+        for name, text in content["data"].items()
     }
     place = np.nanmean(shown.points, axis=(0, 1)) * [1, 0, 1]
     np.testing.assert_allclose(back["points"] / 1e3 + place, shown.points, atol=0.0011)

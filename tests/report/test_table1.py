@@ -68,17 +68,17 @@ def test_four_files_are_written(table, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "words"),
     [
         (("--repeats", "0"), "repeats"),
         (("--seed", "-1"), "seed"),
         (("--trial", "nowhere.toml"), "nowhere.toml"),
     ],
 )
-def test_bad_arguments_end_with_status_2_and_no_folder(tmp_path, arguments, told):
+def test_bad_arguments_end_with_status_2_and_no_folder(tmp_path, arguments, words):
     outcome = run("study", "table1", *arguments, "-o", tmp_path / "out")
     assert outcome.status == 2
-    assert told in outcome.err
+    assert words in outcome.err
     assert "Traceback" not in outcome.err
     assert not list(tmp_path.iterdir())
 

@@ -28,8 +28,8 @@ def _examples():
             if block.language in ("console", "python"):
                 groups.setdefault((page, block.folder), []).append(block)
     return [
-        pytest.param(found, folder, id=f"{page.stem}-{folder}", marks=[pytest.mark.slow] * found[0].slow)
-        for (page, folder), found in groups.items()
+        pytest.param(group, folder, id=f"{page.stem}-{folder}", marks=[pytest.mark.slow] * group[0].slow)
+        for (page, folder), group in groups.items()
     ]
 
 
@@ -47,11 +47,11 @@ def workshop(tmp_path, monkeypatch, request):
     return make
 
 
-@pytest.mark.parametrize(("found", "folder"), _examples())
-def test_examples_run(found, folder, workshop):
+@pytest.mark.parametrize(("group", "folder"), _examples())
+def test_examples_run(group, folder, workshop):
     workshop(folder)
     namespace = {}
-    for block in found:
+    for block in group:
         if block.language == "python":
             exec(compile(block.text, f"example in {folder}", "exec"), namespace)
             continue
@@ -181,7 +181,7 @@ def test_the_house_is_drawn_from_the_contract():
 def test_site_tells_of_every_exported_name(site):
     import kinertia
 
-    told = (site / "api.html").read_text(encoding="utf-8")
+    api_page = (site / "api.html").read_text(encoding="utf-8")
     for name in kinertia.__all__:
-        assert re.search(rf'id="kinertia\.[\w.]*{name}"', told), name
+        assert re.search(rf'id="kinertia\.[\w.]*{name}"', api_page), name
     assert Path(site / "search" / "search_index.js").is_file()

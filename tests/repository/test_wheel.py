@@ -61,14 +61,14 @@ def wheel(index, tmp_path_factory):
 def _resolved(wheel, system, python, *options, extra=""):
     """Versions that an installation would take, by package."""
     platform, macos = OLDEST[system]
-    told = _uv(
+    done = _uv(
         *("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--python-platform", platform),
         *("--python-version", python, *options, "-"),
         text=f"kinertia{extra} @ {wheel.as_uri()}",
         macos=macos,
     )
-    assert told.returncode == 0, told.stderr
-    return dict(line.split("==") for line in told.stdout.splitlines() if "==" in line)
+    assert done.returncode == 0, done.stderr
+    return dict(line.split("==") for line in done.stdout.splitlines() if "==" in line)
 
 
 @pytest.mark.slow
@@ -88,9 +88,9 @@ def test_ezc3d_is_left_out_only_where_it_has_no_wheel(index, system):
     """Once this fails, the marker in pyproject.toml can go. Also: a wheel that is missing is noticed."""
     platform, macos = OLDEST[system]
     options = ("pip", "compile", "--quiet", "--python-platform", platform, "--python-version", PYTHONS[0])
-    told = _uv(*options, "--only-binary", ":all:", "-", text="ezc3d", macos=macos)
-    assert told.returncode != 0
-    assert "no usable wheels" in told.stderr, told.stderr
+    done = _uv(*options, "--only-binary", ":all:", "-", text="ezc3d", macos=macos)
+    assert done.returncode != 0
+    assert "no usable wheels" in done.stderr, done.stderr
 
 
 @pytest.mark.slow

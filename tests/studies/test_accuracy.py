@@ -89,13 +89,13 @@ def test_bars_hold(key):
 
     Where skin is of a kind that the estimate does not know, a joint's moments are covered a hair less.
     """
-    found = run_accuracy({key: PROOF[key]}, 12 if key == "walks" else 24)[key]
+    accuracy = run_accuracy({key: PROOF[key]}, 12 if key == "walks" else 24)[key]
     for name in CLASSES:
-        assert 0.92 < found.classes[name].coverage < 0.98
-        assert 0.85 < found.classes[name].ratio < 1.15
-        assert found.classes[name].rms < 1.3 * found.classes[name].bound
+        assert 0.92 < accuracy.classes[name].coverage < 0.98
+        assert 0.85 < accuracy.classes[name].ratio < 1.15
+        assert accuracy.classes[name].rms < 1.3 * accuracy.classes[name].bound
     for joint in JOINTS:
-        assert found.joints[joint].coverage > (0.92 if key == "clusters" else 0.93)
+        assert accuracy.joints[joint].coverage > (0.92 if key == "clusters" else 0.93)
 
 
 def test_faults_are_what_they_say(trial):
@@ -158,9 +158,9 @@ def test_command(tmp_path, monkeypatch):
     monkeypatch.setattr("kinertia.cli.study.SCENARIOS", chosen)
     outcome = run("study", "accuracy", "--draws", 2, "--workers", 2, "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
-    told = json.loads((tmp_path / "out" / "accuracy.json").read_text())
-    assert set(told["scenarios"]) == set(chosen)
-    assert told["scenarios"]["gain"]["classes"]["mass"]["rms"] > 0
+    content = json.loads((tmp_path / "out" / "accuracy.json").read_text())
+    assert set(content["scenarios"]) == set(chosen)
+    assert content["scenarios"]["gain"]["classes"]["mass"]["rms"] > 0
     for scenario in chosen.values():
         assert scenario.title in outcome.out
     assert (tmp_path / "out" / "accuracy.md").read_text().count("| mass (kg) |") == len(chosen)

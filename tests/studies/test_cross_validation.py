@@ -36,10 +36,10 @@ def recordings(person):
 @pytest.mark.slow
 def test_own_parameters_explain_another_walk_better_than_the_literature_s(recordings):
     inputs = [TrialInput(replace(lab.walk, name=name)) for lab, name in zip(recordings, ("one", "two"), strict=True)]
-    found = cross_validate(prepare(SUBJECT, recordings[0].static, inputs, Settings()))
-    assert [held.trial for held in found] == ["one", "two"]
-    assert found[0].others == ("two",)
-    for held in found:
+    held_out = cross_validate(prepare(SUBJECT, recordings[0].static, inputs, Settings()))
+    assert [held.trial for held in held_out] == ["one", "two"]
+    assert held_out[0].others == ("two",)
+    for held in held_out:
         assert held.estimate.objective < held.literature.objective
         assert 0.0 < held.estimate.force_rms_n < 20.0
         assert 0.0005 < held.estimate.marker_rms_m < 0.01
@@ -70,6 +70,6 @@ def test_command(person, tmp_path):
     subject.write_text(text)
     outcome = run("crossval", subject, "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
-    told = json.loads((tmp_path / "out" / "crossval.json").read_text())
-    assert {held["trial"] for held in told["held_out"]} == {"walk", "again"}
+    content = json.loads((tmp_path / "out" / "crossval.json").read_text())
+    assert {held["trial"] for held in content["held_out"]} == {"walk", "again"}
     assert "2 of 2" in outcome.out

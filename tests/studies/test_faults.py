@@ -53,10 +53,10 @@ def person(measured_walk):
 @pytest.fixture(scope="module")
 def sound(person, tmp_path_factory):
     """What is said of the walk as it is: that the scale says 1.6 kg more than the forces."""
-    found = checked(write_person(tmp_path_factory.mktemp("sound"), person))
-    assert [one.level for one in found] == ["caution"]
-    assert "stated mass" in found[0].sentence
-    return found
+    findings = checked(write_person(tmp_path_factory.mktemp("sound"), person))
+    assert [one.level for one in findings] == ["caution"]
+    assert "stated mass" in findings[0].sentence
+    return findings
 
 
 CASES = [
@@ -75,12 +75,12 @@ def test_mistakes_are_named(mistake, person, sound, tmp_path):
     assert (spoilt is None) == (mistake.name in NOT_POSSIBLE)
     if spoilt is None:
         return
-    told = judged(mistake, sound, checked(write_person(tmp_path, spoilt)))
+    judgement = judged(mistake, sound, checked(write_person(tmp_path, spoilt)))
     if mistake.name in LEFT_TO_THE_FIT:
-        assert told is None
+        assert judgement is None
     else:
-        assert told is not None
-        assert told[0] == "named", told[1]
+        assert judgement is not None
+        assert judgement[0] == "named", judgement[1]
 
 
 @pytest.mark.parametrize("name", ["all left and right labels swapped", "forces 100 ms late"])
@@ -121,7 +121,7 @@ def outcomes():
         SoundWalk("one", None, (), None),
         SoundWalk("other", None, (Finding("caution", "mass"), Finding("caution", "plate", "fit")), None),
     ]
-    told = [
+    of_mistakes = [
         FaultOutcome("one", "a", "named", "said", "check"),
         FaultOutcome("other", "a", "named", "said", "fit", 2.0, 3.0),
         FaultOutcome("one", "b", "silent", "", "", 2.0, 3.0),
@@ -129,7 +129,7 @@ def outcomes():
         FaultOutcome("one", "c", "harmless", "", "", 0.5, 1.0),
         FaultOutcome("other", "c", "warned", "other", "check"),
     ]
-    return walks, told
+    return walks, of_mistakes
 
 
 def test_page(outcomes, tmp_path):
@@ -140,9 +140,9 @@ def test_page(outcomes, tmp_path):
     assert "| **named / possible** | **1 / 3** | **1 / 2** |" in page
     assert "- one: nothing\n- other: mass" in page
     assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
-    told = json.loads((save_faults(*outcomes, tmp_path / "out") / "faults.json").read_text())
-    assert told["outcomes"][0]["change_nm"] is None
-    assert told["sound"]["other"][1]["by"] == "fit"
+    content = json.loads((save_faults(*outcomes, tmp_path / "out") / "faults.json").read_text())
+    assert content["outcomes"][0]["change_nm"] is None
+    assert content["sound"]["other"][1]["by"] == "fit"
 
 
 def test_command(outcomes, tmp_path, monkeypatch):
@@ -162,10 +162,10 @@ def test_study_of_a_walk(tmp_path):
     """One mistake that check names, one that the fit has to look at."""
     wanted = {"forces in kg", "the other sex"}
     picked = [one for one in MISTAKES if one.name in wanted]
-    (sound,), told = run_faults({"walk": synthetic_walk(tmp_path / "lab")}, picked)
+    (sound,), outcomes_of_faults = run_faults({"walk": synthetic_walk(tmp_path / "lab")}, picked)
     assert sound.moments is not None
     assert not any(one.level == "fail" for one in sound.findings)
-    by_name = {one.mistake: one for one in told}
+    by_name = {one.mistake: one for one in outcomes_of_faults}
     assert (by_name["forces in kg"].outcome, by_name["forces in kg"].by) == ("named", "check")
     other = by_name["the other sex"]
     assert other.outcome in ("harmless", "named", "warned")

@@ -25,9 +25,9 @@ def trials(prior):
     """A walk and squats of a person of the prior, as measured."""
     person = replace(walking_subject(), bsp=prior.draw(np.random.default_rng(2)))
     motions = [walk(person, 1.5, trapezoid=False), squat(person)]
-    skeleton, found = measured(motions, Faults("artefact"), np.random.default_rng(3))
+    skeleton, kinematics = measured(motions, Faults("artefact"), np.random.default_rng(3))
     return skeleton, [
-        replace(k, trial=replace(k.trial, name=name)) for name, k in zip(("walk", "squat"), found, strict=True)
+        replace(k, trial=replace(k.trial, name=name)) for name, k in zip(("walk", "squat"), kinematics, strict=True)
     ]
 
 
@@ -45,9 +45,9 @@ def test_prediction_is_what_a_fit_then_reports(prior, trials, planned, chosen):
     ratio = planned.sd[chosen] / fit.posterior.sd
     assert np.median(np.abs(ratio[:, :4] - 1.0)) < 0.03
     assert np.abs(np.log(ratio[:, :4])).max() < np.log(1.35)
-    learnt, told = planned.information(chosen), fit.posterior.information
-    assert np.abs(learnt - told)[:, :4].max() < 0.2
-    assert planned.counts(chosen)["measured"] == pytest.approx((told > 0.75).sum(), abs=3)
+    learnt, reported = planned.information(chosen), fit.posterior.information
+    assert np.abs(learnt - reported)[:, :4].max() < 0.2
+    assert planned.counts(chosen)["measured"] == pytest.approx((reported > 0.75).sum(), abs=3)
 
 
 def test_a_walk_shows_more_than_squats_and_both_more_than_one(planned):
@@ -107,11 +107,11 @@ def test_standing_feet_stay():
 
 @pytest.mark.slow
 def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
-    found = plan_synthetic()
-    assert set(MOTIONS) < set(found.table.columns)
-    mean = {names: found.information(names).mean() for names in found.sd}
+    plan = plan_synthetic()
+    assert set(MOTIONS) < set(plan.table.columns)
+    mean = {names: plan.information(names).mean() for names in plan.sd}
     assert min(mean["walk",], mean["fast walk",]) > mean["squat",]
-    best = [names for names in found.sd if len(names) == 3]
+    best = [names for names in plan.sd if len(names) == 3]
     assert len(best) == 1
     assert mean[best[0]] > max(mean[name,] for name in best[0])
 
@@ -119,8 +119,8 @@ def test_walking_shows_more_than_squats_and_three_motions_more_than_one():
 def test_command(tmp_path, prior, monkeypatch):
     """All but the seconds of planning, which the examples of the pages spend."""
     sets = [*((name,) for name in MOTIONS), ("walk", "squat")]
-    found = Plan(prior.mean.segments, prior.sd, {names: prior.sd / (1 + len(names)) for names in sets})
-    monkeypatch.setattr("kinertia.studies.plan.plan_synthetic", lambda: found)
+    plan = Plan(prior.mean.segments, prior.sd, {names: prior.sd / (1 + len(names)) for names in sets})
+    monkeypatch.setattr("kinertia.studies.plan.plan_synthetic", lambda: plan)
     outcome = run("plan", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     table = pd.read_csv(tmp_path / "out" / "plan.csv")

@@ -26,10 +26,10 @@ def made_up() -> Sensitivity:
 
 
 def test_answers():
-    found = made_up()
-    assert found.insensitive("study") == ["torso.com_z"]
-    assert found.insensitive("artefact") == ["torso.com_z", "thigh.mass"]
-    assert found.never() == ["pelvis.iyy"]
+    sensitivity = made_up()
+    assert sensitivity.insensitive("study") == ["torso.com_z"]
+    assert sensitivity.insensitive("artefact") == ["torso.com_z", "thigh.mass"]
+    assert sensitivity.never() == ["pelvis.iyy"]
 
 
 def test_conditions_change_one_thing_at_a_time():
@@ -50,11 +50,11 @@ def few_conditions(monkeypatch):
 @pytest.mark.usefixtures("few_conditions")
 @in_one_process()
 def test_noise_makes_errors_larger():
-    found = run_sensitivity(2)
-    small, large = found.errors["study x 0.25"], found.errors["study x 2"]
+    sensitivity = run_sensitivity(2)
+    small, large = sensitivity.errors["study x 0.25"], sensitivity.errors["study x 2"]
     assert small.shape == (7 * len(SHOWN),)
     assert np.mean(small.reshape(-1, 7)[:, :4]) < np.mean(large.reshape(-1, 7)[:, :4])
-    masses = [i for i, name in enumerate(found.parameters) if name.endswith(".mass")]
+    masses = [i for i, name in enumerate(sensitivity.parameters) if name.endswith(".mass")]
     assert len(masses) == 7
 
 
@@ -63,8 +63,8 @@ def test_command(tmp_path, monkeypatch):
     outcome = run("study", "sensitivity", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     assert "torso.com_z, thigh.mass" in outcome.out
-    told = json.loads((tmp_path / "out" / "sensitivity.json").read_text())
-    assert told["shown_by_no_condition"] == ["pelvis.iyy"]
+    content = json.loads((tmp_path / "out" / "sensitivity.json").read_text())
+    assert content["shown_by_no_condition"] == ["pelvis.iyy"]
     assert (tmp_path / "out" / "sensitivity.png").stat().st_size > 10_000
     page = (tmp_path / "out" / "sensitivity.md").read_text()
     assert "noise (8.2 mm RMS at twice): torso.com_z\n" in page

@@ -21,7 +21,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     prior = literature_prior(walking_subject().literature)
     seen = observation_of(trial, trial.markers)
     monkeypatch.setattr(study_bound, "STUDY_AMPLITUDE_M", 0.0)
-    found = study_bound.information_on_body(trial, seen, prior, 1e-3)
+    information = study_bound.information_on_body(trial, seen, prior, 1e-3)
     white = replace(
         at_truth(seen, trial),
         marker_sd=np.full_like(seen.marker_sd, 1e-3),
@@ -39,7 +39,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
         MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], BANDWIDTH.spacing_s),
         np.ones((1, 1)),
     )
-    ours = study_bound.bound(found, replace(prior, mean=trial.bsp))
+    ours = study_bound.bound(information, replace(prior, mean=trial.bsp))
     sd = own.sd([0])[[k for k, segment in enumerate(prior.mean.segments) if not segment.endswith("_l")]]
     theirs = [np.sqrt(np.mean(np.square(sd[:, part]))) for part in (slice(0, 1), slice(1, 4), slice(4, 7))]
     assert ours == pytest.approx(theirs, rel=0.02)

@@ -156,12 +156,12 @@ def test_mean_and_spread_are_over_draws(one):
 
 
 def test_json_has_the_promised_form(one):
-    told = json.loads(json.dumps(table1_json(one)))
-    assert list(told["conditions"]) == list(CONDITIONS)
+    content = json.loads(json.dumps(table1_json(one)))
+    assert list(content["conditions"]) == list(CONDITIONS)
     quantities = ("inertia", "mass", "com", "force", "torque")
     units = ("kgm2", "kg", "m", "N", "Nm")
     keys = {f"{q}_{s}_{u}" for q, u in zip(quantities, units, strict=True) for s in ("rms", "max")}
     for condition in CONDITIONS:
-        assert set(told["conditions"][condition]) == keys
-        assert keys <= set(told["draws"][0]["conditions"][condition])
-    assert len(told["draws"]) == 1
+        assert set(content["conditions"][condition]) == keys
+        assert keys <= set(content["draws"][0]["conditions"][condition])
+    assert len(content["draws"]) == 1

@@ -60,12 +60,12 @@ def changed(variant):
     """What differs from the base: steps of the set-up, options of the trust region method, the trial."""
     setup, base = variant.setup, VARIANTS[BASE].setup
     steps = {f.name for f in fields(Setup)} - {"estimate"}
-    found = {name for name in steps if getattr(setup, name) != getattr(base, name)}
-    found |= {"trial"} if variant.trial is not study_trial else set()
+    different = {name for name in steps if getattr(setup, name) != getattr(base, name)}
+    different |= {"trial"} if variant.trial is not study_trial else set()
     if isinstance(setup.estimate, partial):
         assert setup.estimate.func is trust_region
-        return found | set(setup.estimate.keywords)
-    return found | ({"estimate"} if setup.estimate is not trust_region else set())
+        return different | set(setup.estimate.keywords)
+    return different | ({"estimate"} if setup.estimate is not trust_region else set())
 
 
 @pytest.mark.parametrize("title", VARIANTS)
@@ -265,9 +265,9 @@ def test_draws_of_variants(trial):
     """Their number, and that they depend on nothing but seed and number, like those of Table 1."""
     still = Setup(estimate=partial(trust_region, most_iterations=1))
     with in_one_process():
-        found = run_variants(variants={"a": Variant(still), "b": Variant(still, times=2)}, repeats=1)
+        results = run_variants(variants={"a": Variant(still), "b": Variant(still, times=2)}, repeats=1)
         (again,) = run_variants(variants={"c": Variant(still)}, repeats=1).values()
-    a, b = found["a"], found["b"]
+    a, b = results["a"], results["b"]
     assert [len(each.draws) for each in (a, b)] == [1, 2]
     alone = run_draw(trial, 1, 0, still)
     for each in (a, b, again):

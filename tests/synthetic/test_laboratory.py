@@ -50,18 +50,18 @@ def test_files_give_back_what_was_written(tmp_path, measured, kind, place_m, for
     """TRC rounds to 1e-6 mm, C3D to single precision."""
     wanted, static, walked = read_back(tmp_path, measured, kind)
     assert wanted.subject.mass_kg == measured.walk.mass_kg
-    for found, written in ((static, measured.static), (walked, measured.walk)):
-        assert found.markers.labels == written.markers.labels
-        np.testing.assert_allclose(found.markers.time, written.markers.time, atol=1e-9)
-        np.testing.assert_allclose(found.markers.positions, written.markers.positions, rtol=0, atol=place_m)
+    for read, written in ((static, measured.static), (walked, measured.walk)):
+        assert read.markers.labels == written.markers.labels
+        np.testing.assert_allclose(read.markers.time, written.markers.time, atol=1e-9)
+        np.testing.assert_allclose(read.markers.positions, written.markers.positions, rtol=0, atol=place_m)
     np.testing.assert_allclose(walked.plates.time, measured.walk.plates.time, atol=1e-9)
     np.testing.assert_allclose(walked.plates.force, measured.walk.plates.force, rtol=0, atol=force_n)
     np.testing.assert_allclose(walked.plates.moment, measured.walk.plates.moment, rtol=0, atol=moment_nm)
     if kind == "c3d":
         assert walked.mass_kg == pytest.approx(72.6, abs=1e-4)
         assert walked.height_m == pytest.approx(1.803, abs=1e-6)
-        for found, written in zip(walked.plates.corners, measured.walk.plates.corners, strict=True):
-            gaps = np.linalg.norm(found[:, None] - written, axis=-1)
+        for read, written in zip(walked.plates.corners, measured.walk.plates.corners, strict=True):
+            gaps = np.linalg.norm(read[:, None] - written, axis=-1)
             assert gaps.min(axis=0).max() < 1e-6
         assert not [note for note in walked.notes if "plate" in note]
 
@@ -83,14 +83,14 @@ def test_plates_catch_one_whole_contact_of_each_foot(measured, trial):
 def test_pipeline_finds_the_measured_frames(subject, trial):
     """The steps off the plates are seen by the feet's markers alone."""
     recording = record(subject, trial, PERFECT, np.random.default_rng(7), RATIO).walk
-    found = build_trial(recording, read_marker_set("cleveland-clinic").foot_labels())
+    built = build_trial(recording, read_marker_set("cleveland-clinic").foot_labels())
     on_plates = np.abs(
         recording.plates.force.sum(axis=1) - trial.foot_loads[: len(recording.plates.time), :, :3].sum(axis=1)
     )
     truly = on_plates.max(axis=1)[::RATIO] < 2 * LOAD_THRESHOLD_N
-    assert not (found.measured & ~truly).any()
-    assert (truly & ~found.measured).sum() <= 8
-    assert found.measured.sum() > 90
+    assert not (built.measured & ~truly).any()
+    assert (truly & ~built.measured).sum() <= 8
+    assert built.measured.sum() > 90
 
 
 def test_perfect_laboratory_measures_the_truth(subject, trial):

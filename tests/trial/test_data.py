@@ -58,8 +58,8 @@ def test_shapes_and_labels_are_checked():
 
 
 def test_windows_longest_first():
-    found = trial([0, 1, 1, 0, 1, 1, 1, 0, 1]).windows()
-    np.testing.assert_allclose(found, [(0.04, 0.06), (0.01, 0.02), (0.08, 0.08)])
+    spans = trial([0, 1, 1, 0, 1, 1, 1, 0, 1]).windows()
+    np.testing.assert_allclose(spans, [(0.04, 0.06), (0.01, 0.02), (0.08, 0.08)])
     assert trial([0, 0]).windows() == []
     assert windows(np.arange(3.0), np.ones(3, bool)) == [(0.0, 2.0)]
 

@@ -42,51 +42,51 @@ def gait(free_nm=(0.0, 0.0), plates_turned_deg=0.0, duration_s=3.5):
     return FootLoads(time, force, moment), body, np.array(free_nm) * share[whole].mean(axis=0)
 
 
-def found_in(loads, body, start_s=0.9, end_s=2.2):
+def turning_of(loads, body, start_s=0.9, end_s=2.2):
     inside = (loads.time >= start_s) & (loads.time <= end_s)
     return mean_turning(loads, loads.time[inside], body[inside])
 
 
 def test_mirror_image_free_moments_are_fine():
     loads, body, free = gait((6.0, -6.0))
-    found = found_in(loads, body)
-    assert found.free_nm == pytest.approx(free, abs=0.02)
+    turning = turning_of(loads, body)
+    assert turning.free_nm == pytest.approx(free, abs=0.02)
     assert free[0] > 2.5
-    assert found.moment_nm == pytest.approx(0.0, abs=0.05)
-    assert not found.contradicts
-    assert "near zero, as it should be" in found.sentence()
-    assert found.allowed_nm == pytest.approx(TURNING_LEVER_M * MASS_KG * 9.81, rel=0.01)
+    assert turning.moment_nm == pytest.approx(0.0, abs=0.05)
+    assert not turning.contradicts
+    assert "near zero, as it should be" in turning.sentence()
+    assert turning.allowed_nm == pytest.approx(TURNING_LEVER_M * MASS_KG * 9.81, rel=0.01)
 
 
 @pytest.mark.parametrize(("free_nm", "side"), [((3.0, 8.0), "left"), ((-8.0, -3.0), "right")])
 def test_free_moments_to_the_same_side_are_told(free_nm, side):
     loads, body, free = gait(free_nm)
-    found = found_in(loads, body)
-    assert found.moment_nm == pytest.approx(free.sum(), abs=0.05)
-    assert found.contradicts
-    assert f"is {abs(found.moment_nm):.1f} N m to the {side}; it should be near zero" in found.sentence()
-    assert f"have the same sign (right {free[0]:+.1f}, left {free[1]:+.1f} N m" in found.sentence()
+    turning = turning_of(loads, body)
+    assert turning.moment_nm == pytest.approx(free.sum(), abs=0.05)
+    assert turning.contradicts
+    assert f"is {abs(turning.moment_nm):.1f} N m to the {side}; it should be near zero" in turning.sentence()
+    assert f"have the same sign (right {free[0]:+.1f}, left {free[1]:+.1f} N m" in turning.sentence()
 
 
 def test_one_plate_with_the_wrong_sign():
     right, left = 6.0, -6.0
-    assert found_in(*gait((right, -left))[:2]).contradicts
-    assert not found_in(*gait((right, left))[:2]).contradicts
+    assert turning_of(*gait((right, -left))[:2]).contradicts
+    assert not turning_of(*gait((right, left))[:2]).contradicts
 
 
 def test_opposite_free_moments_that_do_not_cancel():
-    found = found_in(*gait((1.0, -9.0))[:2])
-    assert found.contradicts
-    assert "do not cancel" in found.sentence()
+    turning = turning_of(*gait((1.0, -9.0))[:2])
+    assert turning.contradicts
+    assert "do not cancel" in turning.sentence()
 
 
 def test_turned_plates_are_not_blamed_on_free_moments():
     """Braking ahead of the body and pushing behind it turn it once the plates' axes are turned."""
-    found = found_in(*gait(plates_turned_deg=15.0)[:2])
-    assert found.contradicts
-    assert found.free_nm == pytest.approx((0.0, 0.0), abs=1e-9)
-    assert "places and axes of the plates" in found.sentence()
-    assert "free moments" not in found.sentence()
+    turning = turning_of(*gait(plates_turned_deg=15.0)[:2])
+    assert turning.contradicts
+    assert turning.free_nm == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert "places and axes of the plates" in turning.sentence()
+    assert "free moments" not in turning.sentence()
 
 
 def test_neither_axes_nor_floor_nor_the_place_of_the_body_matter():
@@ -94,7 +94,7 @@ def test_neither_axes_nor_floor_nor_the_place_of_the_body_matter():
     turn = Rotation.from_euler("y", 70, degrees=True).as_matrix()
     lower = replace(loads, moment=loads.moment - np.cross([0.0, 0.3, 0.0], loads.force))
     plain, turned, sunk, beside = (
-        found_in(*case)
+        turning_of(*case)
         for case in (
             (loads, body),
             (loads.rotated(turn), body @ turn.T),
@@ -112,9 +112,9 @@ def test_neither_axes_nor_floor_nor_the_place_of_the_body_matter():
 
 def test_silent_without_whole_strides_or_a_foot():
     loads, body, _ = gait((3.0, 8.0))
-    assert found_in(loads, body, 0.9, 1.7) is None
+    assert turning_of(loads, body, 0.9, 1.7) is None
     one = replace(loads, force=loads.force * [[[1], [0]]], moment=loads.moment * [[[1], [0]]])
-    assert found_in(one, body) is None
+    assert turning_of(one, body) is None
 
 
 @pytest.fixture(scope="module")
@@ -183,8 +183,8 @@ def test_measured_trials(measured_file, measured_recording, name):
 
 @pytest.mark.parametrize(("name", "warned"), [("gait2354", True), ("rajagopal", False)])
 def test_a_fit_warns(fit_of, name, warned):
-    told = [w for w in fit_of(name).summary["warnings"] if "it should be near zero" in w]
-    assert len(told) == int(warned)
+    warnings = [w for w in fit_of(name).summary["warnings"] if "it should be near zero" in w]
+    assert len(warnings) == int(warned)
     if warned:
-        assert told[0].startswith("subject01_walk1: the mean vertical moment over whole strides")
-        assert "the free moments under the feet have the same sign (right +1.0, left +2.5 N m" in told[0]
+        assert warnings[0].startswith("subject01_walk1: the mean vertical moment over whole strides")
+        assert "the free moments under the feet have the same sign (right +1.0, left +2.5 N m" in warnings[0]

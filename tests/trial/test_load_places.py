@@ -25,9 +25,11 @@ WALKS = {
 def walk(request, measured_recording):
     """A measured walk and the labels of its feet."""
     markers, forces = WALKS[request.param]
-    found = measured_recording(markers, forces)
-    feet = choose_marker_set(found.markers.labels).foot_labels()
-    return found, {side: [one for one in labels if one in found.markers.labels] for side, labels in feet.items()}
+    recording = measured_recording(markers, forces)
+    feet = choose_marker_set(recording.markers.labels).foot_labels()
+    return recording, {
+        side: [one for one in labels if one in recording.markers.labels] for side, labels in feet.items()
+    }
 
 
 def moved(recording, offset_m, factor=1.0):
@@ -55,19 +57,19 @@ def test_sound_walks(walk):
 @pytest.mark.parametrize("offset_m", [0.05, -0.05])
 def test_offsets_across_the_walk(walk, offset_m):
     recording, feet = walk
-    (told,) = load_places_doubts(moved(recording, (0.0, 0.0, offset_m)), feet)
-    assert "centres of pressure of both feet are off" in told
-    found = float(told.partition("along X and ")[2].partition(" mm")[0])
-    assert found == pytest.approx(1e3 * offset_m, abs=10)
+    (doubt,) = load_places_doubts(moved(recording, (0.0, 0.0, offset_m)), feet)
+    assert "centres of pressure of both feet are off" in doubt
+    offset_mm = float(doubt.partition("along X and ")[2].partition(" mm")[0])
+    assert offset_mm == pytest.approx(1e3 * offset_m, abs=10)
 
 
 @pytest.mark.parametrize("offset_m", [0.3, -0.3])
 def test_other_origins(walk, offset_m):
     recording, feet = walk
-    told = load_places_trouble(moved(recording, (offset_m, 0.0, 0.0)), feet) or "".join(
+    trouble = load_places_trouble(moved(recording, (offset_m, 0.0, 0.0)), feet) or "".join(
         load_places_doubts(moved(recording, (offset_m, 0.0, 0.0)), feet)
     )
-    assert "entres of pressure" in told
+    assert "entres of pressure" in trouble
 
 
 def test_points_in_mm(walk):
@@ -78,11 +80,11 @@ def test_points_in_mm(walk):
 @pytest.mark.parametrize("by_s", [-0.12, 0.09, 0.2])
 def test_clocks(walk, by_s):
     recording, feet = walk
-    told = load_places_trouble(shifted(recording, by_s), feet)
-    assert told.startswith("the forces are ")
-    assert ("late" if by_s > 0 else "early") in told
-    found = float(told.partition("are ")[2].partition(" ms")[0])
-    assert found == pytest.approx(1e3 * abs(by_s), abs=35)
+    trouble = load_places_trouble(shifted(recording, by_s), feet)
+    assert trouble.startswith("the forces are ")
+    assert ("late" if by_s > 0 else "early") in trouble
+    late_ms = float(trouble.partition("are ")[2].partition(" ms")[0])
+    assert late_ms == pytest.approx(1e3 * abs(by_s), abs=35)
 
 
 @pytest.mark.parametrize("late_s", [-0.015, 0.015])
@@ -96,9 +98,9 @@ def test_rates(walk, factor):
     recording, feet = walk
     markers = recording.markers
     time = markers.time[0] + factor * (markers.time - markers.time[0])
-    told = load_places_trouble(replace(recording, markers=Markers(time, markers.labels, markers.positions)), feet)
-    found = float(told.partition("of one of them is wrong (by ")[2].partition(")")[0])
-    assert found == pytest.approx(factor, rel=0.1)
+    trouble = load_places_trouble(replace(recording, markers=Markers(time, markers.labels, markers.positions)), feet)
+    times = float(trouble.partition("of one of them is wrong (by ")[2].partition(")")[0])
+    assert times == pytest.approx(factor, rel=0.1)
 
 
 @pytest.mark.parametrize("stride_m", [1.2, 0.9])
@@ -121,9 +123,9 @@ def test_plates_that_are_exchanged():
     there = np.array([middle[1] - middle[0], middle[0] - middle[1]])  # to the other plate's place
     moment = plates.moment + np.cross(there, plates.force)
     wrong = replace(plates, force=plates.force[:, ::-1], moment=moment[:, ::-1], corners=corners)
-    told = load_places_trouble(replace(recording, plates=wrong), SIMPLE_FEET)
-    assert "the loads of plate 1 and plate 2" in told
-    assert "exchanged" in told
+    trouble = load_places_trouble(replace(recording, plates=wrong), SIMPLE_FEET)
+    assert "the loads of plate 1 and plate 2" in trouble
+    assert "exchanged" in trouble
 
 
 def test_both_feet_on_a_plate():
@@ -136,5 +138,5 @@ def test_both_feet_on_a_plate():
     for part in (force, moment):
         part[rows, 0] += part[rows, 1]
         part[rows, 1] = 0.0
-    (told,) = load_places_doubts(replace(recording, plates=replace(plates, force=force, moment=moment)), SIMPLE_FEET)
-    assert "both feet are on it (plate 1 from 0.7" in told
+    (doubt,) = load_places_doubts(replace(recording, plates=replace(plates, force=force, moment=moment)), SIMPLE_FEET)
+    assert "both feet are on it (plate 1 from 0.7" in doubt

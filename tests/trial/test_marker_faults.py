@@ -31,10 +31,10 @@ def test_spikes_are_named_and_a_gap_or_two_bad_frames_are_not():
     spiked[[50, 90], 0, 1] += 0.3
     assert spikes_trouble(replace(markers, positions=spiked)) == ""
     spiked[40::20, 1, 1] += 0.3
-    told = spikes_trouble(replace(markers, positions=spiked))
-    assert "B (8 times); the first at 0.400 s" in told
-    assert "up to 300 mm" in told
-    assert "A (" not in told
+    trouble = spikes_trouble(replace(markers, positions=spiked))
+    assert "B (8 times); the first at 0.400 s" in trouble
+    assert "up to 300 mm" in trouble
+    assert "A (" not in trouble
 
 
 def changed(markers, change):
@@ -55,17 +55,17 @@ def test_jumps(size_m):
     def jump(places, time):
         places[time > 1.0, 1, 1] += size_m
 
-    (told,) = jump_doubts(changed(_walking(), jump))
-    assert f"B by {abs(1e3 * size_m):.0f} mm at 1.010 s" in told
+    (doubt,) = jump_doubts(changed(_walking(), jump))
+    assert f"B by {abs(1e3 * size_m):.0f} mm at 1.010 s" in doubt
 
 
 @pytest.mark.parametrize("count", [2, 8, 20])
 def test_lost_frames(count):
     markers = _walking()
     kept = np.r_[0:60, 60 + count : 200]  # while the markers are fast
-    told = lost_frames_trouble(Markers(markers.time[: len(kept)], markers.labels, markers.positions[kept]))
-    assert "between 0.590 and 0.600 s" in told
-    lost = int(told.partition("(about ")[2].partition(")")[0])
+    trouble = lost_frames_trouble(Markers(markers.time[: len(kept)], markers.labels, markers.positions[kept]))
+    assert "between 0.590 and 0.600 s" in trouble
+    lost = int(trouble.partition("(about ")[2].partition(")")[0])
     assert lost == pytest.approx(count, rel=0.3)
 
 
@@ -81,8 +81,8 @@ def test_labels_exchanged_for_a_while():
         rows = (time > 0.7) & (time < 1.1)
         places[rows] = places[rows][:, ::-1]
 
-    told = exchanged_trouble(changed(_walking(), exchange))
-    assert told.startswith(
+    trouble = exchanged_trouble(changed(_walking(), exchange))
+    assert trouble.startswith(
         "the markers A and B exchange their places from one frame to the next at 0.710 s, 520 mm apart"
     )
 
@@ -100,7 +100,7 @@ def test_invented_stretches(line, words, step_m):
         if step_m:
             places[:] = np.round(places / step_m) * step_m
 
-    (told,) = straight_doubts(changed(_walking(), invent), SEGMENTS)
-    assert words in told
-    start, end = (float(told.partition(word)[2].split()[0]) for word in ("A from ", " to "))
+    (doubt,) = straight_doubts(changed(_walking(), invent), SEGMENTS)
+    assert words in doubt
+    start, end = (float(doubt.partition(word)[2].split()[0]) for word in ("A from ", " to "))
     assert (start, end) == pytest.approx((0.5, 0.9), abs=0.03)

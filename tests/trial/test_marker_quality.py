@@ -20,11 +20,11 @@ def markers(path_m=(0.0, 0.0, 0.0), sway_m=0.0):
 @given(st.lists(st.booleans(), min_size=1, max_size=40))
 def test_visibility_counts_frames(seen):
     positions = np.where(np.array(seen)[:, None, None], 1.0, np.nan) * np.ones((len(seen), 1, 3))
-    (found,) = visibility(Markers(np.arange(len(seen)) / RATE_HZ, ("A",), positions))
+    (marker,) = visibility(Markers(np.arange(len(seen)) / RATE_HZ, ("A",), positions))
     gaps = "".join("x" if one else "." for one in seen).split("x")
-    assert found.share == pytest.approx(sum(seen) / len(seen))
+    assert marker.share == pytest.approx(sum(seen) / len(seen))
     if len(seen) > 1:
-        assert found.longest_gap_s == pytest.approx(max(map(len, gaps)) / RATE_HZ)
+        assert marker.longest_gap_s == pytest.approx(max(map(len, gaps)) / RATE_HZ)
 
 
 @pytest.mark.parametrize(
@@ -33,11 +33,11 @@ def test_visibility_counts_frames(seen):
      ((-2, 0, 0.2), "-X", 6)],
 )  # fmt: skip
 def test_direction_of_the_walk(path, axis, off):
-    found = travel(markers(path))
-    assert found.kind == "walks"
+    moves = travel(markers(path))
+    assert moves.kind == "walks"
     aside = f" ({off} degrees off)" if off else ""
-    assert found.sentence().startswith(f"walks along {axis}{aside}, ")
-    assert found.speed_m_s == pytest.approx(np.hypot(path[0], path[2]) / ((FRAMES - 1) / RATE_HZ), rel=1e-6)
+    assert moves.sentence().startswith(f"walks along {axis}{aside}, ")
+    assert moves.speed_m_s == pytest.approx(np.hypot(path[0], path[2]) / ((FRAMES - 1) / RATE_HZ), rel=1e-6)
 
 
 def test_standing_and_moving_on_the_spot():
@@ -53,9 +53,9 @@ def test_walk_is_seen_through_gaps():
     walk = markers((2, 0, 0))
     positions = walk.positions.copy()
     positions[10:40, 0] = positions[60:, 1] = positions[:5] = np.nan
-    found = travel(Markers(walk.time, walk.labels, positions))
-    assert found.kind == "walks"
-    assert found.direction_deg == pytest.approx(0.0, abs=1e-6)
+    moves = travel(Markers(walk.time, walk.labels, positions))
+    assert moves.kind == "walks"
+    assert moves.direction_deg == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(

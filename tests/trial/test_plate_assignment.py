@@ -302,7 +302,7 @@ def test_markers_find_contacts_whose_force_is_hidden(real, name):
             force = loads.force.copy()
             force[(loads.time >= time[first] - 0.02) & (loads.time <= time[last] + 0.02), foot] = 0.0
             ground = ground_contact(recording.markers, FootLoads(loads.time, force, loads.moment), feet).ground
-            (found,) = [run for run in runs(ground[:, foot]) if run[0] <= (first + last) // 2 <= run[1]]
+            (contact,) = [run for run in runs(ground[:, foot]) if run[0] <= (first + last) // 2 <= run[1]]
             limit = CONTACT_SLACK_S + CONTACT_MARGIN_S + 1e-6
-            assert abs(time[found[0]] - time[first]) <= limit
-            assert abs(time[found[1]] - time[last]) <= limit
+            assert abs(time[contact[0]] - time[first]) <= limit
+            assert abs(time[contact[1]] - time[last]) <= limit

@@ -8,7 +8,7 @@ from kinertia.trial.telling_movements import TellingMovements, missing_movements
 
 
 @pytest.fixture(scope="module")
-def found():
+def movements():
     """Of every motion of the package."""
     subject = walking_subject()
     trials = {name: make(subject) for name, make in MOTIONS.items()}
@@ -21,17 +21,17 @@ def found():
     }
 
 
-def test_each_motion_is_told_by_what_moves(found):
-    assert {name for name, each in found.items() if each.sways} == {"trunk sway", "squat"}
-    assert {name for name, each in found.items() if each.squats} == {"squat"}
+def test_each_motion_is_told_by_what_moves(movements):
+    assert {name for name, each in movements.items() if each.sways} == {"trunk sway", "squat"}
+    assert {name for name, each in movements.items() if each.squats} == {"squat"}
 
 
-def test_what_is_missing_is_named(found):
-    assert "a swaying trunk or squats" in missing_movements([found["walk"], None])
-    told = missing_movements([found["walk"], found["trunk sway"]])
-    assert "no trial with squats" in told
-    assert "trunk" not in told
-    assert missing_movements([found["squat"], found["trunk sway"]]) is None
+def test_what_is_missing_is_named(movements):
+    assert "a swaying trunk or squats" in missing_movements([movements["walk"], None])
+    sentence = missing_movements([movements["walk"], movements["trunk sway"]])
+    assert "no trial with squats" in sentence
+    assert "trunk" not in sentence
+    assert missing_movements([movements["squat"], movements["trunk sway"]]) is None
     assert missing_movements([None]) is None
 
 
@@ -41,6 +41,6 @@ def test_a_gap_of_one_marker_is_no_sway():
     positions[:, 1:, 1] = 0.5
     positions[:, 2, 0] = 0.3
     positions[4, 2] = np.nan
-    told = TellingMovements.of(Markers(time, ("P", "T1", "T2"), positions), ["P"], ["T1", "T2", "not worn"])
-    assert (told.lean_deg, told.drop_m) == (pytest.approx(0.0, abs=1e-5), 0.0)
+    telling = TellingMovements.of(Markers(time, ("P", "T1", "T2"), positions), ["P"], ["T1", "T2", "not worn"])
+    assert (telling.lean_deg, telling.drop_m) == (pytest.approx(0.0, abs=1e-5), 0.0)
     assert TellingMovements.of(Markers(time, ("P", "T1", "T2"), positions), ["P"], ["X"]) is None

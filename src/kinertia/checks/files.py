@@ -118,17 +118,17 @@ def check_files(
     statics = [r for one, r in recordings if one is wanted.static] or [
         r for _, r in recordings if travel(r.markers).kind == "stands still"
     ]
-    found = []
+    checks = []
     for one, recording in recordings:
         static = statics[0] if len(statics) == 1 and recording is not statics[0] else None
         judged = check_recording(recording, marker_set, mass_kg, one.window_s, static, height_m)
-        found.append((one.title, judged))
-    return found, mistakes
+        checks.append((one.title, judged))
+    return checks, mistakes
 
 
-def _common(told: Sequence[float | None]) -> float | None:
+def _common(stated: Sequence[float | None]) -> float | None:
     """What all files of a person say that say anything."""
-    values = {value for value in told if value is not None}
+    values = {value for value in stated if value is not None}
     return values.pop() if len(values) == 1 else None
 
 

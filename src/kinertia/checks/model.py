@@ -60,14 +60,14 @@ class ModelCheck:
     def facts(self) -> list[tuple[str, str]]:
         """What the model is, as pairs of a name and a sentence."""
         massless = [name for name, mass in zip(self.bsp.segments, self.bsp.mass_kg, strict=True) if mass == 0]
-        told = [
+        facts = [
             ("model", self.name),
             ("bodies", f"{len(self.bsp.segments)}, total mass {self.bsp.total_mass_kg:.2f} kg"),
         ]
         if massless:
-            told.append(("without mass", ", ".join(massless)))
+            facts.append(("without mass", ", ".join(massless)))
         joined = [f"{name}: {' + '.join(own)}" for name, own in self.segments.bodies.items() if len(own) > 1]
-        return [*told, *([("combined", "; ".join(joined))] if joined and self.literature else [])]
+        return [*facts, *([("combined", "; ".join(joined))] if joined and self.literature else [])]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -130,7 +130,7 @@ def check_model(
     if segments.unknown:
         left_out.append(f"bodies of unknown segment, not compared: {', '.join(segments.unknown)}")
     odd = _sides(bsp)
-    found = [
+    verdicts = [
         *_possible(bsp),
         *_sizes(bsp),
         *_total(total, mass_kg),
@@ -140,7 +140,7 @@ def check_model(
         *outliers,
         *_markers(skeleton),
     ]
-    return ModelCheck(skeleton.name, bsp, segments, literature, not odd, tuple(found), tuple(left_out))
+    return ModelCheck(skeleton.name, bsp, segments, literature, not odd, tuple(verdicts), tuple(left_out))
 
 
 def _markers(skeleton: Skeleton) -> list[Verdict]:
@@ -158,8 +158,8 @@ def _has_arms(segments: ModelSegments) -> bool:
 def _cells(row: np.ndarray) -> tuple[str, ...]:
     """Mass, CoM (mm) and moments of a row of the table of body segment parameters."""
     com = (f"{round(value * 1e3)}" if np.isfinite(value) else "-" for value in row[1:4])
-    told = [f"{row[0]:.2f}", *com, *map(_moment, row[4:7])]
-    return tuple("-" if np.isnan(value) else text for text, value in zip(told, row, strict=False))
+    texts = [f"{row[0]:.2f}", *com, *map(_moment, row[4:7])]
+    return tuple("-" if np.isnan(value) else text for text, value in zip(texts, row, strict=False))
 
 
 def _moment(value: float) -> str:
@@ -171,7 +171,7 @@ def _literature(
     segments: ModelSegments, geometry: BodyGeometry, mass_kg: float, height_m: float, sex: str
 ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, np.ndarray]]:
     """Rows of the tables by source and segment, and the deviation of people from them by segment."""
-    found = {}
+    by_source = {}
     for source, name in (("deleva", "de Leva"), ("dumas", "Dumas")):
         bsp = literature_bsp(mass_kg, height_m, sex, geometry, source)
         table = dict(zip(bsp.segments, bsp.table(), strict=True))
@@ -181,87 +181,88 @@ def _literature(
             torso = np.full(10, np.nan)
             torso[0] = table["torso"][0] + sum(row[0] for row in arms)
             table["torso"] = torso
-        found[name] = {segment: table[segment] for segment in segments.bsp.segments}
+        by_source[name] = {segment: table[segment] for segment in segments.bsp.segments}
     sd = literature_prior(bsp).sd
-    return found, dict(zip(bsp.segments, sd, strict=True))
+    return by_source, dict(zip(bsp.segments, sd, strict=True))
 
 
 def _outliers(
     bsp: BodySegmentParameters, literature: Mapping[str, Mapping[str, np.ndarray]], sd: Mapping[str, np.ndarray]
 ) -> list[Verdict]:
     """Mass, CoM and moments farther from both tables than people are."""
-    found: dict[str, list[str]] = {}
+    segments: dict[str, list[str]] = {}
     for name, row in zip(bsp.segments, bsp.table(), strict=True):
         tables = np.array([table[name] for table in literature.values()])
         low, high = tables.min(axis=0), tables.max(axis=0)
         beyond = np.maximum(low - row, row - high) / sd[name]
         far = [k for k in range(7) if beyond[k] > _OUTLYING_SD]  # NaN is not
         if far:
-            told = ", ".join(_against_literature(k, row[k], low[k], high[k]) for k in far)
-            found.setdefault(told, []).append(name)
+            departures = ", ".join(_against_literature(k, row[k], low[k], high[k]) for k in far)
+            segments.setdefault(departures, []).append(name)
     return [
-        Verdict("caution", f"unlike the literature: {', '.join(names)}: {told}") for told, names in found.items()
+        Verdict("caution", f"unlike the literature: {', '.join(names)}: {departures}")
+        for departures, names in segments.items()
     ] or [Verdict("pass", f"every segment is within {_OUTLYING_SD:g} SDs of the literature")]
 
 
 def _against_literature(k: int, value: float, low: float, high: float) -> str:
     name = PARAMETERS[k]
     if name == "mass":
-        unit, told = "kg", [f"{one:.2f}" for one in (value, low, high)]
+        unit, texts = "kg", [f"{one:.2f}" for one in (value, low, high)]
     elif name.startswith("com"):
-        unit, told = "mm", [f"{one * 1e3:.0f}" for one in (value, low, high)]
+        unit, texts = "mm", [f"{one * 1e3:.0f}" for one in (value, low, high)]
     else:
-        unit, told = "kg m2", [_moment(one) for one in (value, low, high)]
-    return f"{name} {told[0]} {unit} (literature {told[1]} to {told[2]})"
+        unit, texts = "kg m2", [_moment(one) for one in (value, low, high)]
+    return f"{name} {texts[0]} {unit} (literature {texts[1]} to {texts[2]})"
 
 
 def _possible(bsp: BodySegmentParameters) -> list[Verdict]:
     impossible = impossible_segments(bsp)
-    found = [
+    verdicts = [
         Verdict("fail", f"physically impossible: {sentence.rstrip('.')}")
         for sentence in bsp.inconsistencies()
         if sentence.split(": ", 1)[0] in impossible
     ]
-    if not found:
-        found.append(Verdict("pass", "every body is physically possible"))
+    if not verdicts:
+        verdicts.append(Verdict("pass", "every body is physically possible"))
     at_fault = ~bsp.physically_consistent() & (bsp.mass_kg > 0)
     thin = [bsp.segments[i] for i in np.flatnonzero(at_fault) if bsp.segments[i] not in impossible]
     if thin:
-        found.append(
+        verdicts.append(
             Verdict(
                 "caution",
                 f"without thickness (two moments of inertia add up to the third exactly): {', '.join(thin)}; rounded "
                 f"inertias do that",
             )
         )
-    return found
+    return verdicts
 
 
 def _sizes(bsp: BodySegmentParameters) -> list[Verdict]:
     """Bodies that would have to be larger than a person, as with inertias of 1."""
-    found = []
+    verdicts = []
     for name, mass, inertia in zip(bsp.segments, bsp.mass_kg, bsp.inertia_kgm2, strict=True):
         radius = np.sqrt(inertia.diagonal().max() / mass) if mass > 0 else 0.0
         if radius > LARGEST_RADIUS_M:
-            told = f"{name}: {mass:g} kg with moments of inertia up to {inertia.diagonal().max():g} kg m2"
-            found.append(
+            body = f"{name}: {mass:g} kg with moments of inertia up to {inertia.diagonal().max():g} kg m2"
+            verdicts.append(
                 Verdict(
                     "fail" if mass >= _NEGLIGIBLE_KG else "caution",
-                    f"{told} would have to be {2 * radius:.1f} m wide or long; the inertia is a placeholder or in "
+                    f"{body} would have to be {2 * radius:.1f} m wide or long; the inertia is a placeholder or in "
                     f"another unit",
                 )
             )
-    return found
+    return verdicts
 
 
 def _total(total_kg: float, mass_kg: float | None) -> list[Verdict]:
     if mass_kg is None:
         return []
     off = total_kg / mass_kg - 1
-    told = f"the bodies weigh {total_kg:.1f} kg together, the person {mass_kg:.1f} kg ({100 * off:+.1f} %)"
+    sentence = f"the bodies weigh {total_kg:.1f} kg together, the person {mass_kg:.1f} kg ({100 * off:+.1f} %)"
     if abs(off) <= FORCE_MASS_TOLERANCE:
-        return [Verdict("pass", told)]
-    return [Verdict("fail" if abs(off) > CONTRADICTING_MASS else "caution", f"{told}; scale the model's masses")]
+        return [Verdict("pass", sentence)]
+    return [Verdict("fail" if abs(off) > CONTRADICTING_MASS else "caution", f"{sentence}; scale the model's masses")]
 
 
 def _placeholders(bsp: BodySegmentParameters) -> list[Verdict]:
@@ -275,12 +276,12 @@ def _placeholders(bsp: BodySegmentParameters) -> list[Verdict]:
             equal.append(f"{name} ({moments[0]:.3g} kg m2)")
         elif all(float(f"{value:.1e}") == value for value in moments):
             rounded.append(name)
-    found = []
+    verdicts = []
     if equal:
-        found.append(Verdict("caution", f"three equal moments of inertia, as placeholders have: {', '.join(equal)}"))
+        verdicts.append(Verdict("caution", f"three equal moments of inertia, as placeholders have: {', '.join(equal)}"))
     if rounded:
-        found.append(Verdict("caution", f"moments of inertia rounded to two digits or less: {', '.join(rounded)}"))
-    return found
+        verdicts.append(Verdict("caution", f"moments of inertia rounded to two digits or less: {', '.join(rounded)}"))
+    return verdicts
 
 
 def _symmetry(odd: list[str]) -> Verdict:
@@ -298,15 +299,17 @@ def _sides(bsp: BodySegmentParameters) -> list[str]:
             continue
         mean = (np.abs(table[i]) + np.abs(other[i])) / 2
         change = np.abs(table[i] - other[i])
-        told = []
+        differences = []
         if change[0] > _SIDE_MASS * mean[0]:
-            told.append(f"mass by {100 * change[0] / mean[0]:.0f} %")
+            differences.append(f"mass by {100 * change[0] / mean[0]:.0f} %")
         if (distance := float(np.linalg.norm(change[1:4]))) > _SIDE_COM_M:
-            told.append(f"centre of mass by {distance * 1e3:.0f} mm")
+            differences.append(f"centre of mass by {distance * 1e3:.0f} mm")
         if (change[4:7] > _SIDE_MOMENT * mean[4:7]).any():
-            told.append(f"a moment of inertia by {100 * (change[4:7] / np.maximum(mean[4:7], 1e-12)).max():.0f} %")
-        if told:
-            odd.append(f"{name[:-2]} ({', '.join(told)})")
+            differences.append(
+                f"a moment of inertia by {100 * (change[4:7] / np.maximum(mean[4:7], 1e-12)).max():.0f} %"
+            )
+        if differences:
+            odd.append(f"{name[:-2]} ({', '.join(differences)})")
     return odd
 
 

@@ -57,14 +57,14 @@ class PlateCheck:
         """Which foot when, in words; of many contacts their number."""
         if not self.contacts:
             return "none"
-        told = []
+        phrases = []
         for foot in dict.fromkeys(contact.foot for contact in self.contacts):
             spans = [(contact.start_s, contact.end_s) for contact in self.contacts if contact.foot == foot]
             listed = ", ".join(f"{start:.2f}-{end:.2f}" for start, end in spans)
             if len(spans) > _LISTED:
                 listed = f"{len(spans)} contacts, {spans[0][0]:.2f}-{spans[-1][1]:.2f}"
-            told.append(f"{_FOOT_NAMES[foot]} {listed} s")
-        return "; ".join(told)
+            phrases.append(f"{_FOOT_NAMES[foot]} {listed} s")
+        return "; ".join(phrases)
 
 
 @dataclass(frozen=True)
@@ -114,8 +114,8 @@ def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> Plat
 
 
 def _contacts(time: FloatArray, loaded: BoolArray, foot: str | None) -> list[Contact]:
-    found = [(float(time[first]), float(time[last])) for first, last in runs(bridged(time, loaded))]
-    return [Contact(foot, start, end) for start, end in found if end - start >= SHORTEST_CONTACT_S]
+    spans = [(float(time[first]), float(time[last])) for first, last in runs(bridged(time, loaded))]
+    return [Contact(foot, start, end) for start, end in spans if end - start >= SHORTEST_CONTACT_S]
 
 
 def _off_plate(force: FloatArray, moment: FloatArray, corners: FloatArray) -> tuple[float, float]:

@@ -79,7 +79,7 @@ class RecordingCheck:
         had = match.n_labels - len(match.missing)
         named = f"{match.name}{'' if match.fits else ' (the nearest preset)'}: {had} of its {match.n_labels} labels"
         missing = [label + (f" ({' or '.join(near)}?)" if near else "") for label, near in match.missing.items()]
-        told = [
+        facts = [
             ("frames", f"{len(markers.time)}{rate}{markers.time[-1]:.3f} s" if rate else "1"),
             ("in the file", axes),
             ("the person", self.travel.sentence()),
@@ -87,24 +87,24 @@ class RecordingCheck:
             ("marker set", named if had else "none known"),
         ]
         if self.telling is not None:
-            told.append(("movement", self.telling.sentence()))
+            facts.append(("movement", self.telling.sentence()))
         if missing and had:
-            told.append(("missing labels", ", ".join(missing)))
+            facts.append(("missing labels", ", ".join(missing)))
         if plates is None:
-            return [*told, ("forces", "none")]
+            return [*facts, ("forces", "none")]
         rate_hz = (len(plates.time) - 1) / (plates.time[-1] - plates.time[0])
-        told.append(("forces", f"{len(plates.names)} plates at {rate_hz:.6g} Hz"))
+        facts.append(("forces", f"{len(plates.names)} plates at {rate_hz:.6g} Hz"))
         spans = [f"{start:.3f} to {end:.3f} s" for start, end in self.windows]
-        told.append(("all contact measured", ", ".join(spans) or "nowhere, or unknown"))
+        facts.append(("all contact measured", ", ".join(spans) or "nowhere, or unknown"))
         if self.mass is not None:
             mass = self.mass
-            told.append(
+            facts.append(
                 (
                     "vertical force",
                     f"{mass.mass_kg:.1f} kg, mean over {mass.over} ({mass.start_s:.2f} to {mass.end_s:.2f} s)",
                 )
             )
-        return told
+        return facts
 
 
 def check_recording(
@@ -131,34 +131,34 @@ def check_recording(
         own = own.select([label for label in used.labels if label in own.labels])
     moves, seen = travel(own), visibility(own)
     standing = moves.kind == "stands still"
-    found, feet = judged_labels(match), None
+    verdicts, feet = judged_labels(match), None
     if used is not None:
         feet, trouble = _feet(recording.markers.labels, used)
-        found += trouble
+        verdicts += trouble
         if used.landmarks:
-            found += _facing(recording.markers, used, moves)
-            found += _static(recording, used) if standing else []
+            verdicts += _facing(recording.markers, used, moves)
+            verdicts += _static(recording, used) if standing else []
     doubts = (
         static_doubts(recording, used, recording.height_m if height_m is None else height_m)
         if standing
         else trial_doubts(recording, used, static, feet)
     )
-    found = [*_verdicts(doubts), *found]
+    verdicts = [*_verdicts(doubts), *verdicts]
     plates = check_plates(recording, feet)
-    trial, notes, told = _trial(recording, feet, window_s, standing)
+    trial, notes, trial_verdicts = _trial(recording, feet, window_s, standing)
     windows = () if trial is None else tuple(trial.windows())
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
-    found += [*_never(seen), *_gaps(within), *told, *_pressure(plates)]
+    verdicts += [*_never(seen), *_gaps(within), *trial_verdicts, *_pressure(plates)]
     if trial is not None and used is not None:
-        found += _turning(trial, used)
+        verdicts += _turning(trial, used)
         refused = any(one.refused for one in doubts)
-        found += [] if refused else _verdicts(motion_doubts(recording, trial, used))
-    found += _weight(mass, scale)
+        verdicts += [] if refused else _verdicts(motion_doubts(recording, trial, used))
+    verdicts += _weight(mass, scale)
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
-        recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(found), tuple(notes)
+        recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(verdicts), tuple(notes)
     )
 
 
@@ -185,12 +185,12 @@ def _gaps(markers: Markers) -> list[Verdict]:
         if one.share >= _RARE and one.longest_gap_s > LONGEST_BRIDGE_S
     ]
     where = f"from {markers.time[0]:.3f} to {markers.time[-1]:.3f} s"
-    found = []
+    verdicts = []
     if rare:
-        found.append(Verdict("caution", f"seen in less than half of the frames {where}: {_some(rare)}"))
+        verdicts.append(Verdict("caution", f"seen in less than half of the frames {where}: {_some(rare)}"))
     if long:
-        found.append(Verdict("caution", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {_some(long)}"))
-    return found or [Verdict("pass", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
+        verdicts.append(Verdict("caution", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {_some(long)}"))
+    return verdicts or [Verdict("pass", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
 
 
 def _some(names: Sequence[str]) -> str:
@@ -209,10 +209,10 @@ def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | N
         for segment, own in marker_set.segments.items()
         if segment in needed and (own or not marker_set.landmarks) and not set(own) & set(labels)
     ]
-    found = []
+    verdicts = []
     if bare:
-        found.append(Verdict("fail", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
-    return (feet if all(feet.values()) else None), found
+        verdicts.append(Verdict("fail", f"no marker of {', '.join(bare)}: a fit needs at least one on each"))
+    return (feet if all(feet.values()) else None), verdicts
 
 
 def _verdicts(doubts: Sequence[Doubt]) -> list[Verdict]:
@@ -251,8 +251,8 @@ def _trial(
 ) -> tuple[Trial | None, tuple[str, ...], list[Verdict]]:
     """The loads sorted by foot, notes, and whether all ground contact is known somewhere."""
     if recording.plates is None:
-        told = "no forces: a fit needs them; name the force file too, or a C3D file with plates"
-        return None, recording.notes, [] if standing else [Verdict("caution", told)]
+        sentence = "no forces: a fit needs them; name the force file too, or a C3D file with plates"
+        return None, recording.notes, [] if standing else [Verdict("caution", sentence)]
     if feet is None:
         return None, recording.notes, []
     try:
@@ -267,10 +267,10 @@ def _measured(trial: Trial, by_user: bool) -> Verdict:
     start, end = trial.windows()[0]
     frames = len(trial.markers.cut(start, end).time)
     what = "the user's window goes" if by_user else "every foot on the ground stands on a plate"
-    told = f"{what} from {start:.3f} to {end:.3f} s ({frames} frames)"
+    sentence = f"{what} from {start:.3f} to {end:.3f} s ({frames} frames)"
     if frames < FEWEST_FRAMES:
-        return Verdict("fail", f"{told}; a fit needs at least {FEWEST_FRAMES} frames")
-    return Verdict("pass", told)
+        return Verdict("fail", f"{sentence}; a fit needs at least {FEWEST_FRAMES} frames")
+    return Verdict("pass", sentence)
 
 
 def _pressure(plates: Sequence[PlateCheck]) -> list[Verdict]:
@@ -296,25 +296,25 @@ def _turning(trial: Trial, marker_set: MarkerSet) -> list[Verdict]:
     seen = np.isfinite(pelvis).all(axis=(1, 2))
     if not worn or not seen.any():
         return []
-    found = mean_turning(trial.loads, markers.time[seen], pelvis[seen].mean(axis=1))
-    return [] if found is None else [Verdict("caution" if found.contradicts else "pass", found.sentence())]
+    turning = mean_turning(trial.loads, markers.time[seen], pelvis[seen].mean(axis=1))
+    return [] if turning is None else [Verdict("caution" if turning.contradicts else "pass", turning.sentence())]
 
 
 def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
     if mass is None or scale_kg is None:
         return []
     off = mass.mass_kg / scale_kg - 1
-    told = (
+    sentence = (
         f"the vertical force corresponds to {mass.mass_kg:.1f} kg (mean over {mass.over}); "
         f"stated mass {scale_kg:.1f} kg ({100 * off:+.1f} %)"
     )
     if abs(off) <= FORCE_MASS_TOLERANCE:
-        return [Verdict("pass", told)]
+        return [Verdict("pass", sentence)]
     if hint := unit_hint(mass.mass_kg, scale_kg):
-        return [Verdict("fail", f"{hint}: {told}")]
+        return [Verdict("fail", f"{hint}: {sentence}")]
     return [
         Verdict(
             "fail" if abs(off) > CONTRADICTING_MASS else "caution",
-            f"{told}; check the mass, and the gain and zero of the plates",
+            f"{sentence}; check the mass, and the gain and zero of the plates",
         )
     ]

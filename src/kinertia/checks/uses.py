@@ -55,7 +55,7 @@ def uses(fit: Fit) -> list[Use]:
 
 def _moments(fit: Fit) -> Use:
     """By the residuals of the worst trial, and by the error bars where there are any."""
-    found = [verdict for trial in fit.trials for verdict in residual_verdicts(trial)]
+    verdicts = [verdict for trial in fit.trials for verdict in residual_verdicts(trial)]
     force, moment = (
         max(rms_length(trial.residuals["estimate"][:, part]) for trial in fit.trials)
         for part in (slice(0, 3), slice(3, 6))
@@ -67,23 +67,23 @@ def _moments(fit: Fit) -> Use:
         half = _BAND_SD * rms(np.concatenate(sds)[:, turns]) / fit.mass_kg
         reason += f"; 95 % of the joint moments lie within ± {half:.2f} N m/kg"
     if fit.warnings:  # of plates, clock, markers or masses: joint moments hang on all of them
-        found.append(Verdict("caution", ""))
+        verdicts.append(Verdict("caution", ""))
         reason += f"; {len(fit.warnings)} warning{'s' if len(fit.warnings) > 1 else ''} below"
-    return Use("joint moments", _with_convergence(fit, found), reason if fit.converged else _NOT_CONVERGED)
+    return Use("joint moments", _with_convergence(fit, verdicts), reason if fit.converged else _NOT_CONVERGED)
 
 
 _NOT_CONVERGED = "the estimate did not converge"
 
 
 def _motion(fit: Fit) -> Use:
-    found = [verdict_of_markers(fit, trial) for trial in fit.trials]
+    verdicts = [verdict_of_markers(fit, trial) for trial in fit.trials]
     apart = 1e3 * max(rms(trial.marker_errors_m["final"]) for trial in fit.trials)
     reason = f"model and measured markers are at most {apart:.1f} mm apart (RMS)"
-    return Use("motion", _with_convergence(fit, found), reason if fit.converged else _NOT_CONVERGED)
+    return Use("motion", _with_convergence(fit, verdicts), reason if fit.converged else _NOT_CONVERGED)
 
 
-def _with_convergence(fit: Fit, found: Sequence[Verdict]) -> Level:
-    return worst_level(found) if fit.converged else "fail"
+def _with_convergence(fit: Fit, verdicts: Sequence[Verdict]) -> Level:
+    return worst_level(verdicts) if fit.converged else "fail"
 
 
 def _segments(fit: Fit, name: str, columns: slice) -> Use:
@@ -98,15 +98,15 @@ def _segments(fit: Fit, name: str, columns: slice) -> Use:
     estimated = fit.posterior.prior_sd[:, columns] > 0
     information = fit.posterior.information[:, columns][estimated]
     shown, measured = int((information > INFORMED).sum()), int((information > MEASURED).sum())
-    told = f"the data show {shown} of {information.size} ({measured} of them well); the others are {start}'s"
+    reason = f"the data show {shown} of {information.size} ({measured} of them well); the others are {start}'s"
     if shown == information.size:
-        told = f"the data show all {shown} ({measured} of them well)"
+        reason = f"the data show all {shown} ({measured} of them well)"
     doubted = _doubted(fit, columns)
     if doubted:
-        told += f"; beyond {CONTRADICTION_SD:g} prior SDs from {start}: {', '.join(doubted)}"
+        reason += f"; beyond {CONTRADICTION_SD:g} prior SDs from {start}: {', '.join(doubted)}"
     if not shown:
         return Use(name, "fail", f"the data show none of {information.size}: these are {start}'s, not this person's")
-    return Use(name, "pass" if shown >= SHOWN_SHARE * information.size and not doubted else "caution", told)
+    return Use(name, "pass" if shown >= SHOWN_SHARE * information.size and not doubted else "caution", reason)
 
 
 def _doubted(fit: Fit, columns: slice) -> list[str]:

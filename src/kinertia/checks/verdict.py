@@ -58,20 +58,20 @@ class Verdict(NamedTuple):
 
 def verdicts(fit: Fit) -> list[Verdict]:
     """Can a fit be used? Convergence, physics, the literature, residuals and markers of every trial."""
-    found = [_convergence(fit), _physics(fit.estimate), _literature(fit)]
+    judged = [_convergence(fit), _physics(fit.estimate), _literature(fit)]
     for trial in fit.trials:
-        found += [*residual_verdicts(trial), verdict_of_markers(fit, trial)]
-    return found
+        judged += [*residual_verdicts(trial), verdict_of_markers(fit, trial)]
+    return judged
 
 
-def stands_against(found: Iterable[Verdict]) -> bool:
+def stands_against(judged: Iterable[Verdict]) -> bool:
     """Whether any check failed: exit status 1."""
-    return any(verdict.level == "fail" for verdict in found)
+    return any(verdict.level == "fail" for verdict in judged)
 
 
-def worst_level(found: Iterable[Verdict]) -> Level:
+def worst_level(judged: Iterable[Verdict]) -> Level:
     """The worst of the levels; "pass" of none."""
-    levels = {verdict.level for verdict in found}
+    levels = {verdict.level for verdict in judged}
     return "fail" if "fail" in levels else "caution" if "caution" in levels else "pass"
 
 
@@ -147,21 +147,23 @@ def _lengths(residual: np.ndarray) -> list[np.ndarray]:
     return [np.linalg.norm(part, axis=1) for part in np.hsplit(residual, 2)]
 
 
-def _and(verdict: Verdict, told: str) -> Verdict:
+def _and(verdict: Verdict, remark: str) -> Verdict:
     """The same with something to know beside it."""
-    return verdict._replace(sentence=f"{verdict.sentence}; {told}")
+    return verdict._replace(sentence=f"{verdict.sentence}; {remark}")
 
 
 def verdict_of_markers(fit: Fit, trial: TrialFit) -> Verdict:
     """How far the model's markers are from the measured ones, at the motion that the forces go with."""
     apart_m = rms(trial.marker_errors_m["final"])
-    told = f"{trial.name}: model and measured markers are {apart_m * 1e3:.1f} mm apart (RMS)"
+    sentence = f"{trial.name}: model and measured markers are {apart_m * 1e3:.1f} mm apart (RMS)"
     if apart_m <= PASS_MARKERS_M:
-        return Verdict("pass", f"{told}; well within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm)")
+        return Verdict("pass", f"{sentence}; well within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm)")
     if apart_m <= CAUTION_MARKERS_M:
-        return Verdict("caution", f"{told}; within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm), marginally")
+        return Verdict(
+            "caution", f"{sentence}; within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm), marginally"
+        )
     advice = "" if fit.file is None else "; let markers and joint centres move (--calibrate)"
-    return Verdict("fail", f"{told}, beyond OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm){advice}")
+    return Verdict("fail", f"{sentence}, beyond OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm){advice}")
 
 
 def _by_guideline(
@@ -169,7 +171,7 @@ def _by_guideline(
 ) -> Verdict:
     """Verdict on vector lengths (w,) by limits of RMS and peak."""
     typical, peak = rms(size), float(size.max())
-    told = f"{what} RMS {typical:.1f} {unit}, peak {peak:.1f} {unit}"
+    sentence = f"{what} RMS {typical:.1f} {unit}, peak {peak:.1f} {unit}"
     levels: tuple[tuple[Level, str, tuple[float, float]], ...] = (
         ("pass", "well within", passing),
         ("caution", "marginally within", marginal),
@@ -177,6 +179,8 @@ def _by_guideline(
     for level, where, limits in levels:
         if typical <= limits[0] and peak <= limits[1]:
             return Verdict(
-                level, f"{told}: {where} OpenSim's guideline (at most {limits[0]:g} and {limits[1]:g} {unit})"
+                level, f"{sentence}: {where} OpenSim's guideline (at most {limits[0]:g} and {limits[1]:g} {unit})"
             )
-    return Verdict("fail", f"{told}: beyond OpenSim's guideline (at most {marginal[0]:g} and {marginal[1]:g} {unit})")
+    return Verdict(
+        "fail", f"{sentence}: beyond OpenSim's guideline (at most {marginal[0]:g} and {marginal[1]:g} {unit})"
+    )

@@ -151,39 +151,39 @@ def _check_models(
     paths: Sequence[Path], mass_kg: float | None, height_m: float | None, sex: str | None
 ) -> tuple[list[tuple[str, ModelCheck]], list[str]]:
     """Findings by title, and a sentence for each model that cannot be read."""
-    found, mistakes = [], []
+    checks, mistakes = [], []
     for path in paths:
         try:
             model = read_osim(path)
         except KinertiaError as error:
             mistakes.append(str(error))
             continue
-        found.append((path.name, check_model(model.skeleton, model.bsp, mass_kg, height_m, sex)))
-    return found, mistakes
+        checks.append((path.name, check_model(model.skeleton, model.bsp, mass_kg, height_m, sex)))
+    return checks, mistakes
 
 
 def _show_facts(title: str, facts: Sequence[tuple[str, str]]) -> None:
     out.print(f"\n{title}")
     table = Table.grid(padding=(0, 2), expand=False)
-    for name, told in facts:
-        table.add_row(name, told)
+    for name, sentence in facts:
+        table.add_row(name, sentence)
     out.print(table)
 
 
-def _show_model(title: str, found: ModelCheck) -> None:
-    _show_facts(title, found.facts())
-    table = plain_table(*found.columns)
-    for row in found.rows():
+def _show_model(title: str, model_check: ModelCheck) -> None:
+    _show_facts(title, model_check.facts())
+    table = plain_table(*model_check.columns)
+    for row in model_check.rows():
         table.add_row(*row)
     out.print(table)
-    show_verdicts(found.verdicts)
-    for sentence in found.left_out:
+    show_verdicts(model_check.verdicts)
+    for sentence in model_check.left_out:
         out.print(f"left out: {sentence}")
 
 
-def _show_recording(title: str, found: RecordingCheck, verbose: bool) -> None:
-    _show_facts(title, found.facts())
-    shown = [one for one in found.markers if verbose or one.share < 1.0]
+def _show_recording(title: str, recording_check: RecordingCheck, verbose: bool) -> None:
+    _show_facts(title, recording_check.facts())
+    shown = [one for one in recording_check.markers if verbose or one.share < 1.0]
     if shown:
         gaps = plain_table("marker", "seen\n(%)", "longest gap\n(s)")
         for one in shown if verbose else shown[:_LISTED]:
@@ -191,13 +191,13 @@ def _show_recording(title: str, found: RecordingCheck, verbose: bool) -> None:
         out.print(gaps)
         if not verbose and len(shown) > _LISTED:
             out.print(f"and {len(shown) - _LISTED} more markers with gaps (--verbose lists them)")
-    if found.plates:
+    if recording_check.plates:
         plates = plain_table("plate", "foot on plate", "peak\n(N)", "off plate\n(% of load)")
         plates.padding = (0, 1)
-        for plate in found.plates:
+        for plate in recording_check.plates:
             off = "-" if plate.outside_share is None else f"{100 * plate.outside_share:.0f}"
             plates.add_row(plate.name, plate.stood_on(), f"{plate.peak_n:.0f}", off)
         out.print(plates)
-    show_verdicts(found.verdicts)
-    for note in found.notes:
+    show_verdicts(recording_check.verdicts)
+    for note in recording_check.notes:
         out.print(f"assumed: {note}")

@@ -45,8 +45,10 @@ def compare(
     for sentence in remarks(fits):
         out.print(f"note: {sentence}")
     for name, other in others:
-        found = differences(first, other)
-        changed = [f"{one.parameter} of {one.segment}" for one in found if one.changed]
-        told = f"{name} against {first_name}: {len(changed)} of {len(found)} parameters changed beyond their error bars"
-        out.print(told + (f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})" if changed else ""))
+        compared = differences(first, other)
+        changed = [f"{one.parameter} of {one.segment}" for one in compared if one.changed]
+        line = (
+            f"{name} against {first_name}: {len(changed)} of {len(compared)} parameters changed beyond their error bars"
+        )
+        out.print(line + (f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})" if changed else ""))
     out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)

@@ -102,14 +102,14 @@ def _report_demo(result: Demo, folder: Path) -> None:
     out.print("usual pipeline: measured motion, literature BSPs, forces as measured\n")
     sources = list(bodies)[1:]
     errors = plain_table("RMS error against the truth", "", *sources)
-    found = [result.rms_errors(bodies[source]) for source in sources]
+    rms_errors = [result.rms_errors(bodies[source]) for source in sources]
     named = (
         ("mass", "kg", ".2f", 1.0),
         ("centre of mass", "mm", ".0f", 1e3),
         ("moments of inertia", "kg m2", ".4f", 1.0),
     )
     for k, (what, unit, form, factor) in enumerate(named):
-        errors.add_row(what, unit, *(f"{values[k] * factor:{form}}" for values in found))
+        errors.add_row(what, unit, *(f"{values[k] * factor:{form}}" for values in rms_errors))
     out.print(errors)
     loads = {**trial.residuals, "two-level": result.two_level.trials[0].residuals["estimate"]}
     out.print(
@@ -120,8 +120,8 @@ def _report_demo(result: Demo, folder: Path) -> None:
         )
         + "\n"
     )
-    out.print(_verdict(found[0], found[1]) + "\n")
-    out.print(_two_level_verdict(found[0], found[2]) + "\n")
+    out.print(_verdict(rms_errors[0], rms_errors[1]) + "\n")
+    out.print(_two_level_verdict(rms_errors[0], rms_errors[2]) + "\n")
     for name, one in (("estimate", fit), ("two-level", result.two_level)):
         for warning in one.warnings:
             out.print(f"warning ({name}): {warning}")

@@ -38,8 +38,8 @@ def export(
     results_folder(output, force)
     fit = load_fit(results)
     with complete_folder(output, "export") as work:
-        told = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}
-        (work / "export.json").write_text(dumps(told, indent=2) + "\n", encoding="utf-8")
+        content = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}
+        (work / "export.json").write_text(dumps(content, indent=2) + "\n", encoding="utf-8")
         if csv:
             write_csv(fit, work)
         if json:

@@ -19,12 +19,12 @@ _STAGES = ("literature", "corrected", "estimate")
 
 def report_fit(fit: Fit) -> None:
     """Who and how, residuals of every trial, the table of segments, masses and warnings."""
-    told = summary(fit)
-    subject, mass = told["subject"], told["total_mass_kg"]
+    fit_summary = summary(fit)
+    subject, mass = fit_summary["subject"], fit_summary["total_mass_kg"]
     height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
     person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
-    out.print(f"\n{subject['name']}: {person}; method {told['method']}; {fit.notes[0]}")
-    for trial in told["trials"]:
+    out.print(f"\n{subject['name']}: {person}; method {fit_summary['method']}; {fit.notes[0]}")
+    for trial in fit_summary["trials"]:
         _report_trial(trial, _before(fit))
     out.print(_bsp_table(fit))
     if fit.posterior is not None:

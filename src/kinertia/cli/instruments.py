@@ -46,9 +46,9 @@ def instruments(
         with shown_progress() as progress:
             fit = fit_subject(each, progress)
         people.append(person_instruments(fit, recordings(each)))
-    found = session_instruments(people, wanted[0].instruments)
-    write_then_rename(output, session_text(VERSION, found.found, found.people))
-    _report(found)
+    session = session_instruments(people, wanted[0].instruments)
+    write_then_rename(output, session_text(VERSION, session.values, session.people))
+    _report(session)
     out.print(f"written to {output}; name it in the subject files: session = ... under [instruments]", soft_wrap=True)
 
 
@@ -74,12 +74,12 @@ def _check_output(output: Path) -> None:
             raise FileError(output, "not a file that kinertia instruments wrote; give another name with -o") from None
 
 
-def _report(found: SessionInstruments) -> None:
+def _report(session: SessionInstruments) -> None:
     table = plain_table("instrument", "unknown", "found", "sd", "unit")
-    for instrument, told in found.found.items():
-        for unknown, (value, sd, unit) in told.items():
+    for instrument, unknowns in session.values.items():
+        for unknown, (value, sd, unit) in unknowns.items():
             factor, shown = SHOWN_UNIT[unit]
             table.add_row(instrument, unknown, f"{value * factor:+.1f}", f"{sd * factor:.1f}", shown)
     out.print(table)
-    for sentence in found.contradictions:
+    for sentence in session.contradictions:
         show_warning(sentence)

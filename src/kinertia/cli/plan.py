@@ -42,25 +42,25 @@ def plan(
     with shown_progress() as progress:
         if subject is None:
             progress("predicting", 0.0)
-            found = plan_motions()
+            planned = plan_motions()
         else:
             wanted = read_subject(subject)
-            found = plan_motions(prepare_subject(wanted, progress), wanted.settings.cutoff_hz)
-    _report_plan(found)
+            planned = plan_motions(prepare_subject(wanted, progress), wanted.settings.cutoff_hz)
+    _report_plan(planned)
     with complete_folder(output, "plan") as work:
-        found.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
-        counts = {" + ".join(names): found.counts(names) for names in found.sd}
-        told = json.dumps({"kinertia": VERSION, "recordings": counts}, indent=2)
-        (work / "plan.json").write_text(told + "\n", encoding="utf-8")
+        planned.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
+        counts = {" + ".join(names): planned.counts(names) for names in planned.sd}
+        text = json.dumps({"kinertia": VERSION, "recordings": counts}, indent=2)
+        (work / "plan.json").write_text(text + "\n", encoding="utf-8")
     out.print(f"predicted sd of every parameter in {output / 'plan.csv'}, counts in plan.json")
 
 
-def _report_plan(found: Plan) -> None:
+def _report_plan(planned: Plan) -> None:
     table = plain_table("recorded", "measured", "informed", "assumed", "mass", "CoM", "Ixx Iyy Izz")
-    for names in found.sd:
-        ratio = found.sd[names] / found.prior_sd
+    for names in planned.sd:
+        ratio = planned.sd[names] / planned.prior_sd
         means = (ratio[:, columns].mean() for columns in (slice(0, 1), slice(1, 4), slice(4, 7)))
-        counts = (str(count) for count in found.counts(names).values())
+        counts = (str(count) for count in planned.counts(names).values())
         table.add_row(" + ".join(names), *counts, *(f"{value:.2f}" for value in means))
     out.print(
         "\nHow many of the parameters each recording would leave measured, informed, assumed (the literature's); and "
@@ -87,21 +87,21 @@ def crossval(
     with shown_progress() as progress:
         ready = prepare_subject(wanted, progress)
         bandwidth = Bandwidth.of(ready.kinematics, wanted.settings.cutoff_hz)
-        found = cross_validate(ready, bandwidth, progress)
-    _report_crossval(found, "literature" if ready.file is None else "model")
+        held_out = cross_validate(ready, bandwidth, progress)
+    _report_crossval(held_out, "literature" if ready.file is None else "model")
     with complete_folder(output, "crossval") as work:
-        told = json.dumps({"kinertia": VERSION, "held_out": [asdict(held) for held in found]}, indent=2)
-        (work / "crossval.json").write_text(told + "\n", encoding="utf-8")
+        text = json.dumps({"kinertia": VERSION, "held_out": [asdict(held) for held in held_out]}, indent=2)
+        (work / "crossval.json").write_text(text + "\n", encoding="utf-8")
     out.print(f"results in {output / 'crossval.json'}")
 
 
-def _report_crossval(found: tuple[HeldOut, ...], before: str) -> None:
+def _report_crossval(held_out: tuple[HeldOut, ...], before: str) -> None:
     table = plain_table("held out", "", "objective", "force\n(N)", "moment\n(N m)", "markers\n(mm)")
-    for held in found:
-        for source, told in ((before, held.literature), ("others", held.estimate)):
-            cells = (f"{told.objective:.0f}", f"{told.force_rms_n:.1f}", f"{told.moment_rms_nm:.1f}")
-            table.add_row(held.trial, source, *cells, f"{told.marker_rms_m * 1e3:.1f}")
+    for held in held_out:
+        for source, explained in ((before, held.literature), ("others", held.estimate)):
+            cells = (f"{explained.objective:.0f}", f"{explained.force_rms_n:.1f}", f"{explained.moment_rms_nm:.1f}")
+            table.add_row(held.trial, source, *cells, f"{explained.marker_rms_m * 1e3:.1f}")
     out.print(f"\nMotion and calibration estimated with frozen BSPs: the {before}'s, and those from the other trials.")
     out.print(table)
-    better = sum(held.estimate.objective < held.literature.objective for held in found)
-    out.print(f"the BSPs from the other trials explain {better} of {len(found)} held-out trials better")
+    better = sum(held.estimate.objective < held.literature.objective for held in held_out)
+    out.print(f"the BSPs from the other trials explain {better} of {len(held_out)} held-out trials better")

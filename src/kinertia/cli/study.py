@@ -63,13 +63,13 @@ def table1(
         measured = None if trial is None else measured_trial(read_subject(trial), progress)
         if variants:
             walk = None if measured is None else measured[0]
-            found = run_variants(walk, repeats=repeats, seed=seed, progress=lambda share: progress("variants", share))
+            results = run_variants(walk, repeats=repeats, seed=seed, progress=lambda share: progress("variants", share))
         else:
             source, name = measured or (study_trial(), "synthetic walk")
             table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     if variants:
-        _report_variants(found, seed)
-        save_variants(found, output)
+        _report_variants(results, seed)
+        save_variants(results, output)
         _say_where(output, ("variants.md", "variants.csv"), "variants.png")
         return
     _report_table1(table, source.deviation)
@@ -77,12 +77,12 @@ def table1(
     _say_where(output, ("report.html", "table1.json", "table1.csv"), "table1.png")
 
 
-def _report_variants(found: Mapping[str, Table1], seed: int) -> None:
+def _report_variants(results: Mapping[str, Table1], seed: int) -> None:
     out.print(f"\nseed {seed}. RMS error without / with correction, both with noise: mean over the draws.\n")
     # forces and torques are in the files: a terminal is not as wide
     wanted = [k for k, heading in enumerate(VARIANT_HEADINGS) if "pelvis" not in heading and "without" not in heading]
     shown = plain_table(*(VARIANT_HEADINGS[k] for k in wanted))
-    for row in variants_rows(found):
+    for row in variants_rows(results):
         shown.add_row(*(row[k] for k in wanted))
     out.print(shown)
 
@@ -123,8 +123,8 @@ def accuracy(
     """
     results_folder(output, force)
     with shown_progress() as progress:
-        found = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
-    for scenario in found.values():
+        accuracies = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
+    for scenario in accuracies.values():
         out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
         for headings, rows in ((JOINT_HEADINGS, joint_rows), (HEADINGS, accuracy_rows)):
             shown = plain_table(*headings)
@@ -132,7 +132,7 @@ def accuracy(
                 shown.add_row(*row)
             out.print(shown)
     out.print(JOINT_CAPTION)
-    save_accuracy(found, seed, output)
+    save_accuracy(accuracies, seed, output)
     out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
 
 
@@ -153,12 +153,12 @@ def sensitivity(
     """
     results_folder(output, force)
     with shown_progress() as progress:
-        found = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
+        result = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
     for kind, title in KINDS.items():
-        listed = ", ".join(found.insensitive(kind)) or "none"
+        listed = ", ".join(result.insensitive(kind)) or "none"
         out.print(f"small errors up to twice the amplitude of {title}: {listed}")
-    out.print(f"shown by no condition: {', '.join(found.never()) or 'none'}")
-    save_sensitivity(found, output)
+    out.print(f"shown by no condition: {', '.join(result.never()) or 'none'}")
+    save_sensitivity(result, output)
     _say_where(output, ("sensitivity.md", "sensitivity.json", "sensitivity.csv"), "sensitivity.png")
 
 

@@ -65,15 +65,15 @@ class Demo:
         true = inverse_dynamics(self.walk.skeleton, self.walk.bsp, self.walk.motion.cut(at), self.walk.foot_loads[at])
         coordinates = self.walk.skeleton.coordinates
         expected = pd.DataFrame(true, columns=list(coordinates))
-        found = {}
+        errors = {}
         for joint, begins in JOINTS.items():
             names = [n for n in coordinates if n.startswith(begins) and n in trial.moments["estimate"]]
             before, after = (
                 rms(trial.moments[stage][names].to_numpy() - expected[names].to_numpy())
                 for stage in ("literature", "estimate")
             )
-            found[joint] = (before, after)
-        return found
+            errors[joint] = (before, after)
+        return errors
 
     @cached_property
     def table(self) -> pd.DataFrame:

@@ -111,21 +111,21 @@ def cycle_curves(
         time, curve = stride.time, partial(CycleCurve, trial.name, stride)
         angle, speed, moment, spread = source.angle(time), source.speed(time), source.moment(time), source.sd(time)
         moment, spread = moment / mass_kg, None if spread is None else spread / mass_kg
-        found = []
+        curves = []
         for base, columns in sides.items():
             column = columns.get(stride.side, columns.get(""))
             if column is None or not skeleton.rotational[column]:
                 continue
-            found.append(curve("angle", f"{base}_angle", np.degrees(angle[:, column]), None))
+            curves.append(curve("angle", f"{base}_angle", np.degrees(angle[:, column]), None))
             if column >= _ROOT_COORDINATES:
                 sd = None if spread is None else spread[:, column]
                 power_sd = None if sd is None else sd * np.abs(speed[:, column])
-                found.append(curve("moment", f"{base}_moment", moment[:, column], sd))
-                found.append(curve("power", f"{base}_power", moment[:, column] * speed[:, column], power_sd))
+                curves.append(curve("moment", f"{base}_moment", moment[:, column], sd))
+                curves.append(curve("power", f"{base}_power", moment[:, column] * speed[:, column], power_sd))
         ground = source.force(time)[:, FEET.index(stride.side)] @ _directions(path, stride.side).T
         share = 100.0 * ground / (mass_kg * GRAVITY_M_S2)
-        found += [curve("force", name, values, None) for name, values in zip(FORCES, share.T, strict=True)]
-        yield from (one for one in found if np.isfinite(one.value).any())
+        curves += [curve("force", name, values, None) for name, values in zip(FORCES, share.T, strict=True)]
+        yield from (one for one in curves if np.isfinite(one.value).any())
 
 
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
@@ -185,7 +185,7 @@ def cycle_columns(
     trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate", most_strides: int | None = None
 ) -> dict[str, Any]:
     """The columns of `Fit.cycles`, by name; of at most so many strides per trial and side, evenly spread."""
-    found = [
+    curves = [
         one
         for trial in trials
         for one in cycle_curves(trial, mass_kg, stage, spread_evenly(trial.strides, most_strides))
@@ -193,13 +193,13 @@ def cycle_columns(
     samples = len(PERCENT)
     unknown = np.full(samples, np.nan)
     return {
-        "trial": [one.trial for one in found for _ in range(samples)],
-        "side": [one.stride.side for one in found for _ in range(samples)],
-        "stride": np.repeat([one.stride.number for one in found], samples).astype(int),
-        "percent": np.tile(PERCENT, len(found)).astype(int),
-        "quantity": [one.quantity for one in found for _ in range(samples)],
-        "value": np.concatenate([one.value for one in found]) if found else np.zeros(0),
-        "sd": np.concatenate([unknown if one.sd is None else one.sd for one in found]) if found else np.zeros(0),
+        "trial": [one.trial for one in curves for _ in range(samples)],
+        "side": [one.stride.side for one in curves for _ in range(samples)],
+        "stride": np.repeat([one.stride.number for one in curves], samples).astype(int),
+        "percent": np.tile(PERCENT, len(curves)).astype(int),
+        "quantity": [one.quantity for one in curves for _ in range(samples)],
+        "value": np.concatenate([one.value for one in curves]) if curves else np.zeros(0),
+        "sd": np.concatenate([unknown if one.sd is None else one.sd for one in curves]) if curves else np.zeros(0),
     }
 
 

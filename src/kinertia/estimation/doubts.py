@@ -44,9 +44,9 @@ def static_doubts(static: Recording, marker_set: MarkerSet | None, height_m: flo
         height_m: as stated, where it is known.
     """
     own = _worn(static.markers, marker_set)
-    found = _refused(axes_trouble(extent_m(own)) or spikes_trouble(own) or _sides(static.markers, marker_set))
-    if found or marker_set is None or not marker_set.landmarks:
-        return found
+    doubts = _refused(axes_trouble(extent_m(own)) or spikes_trouble(own) or _sides(static.markers, marker_set))
+    if doubts or marker_set is None or not marker_set.landmarks:
+        return doubts
     stature = [] if height_m is None else stature_doubts(static, marker_set, height_m)
     return _told([*floor_doubts(static.markers, marker_set), *stature])
 
@@ -86,11 +86,11 @@ def trial_doubts(
         return _refused(trouble)
     # a stretch that was written by a computer often ends with a jump
     straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
-    told = [*straight, *jump_doubts(own), *session]
+    sentences = [*straight, *jump_doubts(own), *session]
     if recording.plates is not None:
-        told += loads_doubts(recording.plates)
-        told += [] if feet is None else load_places_doubts(recording, feet)
-    return _told(told)
+        sentences += loads_doubts(recording.plates)
+        sentences += [] if feet is None else load_places_doubts(recording, feet)
+    return _told(sentences)
 
 
 def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> list[Doubt]:

@@ -61,16 +61,16 @@ class ForceMass:
 
     def sentence(self, mass_kg: float) -> str:
         """What was found beside this stated mass, what may be the cause, and what to do."""
-        told = (
+        text = (
             f"from {self.time[0]:.3f} to {self.time[-1]:.3f} s the vertical force corresponds to {self.mass_kg:.1f} "
             f"kg; stated mass {mass_kg:.1f} kg"
         )
         if hint := unit_hint(self.mass_kg, mass_kg):
-            return f"{hint}: {told}"
+            return f"{hint}: {text}"
         share = self.carried / mass_kg - 1.0
         if self.mass_kg > mass_kg:
             return (
-                f"{told}; correct the mass, the gain, the zero or the units of the plates, or see who else is on them"
+                f"{text}; correct the mass, the gain, the zero or the units of the plates, or see who else is on them"
             )
         whole = np.abs(share) < _CARRIED
         spans = [(a, b) for a, b in runs(share < -_MISSING) if self.time[b] - self.time[a] >= _SHORTEST_S]
@@ -78,12 +78,12 @@ class ForceMass:
             first, last = max(spans, key=lambda span: span[1] - span[0])
             lost = -100.0 * float(share[first : last + 1].mean())
             return (
-                f"{told}; in {100 * whole.mean():.0f} % of this time the plates carry all of it, but from "
+                f"{text}; in {100 * whole.mean():.0f} % of this time the plates carry all of it, but from "
                 f"{self.time[first]:.3f} to {self.time[last]:.3f} s {lost:.0f} % are missing: something that is not "
                 f"measured was stood or leant on; give the other part of the trial as window_s"
             )
         return (
-            f"{told}, and something is missing nearly all the time: correct the mass, or the gain and zero of the "
+            f"{text}, and something is missing nearly all the time: correct the mass, or the gain and zero of the "
             f"plates, if nothing else can have carried a part of the weight (a chair, a handrail, a harness, a foot "
             f"beside the plates)"
         )
@@ -103,7 +103,7 @@ _UNIT_OFF = 0.1
 def unit_hint(by_force_kg: float, stated_kg: float) -> str:
     """The unit that is wrong, where forces and stated mass differ as two units do; else empty."""
     ratio = by_force_kg / stated_kg
-    return next((told for factor, told in _UNITS if abs(ratio / factor - 1) <= _UNIT_OFF), "")
+    return next((hint for factor, hint in _UNITS if abs(ratio / factor - 1) <= _UNIT_OFF), "")
 
 
 def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
@@ -155,4 +155,4 @@ def check_masses(mass_kg: float, by_force: Sequence[ForceMass]) -> None:
 
 def check_force_masses(skeleton: Skeleton, mass_kg: float, trials: Sequence[Trial]) -> None:
     """`check_masses` of the trials whose forces tell a mass."""
-    check_masses(mass_kg, [found for trial in trials if (found := force_mass(skeleton, trial)) is not None])
+    check_masses(mass_kg, [mass for trial in trials if (mass := force_mass(skeleton, trial)) is not None])

@@ -161,14 +161,14 @@ def _words(segments: Sequence[str], vector: np.ndarray) -> str:
                     name = f"both {_PLURALS.get(stem, stem + 's')}" if same else f"the right {stem} and not of the left"
             terms.append((float(value), f"{_QUANTITIES[parameter]} of {name}"))
     terms.sort(key=lambda term: -abs(term[0]))
-    told: list[str] = []
+    phrases: list[str] = []
     share = 0.0
     for value, name in terms[:_MOST_NAMES]:
-        told.append(f"{'with' if value * terms[0][0] > 0 else 'against'} {name}" if told else name)
+        phrases.append(f"{'with' if value * terms[0][0] > 0 else 'against'} {name}" if phrases else name)
         share += value**2
         if share > _NAMED_SHARE:
             break
-    return ", ".join(told) + ("" if share > _NAMED_SHARE else ", and others")
+    return ", ".join(phrases) + ("" if share > _NAMED_SHARE else ", and others")
 
 
 def _never(

@@ -41,22 +41,22 @@ def complete_subject(
         SubjectError: neither the user nor a file gives mass or height, or the value cannot be true.
     """
     warnings = []
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for quantity, option in (("mass_kg", "--mass"), ("height_m", "--height")):
-        told = [(r.name, getattr(r, quantity)) for r in recordings if getattr(r, quantity) is not None]
+        stated = [(r.name, getattr(r, quantity)) for r in recordings if getattr(r, quantity) is not None]
         given = getattr(subject, quantity)
-        if given is None and not told:
+        if given is None and not stated:
             if mass_only and quantity == "height_m":
                 continue
             raise SubjectError(
                 quantity, None, f"no file carries it; give it with {option} or as {quantity} under [subject]"
             )
-        found[quantity] = told[0][1] if given is None else given
-        for name, value in told:
-            if abs(value - found[quantity]) > 0.01 * found[quantity]:
-                warnings.append(f"{quantity} is taken as {found[quantity]:g}, but the file of '{name}' says {value:g}")
-    check_subject(found["mass_kg"], found.get("height_m", 1.7), subject.sex or "male")
-    return subject.model_copy(update=found), warnings
+        values[quantity] = stated[0][1] if given is None else given
+        for name, value in stated:
+            if abs(value - values[quantity]) > 0.01 * values[quantity]:
+                warnings.append(f"{quantity} is taken as {values[quantity]:g}, but the file of '{name}' says {value:g}")
+    check_subject(values["mass_kg"], values.get("height_m", 1.7), subject.sex or "male")
+    return subject.model_copy(update=values), warnings
 
 
 def check_visible(skeleton: Skeleton, trial: Trial) -> None:

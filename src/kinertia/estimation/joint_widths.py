@@ -17,18 +17,18 @@ def with_widths(
 
     What the subject file says goes before the static trial, and that before the other trials.
     """
-    names, found, notes = dict(marker_set.widths), dict(static.measurements), []
+    names, widths_m, notes = dict(marker_set.widths), dict(static.measurements), []
     for joint in WIDTHS:
         key = f"{joint.rpartition('_')[0]}_width_mm"
         given = getattr(subject, key)
         if given is not None:
-            names[joint], found[key] = key, given / 1e3
+            names[joint], widths_m[key] = key, given / 1e3
             continue
         name = names.get(joint)
-        if name is None or found.get(name, 0.0) > 0.0:
+        if name is None or widths_m.get(name, 0.0) > 0.0:
             continue
         other = next((trial for trial in trials if trial.measurements.get(name, 0.0) > 0.0), None)
         if other is not None:
-            found[name] = other.measurements[name]
-            notes.append(f"{name} is from {other.name}, {1e3 * found[name]:.0f} mm: {static.name} does not have it")
-    return replace(static, measurements=found), replace(marker_set, widths=names), notes
+            widths_m[name] = other.measurements[name]
+            notes.append(f"{name} is from {other.name}, {1e3 * widths_m[name]:.0f} mm: {static.name} does not have it")
+    return replace(static, measurements=widths_m), replace(marker_set, widths=names), notes

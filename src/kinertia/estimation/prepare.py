@@ -156,8 +156,8 @@ def prepare(
     warnings += warnings_of(static.name, static_doubts(static, marker_set, subject.height_m))
     turned = []
     for item in inputs:
-        trial, told = _looked_at(item, static, marker_set)
-        warnings += told
+        trial, doubts = _looked_at(item, static, marker_set)
+        warnings += doubts
         turned.append(_turned(trial, marker_set))
     model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
     literature = literature_bsp(

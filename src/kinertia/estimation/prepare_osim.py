@@ -59,8 +59,8 @@ def prepare_osim(
     started = time.perf_counter()
     trials = []
     for item in inputs:
-        trial, told = _looked_at(model, item, feet)
-        warnings += told
+        trial, doubts = _looked_at(model, item, feet)
+        warnings += doubts
         trials.append(trial)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
@@ -159,12 +159,12 @@ def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
     """
     joints = list(skeleton.joints)
     locked: dict[str, float] = {}
-    for i, (joint, told) in enumerate(zip(joints, model.joints, strict=True)):
+    for i, (joint, osim_joint) in enumerate(zip(joints, model.joints, strict=True)):
         turns = [a for a in joint.axes if a.kind == "rotation" and a.coordinate not in skeleton.locked]
-        if i == 0 or told.offset is None or len({a.coordinate for a in turns}) < 3:
+        if i == 0 or osim_joint.offset is None or len({a.coordinate for a in turns}) < 3:
             continue
         columns = np.asarray(joint.rotation).T @ np.eye(3)
-        names = [f"{told.name}/offset_{axis}" for axis in "xyz"]
+        names = [f"{osim_joint.name}/offset_{axis}" for axis in "xyz"]
         offsets = [
             Axis(name, "translation", tuple(map(float, column)))  # type: ignore[arg-type]
             for name, column in zip(names, columns.T, strict=True)

@@ -211,8 +211,8 @@ class Fit:
         columns["literature"], columns["estimate"] = columns.pop("value"), self.estimate.columns()["value"]
         if self.posterior is None:
             return columns
-        told = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
-        return {**columns, **told, "evidence": [evidence(value) for value in told["information"]]}
+        of_posterior = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
+        return {**columns, **of_posterior, "evidence": [evidence(value) for value in of_posterior["information"]]}
 
     def cycles(self, stage: Stage = "estimate") -> pd.DataFrame:
         """Curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.

@@ -18,7 +18,7 @@ from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.io.session_file import PersonInstruments
 from kinertia.settings import Instruments
 
-Found: TypeAlias = dict[str, dict[str, tuple[float, float, str]]]
+InstrumentValues: TypeAlias = dict[str, dict[str, tuple[float, float, str]]]
 _APART_SD = 3.0
 
 
@@ -28,12 +28,12 @@ class SessionInstruments:
 
     Attributes:
         people: what each person's trials say.
-        found: per instrument, per unknown its value, posterior deviation and unit, SI.
+        values: per instrument, per unknown its value, posterior deviation and unit, SI.
         contradictions: one sentence for each unknown of which a person says what the others do not.
     """
 
     people: tuple[PersonInstruments, ...]
-    found: Found
+    values: InstrumentValues
     contradictions: tuple[str, ...] = ()
 
 
@@ -65,8 +65,8 @@ def session_instruments(people: Sequence[PersonInstruments], stated: Instruments
     apart = []
     # of two, one contradicts the other
     for person in people if len(people) > 2 else people[: len(people) - 1]:
-        rest = _found([other for other in people if other is not person], stated)
-        for instrument, unknowns in _found([person], stated).items():
+        rest = _values([other for other in people if other is not person], stated)
+        for instrument, unknowns in _values([person], stated).items():
             for unknown, (value, sd, unit) in unknowns.items():
                 other, other_sd, _ = rest.get(instrument, {}).get(unknown, (value, sd, unit))
                 if abs(value - other) > _APART_SD * np.hypot(sd, other_sd):
@@ -75,10 +75,10 @@ def session_instruments(people: Sequence[PersonInstruments], stated: Instruments
                         f"{instrument}: {unknown}: {value * factor:+.1f} {shown} by the trials of {person.name}, "
                         f"{other * factor:+.1f} by those of the others; were all measured with the same instruments?"
                     )
-    return SessionInstruments(tuple(people), _found(people, stated), tuple(apart))
+    return SessionInstruments(tuple(people), _values(people, stated), tuple(apart))
 
 
-def _found(people: Sequence[PersonInstruments], stated: Instruments) -> Found:
+def _values(people: Sequence[PersonInstruments], stated: Instruments) -> InstrumentValues:
     plates = tuple(dict.fromkeys(name for person in people for name in person.plates))
     prior = InstrumentPrior.stated(stated, [_information(person) for person in people])
     shown, unknowns = prior.of_session(plates), prior.of_unknowns(len(plates))
@@ -92,12 +92,12 @@ def _found(people: Sequence[PersonInstruments], stated: Instruments) -> Found:
     values = to_plates @ mean[:-1]
     sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
     units = list(PLATE_UNKNOWNS.items())
-    found = {
+    by_instrument = {
         name: {unknown: (float(values[i + j]), float(sd[i + j]), unit) for j, (unknown, unit) in enumerate(units)}
         for i, name in zip(range(0, len(values), each), plates, strict=True)
     }
-    found["clock"] = {"late": (float(mean[-1]), float(np.sqrt(covariance[-1, -1])), "s")}
-    return found
+    by_instrument["clock"] = {"late": (float(mean[-1]), float(np.sqrt(covariance[-1, -1])), "s")}
+    return by_instrument
 
 
 def with_instruments(

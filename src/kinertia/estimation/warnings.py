@@ -38,24 +38,24 @@ def force_warnings(
     The first is said of the forces and the markers' centre alone (`force_mass`), so that no motion that we found
     wrongly can accuse the scale or the plates.
     """
-    found = []
+    warnings = []
     for trial in trials:
         by_markers = force_mass(skeleton, trial.kinematics.trial)
         if by_markers is None:
             continue
         by_force, by_motion = by_markers.mass_kg, mass_from_force_kg(literature, trial)
         if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
-            found.append(
+            warnings.append(
                 f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {mass_kg:.1f} kg "
                 f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
             )
         if abs(by_motion - by_force) > MOTION_TOLERANCE * by_force + 2 * by_markers.sd_kg:
-            found.append(
+            warnings.append(
                 f"{trial.name}: before the estimate the motion does not go with the forces (they would move a body of "
                 f"{by_motion:.1f} kg like this, and one of {by_force:.1f} kg like the markers): inverse kinematics "
                 f"went wrong, not the plates; look at the marker errors over time for the frames where it did"
             )
-    return found
+    return warnings
 
 
 def fit_warnings(
@@ -68,21 +68,21 @@ def fit_warnings(
 
     `source` says where the parameters before the estimate come from.
     """
-    found = []
+    warnings = []
     total = estimate.total_mass_kg
     if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
-        found.append(
+        warnings.append(
             f"the estimated total mass is {total:.1f} kg; stated mass {mass_kg:.1f} kg "
             f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
         )
     moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)
     worst = int(np.argmax(moved))
     if moved[worst] > CONTRADICTING_COM_M:
-        found.append(
+        warnings.append(
             f"the estimate contradicts {source}: the centre of mass of {estimate.segments[worst]} "
             f"moved by {moved[worst] * 1e3:.0f} mm"
         )
-    return found
+    return warnings
 
 
 def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
@@ -93,18 +93,18 @@ def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[s
 
 def two_level_warnings(result: TwoLevelResult) -> list[str]:
     """What the user should know of a two-level estimate: not converged, or physically impossible."""
-    found = []
+    warnings = []
     if not result.converged:
-        found.append(
+        warnings.append(
             f"the two-level estimate did not converge within {result.evaluations} evaluations; the best iterate is "
             f"reported"
         )
     consistent = result.bsp.physically_consistent()
     if not consistent.all():
         names = [n for n, good in zip(result.bsp.segments, consistent, strict=True) if not good]
-        found.append(
+        warnings.append(
             f"the two-level estimate is physically impossible for {len(names)} of {len(consistent)} segments "
             f"({', '.join(names)}): it explains the forces, but skin motion decides single parameters; "
             f"do not use them as this person's"
         )
-    return found
+    return warnings

@@ -61,8 +61,8 @@ def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
     notes += unit_notes
     time = _times(file, "points")
     plates, plate_notes = lab_plates(path, file, unit)
-    told = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
-    rotation, up, axis_notes = to_ground(path, told, "POINT:Y_SCREEN", unit * positions, plates)
+    stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
+    rotation, up, axis_notes = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
     mass, height, measurements, subject_notes = _subject(path, parameters)
@@ -79,8 +79,8 @@ def _open(path: Path) -> tuple[C3dContent, list[str]]:
     try:
         file = read_apart(path) if doubt else read_content(path)
     except C3dTrouble as error:
-        found = f"{doubt}; {error}" if doubt else str(error)
-        raise FileError(path, f"broken C3D file ({found}); export it again") from None
+        problem = f"{doubt}; {error}" if doubt else str(error)
+        raise FileError(path, f"broken C3D file ({problem}); export it again") from None
     parameters = file["parameters"]
     if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
         types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))

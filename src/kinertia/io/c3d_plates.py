@@ -102,8 +102,8 @@ def to_ground_plates(
             raise FileError(path, f"{name} has no number at {time[lost][0]:g} s; expected one for every sample")
         offset = np.median(force[~loaded, p], axis=0) if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES else np.zeros(3)
         if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
-            told = ", ".join(f"{value:.0f}" for value in offset)
-            notes.append(f"{path.name}: {name} reads ({told}) N when unloaded; this was not subtracted")
+            reading = ", ".join(f"{value:.0f}" for value in offset)
+            notes.append(f"{path.name}: {name} reads ({reading}) N when unloaded; this was not subtracted")
         plate = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
         force[:, p], moment[:, p] = plate.force, plate.moment
         noises.append(plate.noise_n)
@@ -144,11 +144,11 @@ def _unit_trouble(file: Any, group: Any, plate: int) -> str:
     channels = np.atleast_2d(group["CHANNEL"]["value"])[:, plate]
     units = file["parameters"]["ANALOG"]["UNITS"]["value"]
     channel = int(channels[3]) - 1
-    told = units[channel] if channel < len(units) else ""
-    said = "".join(letter for letter in str(told).lower() if letter.isalpha())
+    unit = units[channel] if channel < len(units) else ""
+    said = "".join(letter for letter in str(unit).lower() if letter.isalpha())
     length = str(file["parameters"]["POINT"]["UNITS"]["value"][0]).strip().lower()
     if length and said in ("nm", "nmm", "ncm") and said != "n" + length:
-        return f"its moments are in {told} while points are in {length}"
+        return f"its moments are in {unit} while points are in {length}"
     return ""
 
 

@@ -131,7 +131,7 @@ def _header(block: bytes, order: str) -> _Header:
 def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, str]:
     """All parameters by group and name, and what is odd about how they are stored."""
     groups: dict[int, str] = {}
-    found: dict[tuple[int, str], _Parameter] = {}
+    entries: dict[tuple[int, str], _Parameter] = {}
     at, odd = 4, ""
 
     def broken(what: str) -> FileError:
@@ -154,7 +154,7 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
             bytes_needed = abs(kind) * math.prod(shape)
             if kind not in _KINDS or len(shape) < dimensions or body + bytes_needed >= len(section):
                 raise broken(f"{called} is longer than the parameters are, or of an unknown type")
-            found[group, name] = _Parameter(_KINDS[kind], shape, section[body : body + bytes_needed], order)
+            entries[group, name] = _Parameter(_KINDS[kind], shape, section[body : body + bytes_needed], order)
             body += bytes_needed
         elif -group in groups or name in groups.values():
             odd = odd or f"it has the group {called} twice"
@@ -171,9 +171,9 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
                 raise broken(f"{called} says that the next entry begins inside it or outside the parameters")
             odd = odd or f"there is a gap after {called}"
         at = link + offset
-    if any(group not in groups for group, _ in found):
+    if any(group not in groups for group, _ in entries):
         odd = odd or "an entry belongs to no group"
-    return {(groups.get(group, ""), name): value for (group, name), value in found.items()}, odd
+    return {(groups.get(group, ""), name): value for (group, name), value in entries.items()}, odd
 
 
 def _header_doubt(header: _Header, end: int) -> str:
@@ -207,8 +207,8 @@ def _doubt(header: _Header, parameters: _Parameters) -> str:
         "POINT:FRAMES": (unsigned("POINT", "FRAMES", header.frames), header.frames),
         "POINT:DATA_START": (unsigned("POINT", "DATA_START", header.data_block), header.data_block),
     }
-    for name, (told, expected) in pairs.items():
-        if told != expected:
+    for name, (stated, expected) in pairs.items():
+        if stated != expected:
             return f"{name} contradicts its header"
     rate_hz = value("POINT", "RATE", header.rate_hz)
     if not abs(rate_hz - header.rate_hz) <= 0.01 * header.rate_hz:
@@ -272,8 +272,12 @@ def _plate_doubt(parameters: _Parameters, channels: float) -> str:
         if kind not in _CHANNELS or rows < max(_CHANNELS[int(kind)]):
             return f"force plate {plate + 1} is of type {kind:g}, with {rows:g} channels"
     for name, shape in (("CORNERS", (3, 4)), ("ORIGIN", (3,)), ("CHANNEL", ())):
-        told = entry(name).shape
-        if not entry(name).numbers or told[: len(shape)] != shape or (told[-1] < count and len(told) > len(shape)):
+        stored = entry(name).shape
+        if (
+            not entry(name).numbers
+            or stored[: len(shape)] != shape
+            or (stored[-1] < count and len(stored) > len(shape))
+        ):
             return f"FORCE_PLATFORM:{name} does not fit {count} plates"
         if len(entry(name).numbers) < math.prod(shape) * count:
             return f"FORCE_PLATFORM:{name} does not fit {count} plates"

@@ -204,9 +204,9 @@ def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[
     path = path_from(loads_path.parent, name)
     if path.is_file():
         return path, ()
-    told = PureWindowsPath(name)  # knows both separators
-    beside = loads_path.parent / told.name
-    if told.root and beside.is_file():
+    named = PureWindowsPath(name)  # knows both separators
+    beside = loads_path.parent / named.name
+    if named.root and beside.is_file():
         return beside, (f"{loads_path.name}: its datafile {name} is not there; {beside.name} beside it was read",)
     raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
 

@@ -13,13 +13,13 @@ _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(
 
 
 def to_ground(
-    path: Path, told: str, where: str, positions: FloatArray, plates: LabPlates | None
+    path: Path, stated: str, where: str, positions: FloatArray, plates: LabPlates | None
 ) -> tuple[FloatArray, str, list[str]]:
     """From the axes of a laboratory to ground axes, by the file's word and by the data.
 
     Args:
         path: the file, for messages.
-        told: the axis that it calls vertical, "+Z" or the like; empty where it says nothing.
+        stated: the axis that it calls vertical, "+Z" or the like; empty where it says nothing.
         where: it says so, or would say so.
         positions: (n, m, 3) m, markers in the laboratory's axes; NaN where not seen.
         plates: what stood on the floor, if anything.
@@ -27,7 +27,7 @@ def to_ground(
     Returns:
         the rotation (3, 3), the axis that is up, and notes.
     """
-    told_up = _AXES.get(told)
+    stated_up = _AXES.get(stated)
     seen = positions[_seen(positions).any(axis=1)]
     extent = np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=0)
     floor = np.zeros(3) if plates is None or plates.corners is None else plates.corners.mean(axis=(0, 1))
@@ -36,19 +36,19 @@ def to_ground(
         axis, why = int(np.argmax(np.abs(force))), "the plates' forces"
     else:
         axis, why = int(np.argmax(extent)), "the markers' extents"
-        if told_up is not None and extent[told_up[0]] > 0.5 * extent[axis]:
-            axis = told_up[0]
+        if stated_up is not None and extent[stated_up[0]] > 0.5 * extent[axis]:
+            axis = stated_up[0]
     middle = np.nanmedian(seen, axis=(0, 1))[axis] - floor[axis]
-    found_up = (axis, 1 if middle >= 0 else -1)
-    up = f"{'+-'[found_up[1] < 0]}{'XYZ'[axis]}"
+    data_up = (axis, 1 if middle >= 0 else -1)
+    up = f"{'+-'[data_up[1] < 0]}{'XYZ'[axis]}"
     notes = []
-    if told_up is None:
+    if stated_up is None:
         notes.append(f"{path.name}: no vertical axis given ({where}); {up} was found from {why}")
-    elif told_up != found_up:
-        notes.append(f"{path.name}: {where} says {told} is up but {why} say {up}; {up} was used")
+    elif stated_up != data_up:
+        notes.append(f"{path.name}: {where} says {stated} is up but {why} say {up}; {up} was used")
     if up != "+Y":
         notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
-    return _rotation(*found_up), up, notes
+    return _rotation(*data_up), up, notes
 
 
 def _seen(positions: FloatArray) -> BoolArray:

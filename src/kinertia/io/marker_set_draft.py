@@ -28,9 +28,9 @@ def draft_marker_set(labels: Sequence[str], name: str) -> str:
         "[landmarks]",
     ]
     for landmark in LANDMARKS:
-        found = landmarks.get(landmark)
-        if found:
-            lines.append(f"{landmark} = {_quoted(found)}")
+        own = landmarks.get(landmark)
+        if own:
+            lines.append(f"{landmark} = {_quoted(own)}")
         elif landmark in _NEEDED:
             lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
     lines += ["", "[segments]"]
@@ -39,7 +39,7 @@ def draft_marker_set(labels: Sequence[str], name: str) -> str:
             lines.append(f"{segment} = {_quoted(segments[segment])}")
         else:
             lines.append(f"# {segment} = []  # FILL IN")
-    placed = {label for found in segments.values() for label in found}
+    placed = {label for own in segments.values() for label in own}
     rest = [label for label in labels if label not in placed]
     if rest:
         lines += ["", f"# Not placed; FILL IN where they belong: {', '.join(rest)}"]
@@ -64,13 +64,13 @@ def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 def _placed(labels: Sequence[str], names: Mapping[str, str], single: bool) -> dict[str, list[str]]:
     """Entry -> labels, those of the very names first."""
-    found: dict[str, list[str]] = {}
+    placed: dict[str, list[str]] = {}
     exact = {label: names[folded(label)] for label in labels if folded(label) in names}
     near = {label: _nearest(label, names) for label in labels if label not in exact}
     for label, entry in (*exact.items(), *near.items()):
-        if entry is not None and not (single and entry in found):
-            found.setdefault(entry, []).append(label)
-    return found
+        if entry is not None and not (single and entry in placed):
+            placed.setdefault(entry, []).append(label)
+    return placed
 
 
 def _nearest(label: str, names: Mapping[str, str]) -> str | None:

@@ -51,8 +51,10 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
     delimiter = ";" if ";" in lines[first] else "," if "," in lines[first] else "\t"
     header = [cell.strip().lower() for cell in next(csv.reader([lines[first]], delimiter=delimiter))]
     if lacking := [name for name in COLUMNS if name not in header]:
-        found = ", ".join(header)
-        raise FileError(path, f"lacks the columns {', '.join(lacking)}; found {found}; expected {','.join(COLUMNS)}", 1)
+        columns = ", ".join(header)
+        raise FileError(
+            path, f"lacks the columns {', '.join(lacking)}; found {columns}; expected {','.join(COLUMNS)}", 1
+        )
     rows: dict[str, dict[float, tuple[float, float]]] = {}
     for number, cells in enumerate(csv.reader(lines[first + 1 :], delimiter=delimiter), start=first + 2):
         if not any(cell.strip() for cell in cells):

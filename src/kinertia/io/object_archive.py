@@ -60,10 +60,10 @@ def read_archive(path: Path, kinds: Sequence[type]) -> Any:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            told = json.loads(archive.read(_STRUCTURE))
-            if told["format"] > _FORMAT:
+            structure = json.loads(archive.read(_STRUCTURE))
+            if structure["format"] > _FORMAT:
                 raise FileError(path, "was written by a later version of Kinertia; update it (pip install -U kinertia)")
-            return _Reader(archive, {kind.__name__: kind for kind in kinds}).whole(told["content"], "")
+            return _Reader(archive, {kind.__name__: kind for kind in kinds}).whole(structure["content"], "")
     except OSError as error:
         raise FileError(path, f"cannot be read ({error.strerror or error})") from error
     except (zipfile.BadZipFile, zlib.error, KeyError, ValueError, TypeError, EOFError) as error:
@@ -147,21 +147,21 @@ class _Reader:
         self.archive, self.kinds = archive, kinds
         self.made: dict[str, Any] = {}
 
-    def whole(self, told: Any, place: str) -> Any:
-        if not isinstance(told, dict | list):
-            return told
-        self.made[place] = made = self._made(told, place)
+    def whole(self, node: Any, place: str) -> Any:
+        if not isinstance(node, dict | list):
+            return node
+        self.made[place] = made = self._made(node, place)
         return made
 
-    def _made(self, told: Any, place: str) -> Any:
-        if isinstance(told, list):
-            return [self.whole(item, _below(place, k)) for k, item in enumerate(told)]
-        if "kind" in told:
-            attributes = {name: self.whole(value, _below(place, name)) for name, value in told["with"].items()}
-            if told["kind"] == _SPLINE:
+    def _made(self, node: Any, place: str) -> Any:
+        if isinstance(node, list):
+            return [self.whole(item, _below(place, k)) for k, item in enumerate(node)]
+        if "kind" in node:
+            attributes = {name: self.whole(value, _below(place, name)) for name, value in node["with"].items()}
+            if node["kind"] == _SPLINE:
                 return BSpline(attributes["t"], attributes["c"], attributes["k"], attributes["extrapolate"])
-            return self.kinds[told["kind"]](**attributes)
-        ((word, value),) = told.items()
+            return self.kinds[node["kind"]](**attributes)
+        ((word, value),) = node.items()
         match word:
             case "same":
                 return self.made[value]

@@ -116,10 +116,10 @@ def _says_kinertia(path: Path) -> bool:
     if path.suffix == ".html":
         return GENERATOR in text[:2000]
     try:
-        told = json.loads(text)
+        content = json.loads(text)
     except ValueError:
         return False
-    return isinstance(told, dict) and "kinertia" in told
+    return isinstance(content, dict) and "kinertia" in content
 
 
 def _existing(folder: Path) -> Path:
@@ -189,12 +189,12 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
 def _written(folder: Path) -> dict[str, list[str]]:
     """Files that Kinertia wrote to this folder, by kind; none where it does not say."""
     try:
-        told = json.loads((folder / _WRITTEN).read_text(encoding="utf-8"))
+        written = json.loads((folder / _WRITTEN).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    if not isinstance(told, dict):
+    if not isinstance(written, dict):
         return {}
-    return {kind: [str(name) for name in names] for kind, names in told.items() if isinstance(names, list)}
+    return {kind: [str(name) for name in names] for kind, names in written.items() if isinstance(names, list)}
 
 
 def _files(folder: Path) -> set[str]:

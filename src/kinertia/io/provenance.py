@@ -67,8 +67,8 @@ def sha256(path: Path) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of everything that numbers depend on, as far as it is installed."""
-    found = {"Python": platform.python_version()}
+    installed = {"Python": platform.python_version()}
     for name in _COMPUTES:
         with contextlib.suppress(PackageNotFoundError):  # ezc3d, where it has no wheel
-            found[name] = version(name)
-    return found
+            installed[name] = version(name)
+    return installed

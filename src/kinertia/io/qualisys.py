@@ -42,21 +42,21 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
     path = Path(path)
     beside = plates_beside(path) if forces is None else list(forces)
     markers, notes = _markers(path)
-    found = [_plate(file) for file in beside]
+    single_plates = [_plate(file) for file in beside]
     plates, time = None, np.zeros(0)
-    if found:
-        _expect_alike(beside, found)
-        time = markers.time[0] + np.arange(len(found[0].force)) / found[0].rate_hz
+    if single_plates:
+        _expect_alike(beside, single_plates)
+        time = markers.time[0] + np.arange(len(single_plates[0].force)) / single_plates[0].rate_hz
         plates = LabPlates(
-            tuple(one.name for one in found),
-            np.stack([one.force for one in found], axis=1),
-            np.stack([one.moment for one in found], axis=1),
-            np.stack([one.corners for one in found]),
+            tuple(one.name for one in single_plates),
+            np.stack([one.force for one in single_plates], axis=1),
+            np.stack([one.moment for one in single_plates], axis=1),
+            np.stack([one.corners for one in single_plates]),
         )
     rotation, up, axis_notes = to_ground(path, "+Z", "Qualisys' usual setting", markers.positions, plates)
     ground, load_notes = to_ground_plates(path, plates, rotation, time) if plates is not None else (None, [])
     read = [f"{path.name}: plates from {', '.join(file.name for file in beside)}"] if beside else []
-    more = [note for one in found for note in one.notes]
+    more = [note for one in single_plates for note in one.notes]
     return Recording(
         path.stem,
         markers.rotated(rotation),
@@ -101,8 +101,8 @@ def _is_number(cell: str) -> bool:
 def _number(path: Path, header: dict[str, list[str]], name: str) -> float:
     value = (header.get(name) or [""])[0]
     if not _is_number(value):
-        found = f"{name} is '{value}'" if name in header else f"its header has no {name}"
-        raise FileError(path, f"{found}; expected a number, as Qualisys Track Manager writes it with a TSV header")
+        problem = f"{name} is '{value}'" if name in header else f"its header has no {name}"
+        raise FileError(path, f"{problem}; expected a number, as Qualisys Track Manager writes it with a TSV header")
     return float(value)
 
 
@@ -114,15 +114,15 @@ def _markers(path: Path) -> tuple[Markers, list[str]]:
     if not labels:
         raise FileError(path, "its header has no MARKER_NAMES; export 3D data with the TSV header included")
     rate = _number(path, header, "FREQUENCY")
-    told = int(_number(path, header, "NO_OF_FRAMES"))
+    stated = int(_number(path, header, "NO_OF_FRAMES"))
     counted = {"Frame", "Time"} <= {name for cells in ([k, *v] for k, v in header.items()) for name in cells}
     wide = 3 * len(labels) + 2 * counted
     text = [line.replace("NULL", "") for line in lines]
     values, numbers = read_rows(path, text, first, wide, may_be_short=True)
     positions, zero_notes = seen_positions(path, values[:, 2 * counted :], labels, numbers)
     notes = [*zero_notes]
-    if told != len(values):
-        notes.append(f"{path.name}: its header announces {told} frames, the file has {len(values)}: all were read")
+    if stated != len(values):
+        notes.append(f"{path.name}: its header announces {stated} frames, the file has {len(values)}: all were read")
     start = values[0, 1] if counted else 0.0
     return Markers(start + np.arange(len(values)) / rate, labels, _MM * positions), notes
 
@@ -156,15 +156,15 @@ def _plate(path: Path) -> _Plate:
     if "local" in " ".join(header.get("DESCRIPTION", ())).lower():
         turned = _axes(corners)
         force, moment, point = force @ turned, moment @ turned, corners.mean(axis=0) + point @ turned
-    found = PlateMoments.of(force, moment, point)
+    moments = PlateMoments.of(force, moment, point)
     name = (header.get("FORCE_PLATE_NAME") or [path.stem])[0] or path.stem
     notes = []
-    if not found.agree and np.isfinite(found.misses):
+    if not moments.agree and np.isfinite(moments.misses):
         notes.append(
-            f"{path.name}: moments and centre of pressure contradict each other (by {100 * found.misses:.0f} %); the "
+            f"{path.name}: moments and centre of pressure contradict each other (by {100 * moments.misses:.0f} %); the "
             f"centre of pressure was taken, without a free moment"
         )
-    return _Plate(name, _number(path, header, "FREQUENCY"), force, found.about_origin, corners, notes)
+    return _Plate(name, _number(path, header, "FREQUENCY"), force, moments.about_origin, corners, notes)
 
 
 def _axes(corners: FloatArray) -> FloatArray:

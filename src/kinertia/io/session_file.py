@@ -71,18 +71,20 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
         return SessionFile.model_validate(document.content).people
     except ValidationError as error:
         first = error.errors()[0]
-        told = f"not what kinertia instruments wrote: {'.'.join(map(str, first['loc']))}: {first['msg']}; write it anew"
-        raise FileError(path, told, document.line(first["loc"]) or document.last_line) from None
+        problem = (
+            f"not what kinertia instruments wrote: {'.'.join(map(str, first['loc']))}: {first['msg']}; write it anew"
+        )
+        raise FileError(path, problem, document.line(first["loc"]) or document.last_line) from None
 
 
 def session_text(
-    version: str, found: Mapping[str, Mapping[str, tuple[float, float, str]]], people: Sequence[PersonInstruments]
+    version: str, values: Mapping[str, Mapping[str, tuple[float, float, str]]], people: Sequence[PersonInstruments]
 ) -> str:
     """The text of the file.
 
     Args:
         version: of Kinertia.
-        found: per instrument, per unknown its value, deviation and unit (m, 1, N m/N or s).
+        values: per instrument, per unknown its value, deviation and unit (m, 1, N m/N or s).
         people: what each says.
     """
     lines = [
@@ -92,9 +94,9 @@ def session_text(
         "# A fit leaves out what its own trials have said here.",
         f"kinertia = {json.dumps(version)}",
     ]
-    for instrument, told in found.items():
+    for instrument, unknowns in values.items():
         lines += ["", f"[found.{json.dumps(instrument, ensure_ascii=False)}]"]
-        for unknown, (value, sd, unit) in told.items():
+        for unknown, (value, sd, unit) in unknowns.items():
             name, factor = _UNITS[unit]
             key = unknown.replace(" ", "_")
             lines += [f"{key}_{name} = {value * factor:.3f}", f"{key}_sd_{name} = {sd * factor:.3f}"]

@@ -49,9 +49,11 @@ def read_sto(path: str | Path) -> pd.DataFrame:
     """`read_table` as pandas' table, indexed by time (s); `attrs["in_degrees"]` is its `in_degrees`."""
     import pandas as pd
 
-    found = read_table(path)
-    table = pd.DataFrame(found.values, index=pd.Index(found.time, name="time"), columns=list(found.labels))
-    table.attrs["in_degrees"] = found.in_degrees
+    time_table = read_table(path)
+    table = pd.DataFrame(
+        time_table.values, index=pd.Index(time_table.time, name="time"), columns=list(time_table.labels)
+    )
+    table.attrs["in_degrees"] = time_table.in_degrees
     return table
 
 
@@ -78,8 +80,8 @@ def read_table(path: str | Path) -> TimeTable:
     time = values[:, 0]
     if np.isnan(time).any():
         raise FileError(path, "the row has no time", line_numbers[int(np.argmax(np.isnan(time)))])
-    told = header.get("indegrees")
-    in_degrees = None if told is None else told[0].lower() == "yes"
+    stated = header.get("indegrees")
+    in_degrees = None if stated is None else stated[0].lower() == "yes"
     return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees, notes)
 
 
@@ -146,11 +148,11 @@ def _labels(path: Path, line: str, number: int) -> list[str]:
 def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> tuple[str, ...]:
     """What the header says that the file has not: a note, since the rows say what is there (OpenSim reads it, too)."""
     notes = []
-    for keys, found, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns")):
-        for told, line in (header[key] for key in keys if key in header):
-            if not told.isdigit() or int(told) != found:
+    for keys, count, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns")):
+        for stated, line in (header[key] for key in keys if key in header):
+            if not stated.isdigit() or int(stated) != count:
                 notes.append(
-                    f"{path.name}: line {line} of its header announces {told} {what}, the file has {found}: all of "
+                    f"{path.name}: line {line} of its header announces {stated} {what}, the file has {count}: all of "
                     f"them were read"
                 )
     return tuple(notes)

@@ -146,9 +146,9 @@ def is_capture(file: Path) -> bool:
 
 def _holds_markers(file: Path) -> bool:
     """Whether a text file is a recording of markers, by its ending and its head."""
-    told = {".tsv": "MARKER_NAMES", ".csv": "Sub Frame"}
+    marks = {".tsv": "MARKER_NAMES", ".csv": "Sub Frame"}
     kind = file.suffix.lower()
-    return kind == ".trc" or (kind in told and told[kind] in _head(file))
+    return kind == ".trc" or (kind in marks and marks[kind] in _head(file))
 
 
 def _brings_forces(file: Path) -> bool:
@@ -166,14 +166,14 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
     """The files of the folder that hold it; where there are none, those of the folders in it and beside it, but for
     folders with markers of their own: those may be another person's.
     """
-    found = [file for file in files if holds(file)]
-    if found:
-        return found
+    holding = [file for file in files if holds(file)]
+    if holding:
+        return holding
     for other in (*files, *sorted(folder.parent.iterdir())):
         inside = sorted(file for file in other.iterdir() if file.is_file()) if other.is_dir() else []
         if other != folder and not any(map(is_capture, inside)):
-            found += [file for file in inside if holds(file)]
-    return found
+            holding += [file for file in inside if holds(file)]
+    return holding
 
 
 def _relative(file: Path, folder: Path) -> str:

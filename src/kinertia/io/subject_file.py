@@ -183,8 +183,8 @@ def subject_file_in(folder: Path) -> Path:
     Raises:
         FileError: there is none, or several of which none is called subject.toml.
     """
-    found = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml")
-    named = [path for path in found if path.name.lower() == "subject.toml"] or found
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml")
+    named = [path for path in paths if path.name.lower() == "subject.toml"] or paths
     if len(named) == 1:
         return named[0]
     if not named:
@@ -230,9 +230,9 @@ def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
     """The first of several trials whose name cannot be that of a folder beside those before, and why."""
     for index, name in enumerate(names if len(names) > 1 else ()):
         if not fits_everywhere(name):
-            told = json.dumps(name, ensure_ascii=False)
+            quoted = json.dumps(name, ensure_ascii=False)
             return index, (
-                f'name = {told}: must be a name that a folder can have on every system: none of < > : " / \\ | ? *, '
+                f'name = {quoted}: must be a name that a folder can have on every system: none of < > : " / \\ | ? *, '
                 "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...); "
                 'give the trial a name = "..." of its own'
             )

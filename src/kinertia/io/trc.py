@@ -169,8 +169,8 @@ def _uniform_time(
     at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
     # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
     if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > _rounding_s(time):
-        found = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
-        raise FileError(path, f"{found}; correct the wrong one", 3)
+        problem = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
+        raise FileError(path, f"{problem}; correct the wrong one", 3)
     frames = np.arange(len(time))
     uniform = time[0] + frames / rate_hz
     if np.abs(time - uniform).max() > _TIME_TOLERANCE_FRAMES * step:
@@ -178,8 +178,8 @@ def _uniform_time(
     error = np.abs(time - uniform)
     if error.max() > _TIME_TOLERANCE_FRAMES * step:
         row = int(np.argmax(error))
-        found = f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s"
-        raise FileError(path, f"{found}; Kinertia needs a constant frame rate, export one", line_numbers[row])
+        problem = f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s"
+        raise FileError(path, f"{problem}; Kinertia needs a constant frame rate, export one", line_numbers[row])
     if error.max() <= 1e-9:
         return time, ()
     note = (
@@ -207,8 +207,8 @@ def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) ->
     odd = back if back.size else np.flatnonzero(np.abs(steps - usual) > 0.5 * usual)
     if odd.size:
         row = int(odd[0]) + 1
-        found = f"time goes from {time[row - 1]:g} s to {time[row]:g} s where its step is {usual:g} s"
-        raise FileError(path, f"{found}; expected every frame, export gaps as empty cells", line_numbers[row])
+        problem = f"time goes from {time[row - 1]:g} s to {time[row]:g} s where its step is {usual:g} s"
+        raise FileError(path, f"{problem}; expected every frame, export gaps as empty cells", line_numbers[row])
 
 
 def seen_positions(

@@ -56,8 +56,8 @@ def read_vicon_csv(path: str | Path) -> Recording:
     path = Path(path)
     sections = dict(_sections(path))
     if "Trajectories" not in sections:
-        found = ", ".join(sections) or "none"
-        raise FileError(path, f"no section Trajectories (sections: {found}); export them from Vicon Nexus, too")
+        names = ", ".join(sections) or "none"
+        raise FileError(path, f"no section Trajectories (sections: {names}); export them from Vicon Nexus, too")
     markers, notes = _markers(path, sections["Trajectories"])
     plates, time, plate_notes = _plates(path, sections.get("Devices"), markers.rate_hz)
     rotation, up, axis_notes = to_ground(path, "+Z", "Vicon's usual setting", markers.positions, plates)

@@ -92,10 +92,10 @@ def model_segments(
         )
         rotation, origin = _segment_frame(segment, place[main.get(segment, bodies[segment][0])], centres)
         tables.append((mass, rotation.T @ (com - origin), rotation.T @ inertia @ rotation))
-    found = BodySegmentParameters(tuple(bodies), *(np.array(column) for column in zip(*tables, strict=True)))
+    combined = BodySegmentParameters(tuple(bodies), *(np.array(column) for column in zip(*tables, strict=True)))
     unknown = tuple(body for body in bsp.segments if masses[body] > 0 and segment_of(body) is None)
     geometry = _geometry(centres, place, reference_lengths(height_m, sex))
-    return ModelSegments(found, bodies, unknown, geometry)
+    return ModelSegments(combined, bodies, unknown, geometry)
 
 
 Place = tuple[np.ndarray, np.ndarray]

@@ -74,15 +74,15 @@ def _landmarks(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]
 
 def _fronts(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """(n, 3): where the right foot, the left foot and the pelvis point, each from its own back to its front."""
-    found = {}
+    fronts = {}
     for side in "rl":
         toe = next((f"{name}_{side}" for name in ("metatarsal", "toe") if f"{name}_{side}" in places), "")
         if toe and f"heel_{side}" in places:
-            found[f"foot_{side}"] = _level(places[toe] - places[f"heel_{side}"])
+            fronts[f"foot_{side}"] = _level(places[toe] - places[f"heel_{side}"])
     back = [places[name] for name in ("psis_r", "psis_l", "sacrum") if name in places]
     if back and {"asis_r", "asis_l"} <= set(places):
-        found["pelvis"] = _level((places["asis_r"] + places["asis_l"]) / 2 - np.mean(back, axis=0))
-    return {name: front for name, front in found.items() if np.isfinite(front).all(axis=1).any()}
+        fronts["pelvis"] = _level((places["asis_r"] + places["asis_l"]) / 2 - np.mean(back, axis=0))
+    return {name: front for name, front in fronts.items() if np.isfinite(front).all(axis=1).any()}
 
 
 def _odd_one_out(fronts: Mapping[str, FloatArray]) -> str:

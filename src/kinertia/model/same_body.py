@@ -67,31 +67,31 @@ class _Distances:
 
 def body_trouble(static: Markers, trial: Markers, marker_set: MarkerSet) -> str:
     """Why static trial and trial cannot be used together: swapped labels, or another person; empty where they may."""
-    found = _Distances.of(static, trial, marker_set)
-    if not len(found.pairs):
+    distances = _Distances.of(static, trial, marker_set)
+    if not len(distances.pairs):
         return ""
-    return _swapped(found) or _another_body(found)
+    return _swapped(distances) or _another_body(distances)
 
 
 def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
     """What speaks against markers that were left in place between static trial and trial, if `body_trouble` found
     nothing.
     """
-    found = _Distances.of(static, trial, marker_set)
-    if not len(found.pairs):
+    distances = _Distances.of(static, trial, marker_set)
+    if not len(distances.pairs):
         return []
-    off = found.differences()
+    off = distances.differences()
     typical = float(np.sqrt(np.square(off).mean()))
     far = np.abs(off) > _ELSEWHERE_M
     # one marker that moved takes all of its distances along
-    about = [np.abs(off[(found.pairs == k).any(axis=1)]) for k in range(len(found.labels))]
+    about = [np.abs(off[(distances.pairs == k).any(axis=1)]) for k in range(len(distances.labels))]
     moved = int(np.argmax([np.median(one) if len(one) else 0.0 for one in about]))
-    alone = (found.pairs[far] == moved).any(axis=1)
-    rest = off[~(found.pairs == moved).any(axis=1)]
+    alone = (distances.pairs[far] == moved).any(axis=1)
+    rest = off[~(distances.pairs == moved).any(axis=1)]
     if far.any() and alone.all() and np.sqrt(np.square(rest).mean() if len(rest) else 0.0) <= _SAME_SESSION_M:
-        mates = found.pairs[far][0]
-        other = found.labels[int(mates[0] if mates[1] == moved else mates[1])]
-        names = f"{found.labels[moved]}" if len(about[moved]) > 1 else f"{found.labels[moved]} or {other}"
+        mates = distances.pairs[far][0]
+        other = distances.labels[int(mates[0] if mates[1] == moved else mates[1])]
+        names = f"{distances.labels[moved]}" if len(about[moved]) > 1 else f"{distances.labels[moved]} or {other}"
         return [
             f"the marker {names} sits elsewhere than in the static trial (its distances in the segment differ by up to "
             f"{1e3 * about[moved].max():.0f} mm; to {other}, for one): it was moved or put back in between; record the "
@@ -99,7 +99,7 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
         ]
     if len(off) >= _FEWEST_PAIRS and typical > _SAME_SESSION_M:
         worst = int(np.argmax(np.abs(off)))
-        pair = " to ".join(found.labels[k] for k in found.pairs[worst])
+        pair = " to ".join(distances.labels[k] for k in distances.pairs[worst])
         return [
             f"distances between markers of one segment differ from the static trial's by {1e3 * typical:.0f} mm (RMS "
             f"of {len(off)}; most of all {pair}, {1e3 * off[worst]:+.0f} mm): the static trial is of another session, "
@@ -108,24 +108,24 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
     return []
 
 
-def _swapped(found: _Distances) -> str:
+def _swapped(distances: _Distances) -> str:
     """Which two labels fit once they are exchanged."""
-    off = np.abs(found.differences())
-    suspects = sorted({int(k) for pair in found.pairs[off > _SWAPPED_M] for k in pair})
+    off = np.abs(distances.differences())
+    suspects = sorted({int(k) for pair in distances.pairs[off > _SWAPPED_M] for k in pair})
     best, cured = (0.0, ("", "", 0.0, 0.0)), False
-    for a, b in combinations(range(len(found.labels)), 2):
+    for a, b in combinations(range(len(distances.labels)), 2):
         if a not in suspects and b not in suspects:
             continue
-        own = np.isin(found.pairs, (a, b)).any(axis=1)
+        own = np.isin(distances.pairs, (a, b)).any(axis=1)
         if not own.any() or off[own].max() <= _SWAPPED_M:
             continue
-        order = np.arange(len(found.labels))
+        order = np.arange(len(distances.labels))
         order[[a, b]] = b, a
-        after = np.abs(found.differences(order)[own])
+        after = np.abs(distances.differences(order)[own])
         gain = float(off[own].sum() - after.sum())
         if np.nan_to_num(after, nan=np.inf).max() < _CURED * off[own].max() and gain > best[0]:
             cured = True
-            best = (gain, (found.labels[a], found.labels[b], float(off[own].max()), float(after.max())))
+            best = (gain, (distances.labels[a], distances.labels[b], float(off[own].max()), float(after.max())))
     if not cured:
         return ""
     one, other, before_m, after_m = best[1]
@@ -136,15 +136,15 @@ def _swapped(found: _Distances) -> str:
     )
 
 
-def _another_body(found: _Distances) -> str:
-    if len(found.pairs) < _FEWEST_PAIRS:
+def _another_body(distances: _Distances) -> str:
+    if len(distances.pairs) < _FEWEST_PAIRS:
         return ""
-    before, after = (matrix[tuple(found.pairs.T)] for matrix in (found.static, found.trial))
+    before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
     ratio = float(np.median(after / before))
     if abs(ratio - 1) <= _OTHER_BODY:
         return ""
     worst = int(np.argmax(np.abs(after - before)))
-    first, second = (found.labels[k] for k in found.pairs[worst])
+    first, second = (distances.labels[k] for k in distances.pairs[worst])
     word = "longer" if ratio > 1 else "shorter"
     return (
         f"the distances between markers of one segment are {100 * abs(ratio - 1):.0f} % {word} than in the static "

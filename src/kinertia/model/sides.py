@@ -13,9 +13,9 @@ def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
         >>> by_side(["pelvis_tilt", "knee_angle_r", "knee_angle_l"])
         {'pelvis_tilt': {'': 0}, 'knee_angle': {'r': 1, 'l': 2}}
     """
-    found: dict[str, dict[str, int]] = {}
+    columns: dict[str, dict[str, int]] = {}
     for column, name in enumerate(names):
         base, _, side = name.rpartition("_")
         paired = side in ("r", "l") and {f"{base}_r", f"{base}_l"} <= set(names)
-        found.setdefault(base if paired else name, {})[side if paired else ""] = column
-    return found
+        columns.setdefault(base if paired else name, {})[side if paired else ""] = column
+    return columns

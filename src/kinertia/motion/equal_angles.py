@@ -57,7 +57,7 @@ class EqualAngles:
     @classmethod
     def of(cls, model: Skeleton) -> EqualAngles:
         """The equal angles of a skeleton."""
-        joints = tuple(found for joint in model.joints if (found := _three_angles(model, joint)) is not None)
+        joints = tuple(angles for joint in model.joints if (angles := _three_angles(model, joint)) is not None)
         taken = {column for joint in joints for column in joint.columns}
         single = tuple(column for column in np.flatnonzero(model.periodic).tolist() if column not in taken)
         neutral = np.array([model.start.get(name, 0.0) for name in model.coordinates])

@@ -52,9 +52,9 @@ def direction_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
     if trouble := _time_scale_trouble(both):
         return trouble
     angle, strength = _turn(both)
-    found = _agreement(both)
-    against = {axis: one.correlation for axis, one in found.items() if one.correlation < _OPPOSED}
-    fitting = any(one.correlation > -_OPPOSED for one in found.values())
+    agreements = _agreement(both)
+    against = {axis: one.correlation for axis, one in agreements.items() if one.correlation < _OPPOSED}
+    fitting = any(one.correlation > -_OPPOSED for one in agreements.values())
     evidence = ", ".join(f"correlation {value:.2f} along {axis}" for axis, value in against.items())
     if len(against) == len(_HORIZONTAL):
         cause = "the forces are turned by 180 degrees about the vertical"
@@ -106,13 +106,13 @@ def _turn(both: _Velocities) -> tuple[float, float]:
 
 def offset_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
     """A horizontal force that no motion of the pelvis' markers accounts for; empty where there is none."""
-    found = agreement(trial, pelvis)
-    off = {axis: one.offset_n for axis, one in found.items() if abs(one.offset_n) > OFFSET_LIMIT_N}
+    agreements = agreement(trial, pelvis)
+    off = {axis: one.offset_n for axis, one in agreements.items() if abs(one.offset_n) > OFFSET_LIMIT_N}
     if not off:
         return ""
-    told = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off.items())
+    shown = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off.items())
     return (
-        f"the plates show {told} on average that do not accelerate the body; the zero of that axis is wrong: zero the "
+        f"the plates show {shown} on average that do not accelerate the body; the zero of that axis is wrong: zero the "
         f"plates without load, or subtract it before export"
     )
 
@@ -129,15 +129,15 @@ def agreement(trial: Trial, pelvis: Sequence[str]) -> dict[str, Agreement]:
 
 
 def _agreement(both: _Velocities) -> dict[str, Agreement]:
-    found = {}
+    agreements = {}
     for axis, k in _HORIZONTAL.items():
         one, other = (_without_trend(both.time, values[:, k]) for values in (both.pelvis, both.caused))
         still = min(one.std(), other.std()) < _LEAST_CHANGE_M_S
         correlation = np.nan if still else float(np.corrcoef(one, other)[0, 1])
         time = both.time - both.time.mean()
         trend = float(np.polyfit(time, both.caused[:, k] - both.pelvis[:, k], 1)[0])
-        found[axis] = Agreement(correlation, both.mass_kg * trend)
-    return found
+        agreements[axis] = Agreement(correlation, both.mass_kg * trend)
+    return agreements
 
 
 @dataclass(frozen=True, eq=False)

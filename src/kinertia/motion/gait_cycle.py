@@ -128,7 +128,7 @@ def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]
     events = _with_plates(_from_motion(feet), kinematics)
     strikes = {side: [e for e in events if e.event.side == side and e.event.kind == "heel strike"] for side in FEET}
     offs = {side: [e.event.time_s for e in events if e.event[1:] == (side, "toe off")] for side in FEET}
-    found = []
+    strides = []
     for side, other in zip(FEET, reversed(FEET), strict=True):
         number = 0
         for first, second in zip(strikes[side], strikes[side][1:], strict=False):
@@ -140,8 +140,8 @@ def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]
             number += 1
             off = _only(_between(offs[side], start, end))
             other_off = _only(_between(offs[other], start, across[0]))
-            found.append(Stride(side, number, start, end, off, other_off, across[0], first.seen and second.seen))
-    return tuple(found)
+            strides.append(Stride(side, number, start, end, off, other_off, across[0], first.seen and second.seen))
+    return tuple(strides)
 
 
 def _between(times: Sequence[float], start: float, end: float) -> list[float]:
@@ -162,18 +162,18 @@ class _Event:
 
 
 def _from_motion(feet: FeetUnderPelvis) -> list[GaitEvent]:
-    found = []
+    events = []
     for side in FEET:
         for frame in turning_points(feet.ahead(feet.heel[side]), _LEAST_SWING_M):
-            found.append(GaitEvent(float(feet.time[frame]), side, "heel strike"))
+            events.append(GaitEvent(float(feet.time[frame]), side, "heel strike"))
         for frame in turning_points(-feet.ahead(feet.toe[side]), _LEAST_SWING_M):
-            found.append(GaitEvent(float(feet.time[frame]), side, "toe off"))
-    return sorted(found)
+            events.append(GaitEvent(float(feet.time[frame]), side, "toe off"))
+    return sorted(events)
 
 
 def turning_points(values: np.ndarray, least: float) -> list[int]:
     """Indices of the maxima of values (n,) that rise above what is before and after them by at least so much."""
-    found: list[int] = []
+    maxima: list[int] = []
     high = low = 0
     rising = False
     for k, value in enumerate(values):
@@ -181,13 +181,13 @@ def turning_points(values: np.ndarray, least: float) -> list[int]:
             if value > values[high]:
                 high = k
             elif values[high] - value >= least:
-                found.append(high)
+                maxima.append(high)
                 rising, low = False, k
         elif value < values[low]:
             low = k
         elif value - values[low] >= least:
             rising, high = True, k
-    return found
+    return maxima
 
 
 def _with_plates(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[_Event]:

@@ -108,18 +108,18 @@ def solve_ik(
     if consecutive:
         every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz)) if len(fine) > 1 else 1
         coarse = np.unique(np.append(fine[::every], fine[-1]))
-        found = _best_fit(model, measured[coarse], q[coarse], choosing)
-        _carry_on(model, measured[coarse], markers.time[coarse], found, equal, choosing)
+        poses = _best_fit(model, measured[coarse], q[coarse], choosing)
+        _carry_on(model, measured[coarse], markers.time[coarse], poses, equal, choosing)
         if len(coarse) > 1:
-            q[fine] = PchipInterpolator(coarse, equal.continuous(found.q))(fine)
+            q[fine] = PchipInterpolator(coarse, equal.continuous(poses.q))(fine)
     converged, informed = np.zeros(len(q), dtype=bool), np.zeros(q.shape, dtype=bool)
     for some in (fine[piece] for piece in pieces(len(fine))):
         if not consecutive:
             q[some] = _best_fit(model, measured[some], q[some], choosing).q
-        found = fit_poses(model, measured[some], q[some], stop)
+        poses = fit_poses(model, measured[some], q[some], stop)
         if consecutive:
-            _carry_on(model, measured[some], markers.time[some], found, equal, stop)
-        q[some], converged[some], informed[some] = found.q, found.converged, ~_uninformed(found.normal)
+            _carry_on(model, measured[some], markers.time[some], poses, equal, stop)
+        q[some], converged[some], informed[some] = poses.q, poses.converged, ~_uninformed(poses.normal)
     if consecutive:
         _hold_in_gaps(model, measured, placed, q, stop)
     errors = np.full(measured.shape[:2], np.nan)
@@ -146,21 +146,21 @@ def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 def _best_fit(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) -> PoseFit:
     """`fit_poses`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
-    found = fit_poses(model, measured, q, stop)
-    doubtful = np.flatnonzero(_doubtful(model, measured, found))
+    poses = fit_poses(model, measured, q, stop)
+    doubtful = np.flatnonzero(_doubtful(model, measured, poses))
     if doubtful.size:
-        anew, neutral = found.q[doubtful], q[doubtful]
+        anew, neutral = poses.q[doubtful], q[doubtful]
         anew[:, 6:] = np.clip(anew[:, 6:], neutral[:, 6:] - _ANEW_RAD, neutral[:, 6:] + _ANEW_RAD)
         other = fit_poses(model, measured[doubtful], anew, stop)
-        found.put(doubtful, other, _as_good(other.cost_m2, found.cost_m2[doubtful]))
-    return found
+        poses.put(doubtful, other, _as_good(other.cost_m2, poses.cost_m2[doubtful]))
+    return poses
 
 
-def _doubtful(model: Skeleton, measured: np.ndarray, found: PoseFit) -> np.ndarray:
+def _doubtful(model: Skeleton, measured: np.ndarray, poses: PoseFit) -> np.ndarray:
     seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
-    miss = np.sqrt(found.cost_m2 / seen)
-    beyond = np.abs(model.bounds.beyond(found.q)).max(axis=1) > _DOUBTED_RAD
-    result: np.ndarray = ~found.converged | beyond | (miss > np.maximum(_DOUBTED * np.median(miss), _DOUBTED_M))
+    miss = np.sqrt(poses.cost_m2 / seen)
+    beyond = np.abs(model.bounds.beyond(poses.q)).max(axis=1) > _DOUBTED_RAD
+    result: np.ndarray = ~poses.converged | beyond | (miss > np.maximum(_DOUBTED * np.median(miss), _DOUBTED_M))
     return result
 
 
@@ -170,29 +170,29 @@ def _as_good(cost: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _carry_on(
-    model: Skeleton, measured: np.ndarray, time: np.ndarray, found: PoseFit, equal: EqualAngles, stop: Stop
+    model: Skeleton, measured: np.ndarray, time: np.ndarray, poses: PoseFit, equal: EqualAngles, stop: Stop
 ) -> None:
     """Start frames that lie far from their neighbours again from there, outwards from the best one and back.
 
     On the way out they keep what is as good, so that all frames are on the branch of the best; on the way back, what is
     clearly better.
     """
-    far = _far(equal, time, found.q)
+    far = _far(equal, time, poses.q)
     if not far.any():
         return
-    count, best = len(time), int(np.argmin(_strangeness(measured, found, equal)))
+    count, best = len(time), int(np.argmin(_strangeness(measured, poses, equal)))
     outwards = [(k, k - 1) for k in range(best + 1, count)] + [(k, k + 1) for k in range(best - 1, -1, -1)]
     back = [(k, k + 1) for k in range(count - 2, -1, -1)] + [(k, k - 1) for k in range(1, count)]
     for pairs, returning in ((outwards, False), (back, True)):
         for k, beside in pairs:
             if not far[min(k, beside)]:
                 continue
-            again = fit_poses(model, measured[[k]], found.q[[beside]], stop)
-            cost = found.cost_m2[[k]]
+            again = fit_poses(model, measured[[k]], poses.q[[beside]], stop)
+            cost = poses.cost_m2[[k]]
             better = ~_as_good(cost, again.cost_m2) if returning else _as_good(again.cost_m2, cost)
-            found.put(np.array([k]), again, better)
+            poses.put(np.array([k]), again, better)
             near = slice(max(k - 1, 0), k + 2)
-            far[near.start : near.start + len(time[near]) - 1] = _far(equal, time[near], found.q[near])
+            far[near.start : near.start + len(time[near]) - 1] = _far(equal, time[near], poses.q[near])
 
 
 def _far(equal: EqualAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -202,13 +202,13 @@ def _far(equal: EqualAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
     return result
 
 
-def _strangeness(measured: np.ndarray, found: PoseFit, equal: EqualAngles) -> np.ndarray:
+def _strangeness(measured: np.ndarray, poses: PoseFit, equal: EqualAngles) -> np.ndarray:
     """(n,) m2, mean squared marker distances, and one square centimetre per square rad away from neutral."""
     seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
     away = np.square(
-        equal.nearest(found.q, np.broadcast_to(equal.neutral, found.q.shape))[:, 6:] - equal.neutral[6:]
+        equal.nearest(poses.q, np.broadcast_to(equal.neutral, poses.q.shape))[:, 6:] - equal.neutral[6:]
     ).mean(axis=1)
-    result: np.ndarray = found.cost_m2 / seen + 1e-4 * away
+    result: np.ndarray = poses.cost_m2 / seen + 1e-4 * away
     return result
 
 

@@ -153,9 +153,9 @@ def solve_kinematics(
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
         notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
-    told = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    told += [f"{trial.name}: {sentence}" for sentence in _ends_of_ranges(skeleton, ik)]
-    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, window, (*trial.notes, *told, *notes))
+    remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
+    remarks += [f"{trial.name}: {sentence}" for sentence in _ends_of_ranges(skeleton, ik)]
+    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, window, (*trial.notes, *remarks, *notes))
 
 
 def _ends_of_ranges(skeleton: Skeleton, ik: InverseKinematics) -> list[str]:
@@ -169,15 +169,15 @@ def _ends_of_ranges(skeleton: Skeleton, ik: InverseKinematics) -> list[str]:
         f"{ik.coordinates[c]} ({np.degrees(beyond[c]):.0f} deg)"
         for c in np.flatnonzero((beyond > _BEYOND_RAD) & skeleton.rotational)
     ]
-    told = []
+    sentences = []
     if held:
-        told.append(
+        sentences.append(
             f"before the estimate these coordinates stand at an end of their range, which the model clamps (share of "
             f"the frames): {', '.join(held)}"
         )
     if past:
-        told.append(f"beyond the usual range of a joint, by at most: {', '.join(past)}")
-    return told
+        sentences.append(f"beyond the usual range of a joint, by at most: {', '.join(past)}")
+    return sentences
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:

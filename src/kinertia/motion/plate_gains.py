@@ -55,11 +55,11 @@ def _masses(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> di
         return {}
     measured = trial.measured[nearest_samples(markers.time, plates.time)]
     measured &= (plates.time >= markers.time[0]) & (plates.time <= markers.time[-1])
-    found = {}
+    by_plate = {}
     for p, name in enumerate(plates.names):
         vertical: FloatArray = plates.force[:, p, 1]
         alone = (vertical > _ALONE_N) & (np.delete(plates.force[..., 1], p, axis=1).max(axis=1) < _IDLE_N) & measured
-        told = []
+        masses_kg = []
         for first, last in runs(alone):
             span = float(plates.time[last] - plates.time[first])
             if span < _SHORTEST_S:
@@ -67,7 +67,7 @@ def _masses(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> di
             step = np.diff(plates.time[first : last + 1])
             impulse = float(((vertical[first + 1 : last + 1] + vertical[first:last]) / 2 * step).sum())
             velocity = centre(plates.time[[first, last]], 1)
-            told.append(impulse / (GRAVITY_M_S2 * span + float(velocity[1] - velocity[0])))
-        if told:
-            found[name] = float(np.mean(told))
-    return found
+            masses_kg.append(impulse / (GRAVITY_M_S2 * span + float(velocity[1] - velocity[0])))
+        if masses_kg:
+            by_plate[name] = float(np.mean(masses_kg))
+    return by_plate

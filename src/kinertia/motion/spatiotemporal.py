@@ -96,10 +96,10 @@ def _at(feet: FeetUnderPelvis, values: np.ndarray, time_s: float) -> np.ndarray:
 
 def _belt_velocity(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
     """(3,) m/s, horizontal: how fast standing feet go; zero on a floor."""
-    found = []
+    velocities = []
     for stride in strides:
         first, last = (stride.start_s + share / 100 * (stride.end_s - stride.start_s) for share in _FOOT_FLAT)
         heel = feet.heel[stride.side]
-        found.append((_at(feet, heel, last) - _at(feet, heel, first)) / (last - first))
-    velocity = np.median(found, axis=0) * [1.0, 0.0, 1.0] if found else np.zeros(3)
+        velocities.append((_at(feet, heel, last) - _at(feet, heel, first)) / (last - first))
+    velocity = np.median(velocities, axis=0) * [1.0, 0.0, 1.0] if velocities else np.zeros(3)
     return velocity if np.linalg.norm(velocity) > _BELT_M_S else np.zeros(3)

@@ -48,11 +48,11 @@ def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
     trials = np.repeat(measured.positions[None], len(pairs), axis=0)
     for trial, pair in zip(trials, pairs, strict=True):
         trial[:, pair] = trial[:, pair[::-1]]
-    found = _exchanged_errors(skeleton, labels, trials)
+    exchanged = _exchanged_errors(skeleton, labels, trials)
     # the exchanged markers' errors under each other's names
     before = np.sqrt(np.square(plain[pairs]).mean(axis=1))
-    after = np.sqrt(np.square(np.take_along_axis(found, pairs, axis=1)).mean(axis=1))
-    gain = np.square(plain).sum() - np.square(found).sum(axis=1)
+    after = np.sqrt(np.square(np.take_along_axis(exchanged, pairs, axis=1)).mean(axis=1))
+    gain = np.square(plain).sum() - np.square(exchanged).sum(axis=1)
     cured = (after < _CURED * before) & (gain > before**2 - after**2)
     if cured.any():
         best = int(np.argmax(np.where(cured, gain, -np.inf)))

@@ -25,17 +25,17 @@ _SHOWN = {
 def accuracy_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     """One row per class of parameters, under `HEADINGS`."""
     rows = []
-    for name, found in scenario.classes.items():
+    for name, accuracy in scenario.classes.items():
         factor, unit, form = _SHOWN.get(name, (1.0, "prior sd", ".2f"))
-        errors = (f"{factor * value:{form}}" for value in (found.rms, found.bound, found.rms_literature))
-        coverage = f"{100 * found.coverage:.1f} ± {100 * found.coverage_sd:.1f} %"
-        rows.append([f"{name} ({unit})", coverage, f"{found.ratio:.2f}", *errors, _better(found)])
+        errors = (f"{factor * value:{form}}" for value in (accuracy.rms, accuracy.bound, accuracy.rms_literature))
+        coverage = f"{100 * accuracy.coverage:.1f} ± {100 * accuracy.coverage_sd:.1f} %"
+        rows.append([f"{name} ({unit})", coverage, f"{accuracy.ratio:.2f}", *errors, _better(accuracy)])
     return rows
 
 
-def _better(found: ClassAccuracy) -> str:
-    told = f"{100 * found.better:.0f} %"
-    return told if np.isnan(found.attainable) else f"{told} ({100 * found.attainable:.0f} %)"
+def _better(accuracy: ClassAccuracy) -> str:
+    text = f"{100 * accuracy.better:.0f} %"
+    return text if np.isnan(accuracy.attainable) else f"{text} ({100 * accuracy.attainable:.0f} %)"
 
 
 JOINT_HEADINGS = ("", "N m", "usual", "ratio", "sd (coverage)", "deg", "IK", "varying", "IK")
@@ -50,28 +50,32 @@ JOINT_CAPTION = (
 def joint_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
     """One row per joint, under `JOINT_HEADINGS`: RMS errors of the estimate beside the usual pipeline's."""
     rows = []
-    for joint, found in scenario.joints.items():
-        angles = (found.angle_rad, found.angle_ik_rad, found.change_rad, found.change_ik_rad)
-        moments = [f"{found.moment_nm:.2f}", f"{found.usual_nm:.2f}", f"{found.moment_nm / found.usual_nm:.2f}"]
-        deviation = f"{found.moment_sd_nm:.2f} ({100 * found.coverage:.0f} %)"
+    for joint, accuracy in scenario.joints.items():
+        angles = (accuracy.angle_rad, accuracy.angle_ik_rad, accuracy.change_rad, accuracy.change_ik_rad)
+        moments = [
+            f"{accuracy.moment_nm:.2f}",
+            f"{accuracy.usual_nm:.2f}",
+            f"{accuracy.moment_nm / accuracy.usual_nm:.2f}",
+        ]
+        deviation = f"{accuracy.moment_sd_nm:.2f} ({100 * accuracy.coverage:.0f} %)"
         rows.append([joint, *moments, deviation, *(f"{np.degrees(angle):.2f}" for angle in angles)])
     return rows
 
 
-def moments_markdown(found: Mapping[str, ScenarioAccuracy]) -> str:
+def moments_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
     """One table: per laboratory and joint the RMS error of joint moments, estimate / usual pipeline."""
-    joints = list(next(iter(found.values())).joints)
+    joints = list(next(iter(accuracies.values())).joints)
     rows = [
         [scenario.title, *(f"{one.moment_nm:.2f} / {one.usual_nm:.2f}" for one in scenario.joints.values())]
-        for scenario in found.values()
+        for scenario in accuracies.values()
     ]
     return _table(["N m", *joints], rows)
 
 
-def accuracy_markdown(found: Mapping[str, ScenarioAccuracy]) -> str:
+def accuracy_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
     """A table per scenario."""
     parts = []
-    for scenario in found.values():
+    for scenario in accuracies.values():
         title = scenario.title[0].upper() + scenario.title[1:]
         joints, classes = _table(JOINT_HEADINGS, joint_rows(scenario)), _table(HEADINGS, accuracy_rows(scenario))
         parts.append("\n\n".join([f"### {title}", joints, classes]))
@@ -83,14 +87,14 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (headings, rule, *rows))
 
 
-def save_accuracy(found: Mapping[str, ScenarioAccuracy], seed: int, folder: str | Path) -> Path:
+def save_accuracy(accuracies: Mapping[str, ScenarioAccuracy], seed: int, folder: str | Path) -> Path:
     """Write `accuracy.json` and `accuracy.md` into a folder; returns the folder."""
-    told = {
+    content = {
         "kinertia": VERSION,
         "seed": seed,
-        "scenarios": {key: asdict(scenario) for key, scenario in found.items()},
+        "scenarios": {key: asdict(scenario) for key, scenario in accuracies.items()},
     }
     with complete_folder(folder, "accuracy") as work:
-        (work / "accuracy.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-        (work / "accuracy.md").write_text(accuracy_markdown(found) + "\n", encoding="utf-8")
+        (work / "accuracy.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        (work / "accuracy.md").write_text(accuracy_markdown(accuracies) + "\n", encoding="utf-8")
     return Path(folder)

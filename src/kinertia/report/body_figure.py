@@ -77,7 +77,7 @@ def body_figure(fit: Fit, shown: Shown = "mass") -> Figure | None:
         corners = np.concatenate(outlines)
         place = left - float(corners[:, 0].min())
         data += [
-            _segment(outline + np.array([place, 0.0]), colours.fill(i), plain(colours.told[i]))
+            _segment(outline + np.array([place, 0.0]), colours.fill(i), plain(colours.texts[i]))
             for i, outline in zip(rows, outlines, strict=True)
         ]
         data += _centres(fit, body, view, rows, place)
@@ -171,7 +171,7 @@ def _outline(points: np.ndarray, radius: float, view: _View) -> np.ndarray:
     return corners[[*around, around[0]]]
 
 
-def _segment(outline: np.ndarray, colour: str, told: str) -> dict[str, Any]:
+def _segment(outline: np.ndarray, colour: str, text: str) -> dict[str, Any]:
     return {
         "type": "scatter",
         "mode": "lines",
@@ -182,14 +182,14 @@ def _segment(outline: np.ndarray, colour: str, told: str) -> dict[str, Any]:
         "line": {"color": style.GREY, "width": 1},
         "hoveron": "fills",
         "hoverinfo": "text",
-        "text": told,
+        "text": text,
         "showlegend": False,
     }
 
 
 def _centres(fit: Fit, body: _Body, view: _View, rows: list[int], place: float) -> list[dict[str, Any]]:
     """Centres of mass before and after."""
-    told = [_moved(fit, i) for i in rows]
+    texts = [_moved(fit, i) for i in rows]
     marks = ((f"CoM, {start_of(fit).word}", body.before, "circle-open"), ("CoM, estimate", body.after, "circle"))
     return [
         {
@@ -201,7 +201,7 @@ def _centres(fit: Fit, body: _Body, view: _View, rows: list[int], place: float) 
             "name": name,
             "legendgroup": name,
             "showlegend": view is _VIEWS[0],
-            "text": told,
+            "text": texts,
             "hoverinfo": "text",
         }
         for name, at, symbol in marks
@@ -227,7 +227,7 @@ class _Colours:
         limits: between which the colours run.
         stops: colours at the lower limit, in the middle and at the upper one.
         title: of the scale.
-        told: (s,) a sentence on each segment.
+        texts: (s,) a sentence on each segment.
         alt: the figure's text for those who cannot see it.
     """
 
@@ -235,7 +235,7 @@ class _Colours:
     limits: tuple[float, float]
     stops: tuple[str, str, str]
     title: str
-    told: list[str]
+    texts: list[str]
     alt: str
 
     def fill(self, i: int) -> str:
@@ -261,19 +261,19 @@ def _by_mass(fit: Fit) -> _Colours:
     rows = estimated_rows(fit)
     percent[rows] = 100 * (after[rows] / before[rows] - 1)
     sd = None if fit.posterior is None else fit.posterior.sd[:, 0]
-    told = []
+    texts = []
     for i, name in enumerate(map(segment_name, fit.estimate.segments)):
         bar = "" if sd is None else f" ± {fixed(INTERVAL_SD * sd[i], 2)}"
         change = f"{fixed(after[i] - before[i], 2, sign=True)}{bar} kg ({fixed(percent[i], 0, sign=True)} %)"
-        told.append(f"{name}: {change if np.isfinite(percent[i]) else 'kept'}")
+        texts.append(f"{name}: {change if np.isfinite(percent[i]) else 'kept'}")
     reach = max(_LEAST_PERCENT, float(np.nanmax(np.abs(percent), initial=0.0)))
     return _Colours(
         percent,
         (-reach, reach),
         (style.BLUE, "#FFFFFF", style.VERMILION),
         f"change of mass against {start_of(fit).of} (%)",
-        told,
-        f"The body from the right, the front and the left, coloured by change of mass. {'; '.join(told)}.",
+        texts,
+        f"The body from the right, the front and the left, coloured by change of mass. {'; '.join(texts)}.",
     )
 
 
@@ -281,7 +281,7 @@ def _by_information(fit: Fit, posterior: Posterior) -> _Colours:
     percent = 100 * np.clip(posterior.information[:, 0], 0.0, 1.0)
     percent[np.setdiff1d(np.arange(len(percent)), estimated_rows(fit))] = np.nan
     words = [evidence(value) for value in posterior.information[:, 0]]
-    told = [
+    texts = [
         f"{segment_name(name)}: {f'{value:.0f} % ({word})' if np.isfinite(value) else 'kept'}"
         for name, value, word in zip(fit.estimate.segments, percent, words, strict=True)
     ]
@@ -290,7 +290,7 @@ def _by_information(fit: Fit, posterior: Posterior) -> _Colours:
         (0.0, 100.0),
         ("#FFFFFF", style.between("#FFFFFF", style.BLUE, 0.5), style.BLUE),
         "information on the mass (%)",
-        told,
+        texts,
         f"The body from the right, the front and the left, coloured by what the data say about each mass. "
-        f"{'; '.join(told)}.",
+        f"{'; '.join(texts)}.",
     )

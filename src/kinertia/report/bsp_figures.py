@@ -113,11 +113,11 @@ def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict
     away, place = (after - before) / scale, np.arange(len(shown))
     names = [plain(segment_name(fit.estimate.segments[i])) for i in shown]
     if posterior is None:
-        told = [f"{name}: {_change(k, a - b)}" for name, b, a in zip(names, before, after, strict=True)]
-        return [_dots(away, place, told) | {"name": f"estimate minus {start.word}"}]
+        texts = [f"{name}: {_change(k, a - b)}" for name, b, a in zip(names, before, after, strict=True)]
+        return [_dots(away, place, texts) | {"name": f"estimate minus {start.word}"}]
     prior_sd, sd = posterior.prior_sd[shown, k], posterior.sd[shown, k]
     half = INTERVAL_SD * sd / scale
-    told = [
+    texts = [
         f"{name}: {start.word} {_interval(k, b, p)}, estimate {_interval(k, a, s)} {read_in(k)[0]}"
         for name, b, p, a, s in zip(names, before, prior_sd, after, sd, strict=True)
     ]
@@ -140,20 +140,20 @@ def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict
         (free & far, f"estimate beyond {DEPARTURE_SD:g} prior SDs", style.VERMILION, "diamond"),
     ):
         if chosen.any():
-            dots = _dots(away[chosen], place[chosen], [line for line, yes in zip(told, chosen, strict=True) if yes])
+            dots = _dots(away[chosen], place[chosen], [line for line, yes in zip(texts, chosen, strict=True) if yes])
             look = {"symbol": symbol, "size": 8, "color": colour}
             traces.append(dots | {"marker": look, "error_x": _bars(half[chosen], 2.2, colour), "name": name})
     return traces
 
 
-def _dots(x: np.ndarray, place: np.ndarray, told: list[str]) -> dict[str, Any]:
+def _dots(x: np.ndarray, place: np.ndarray, texts: list[str]) -> dict[str, Any]:
     return {
         "type": "scatter",
         "mode": "markers",
         "x": compact(x),
         "y": place.tolist(),
         "marker": {"size": 8, "color": style.BLUE},
-        "text": told,
+        "text": texts,
         "hovertemplate": "%{text}<extra></extra>",
     }
 
@@ -180,15 +180,15 @@ def information_figure(fit: Fit) -> Figure | None:
     if fit.posterior is None:
         return None
     shown = estimated_rows(fit)
-    told = 100 * np.clip(fit.posterior.information[shown], 0.0, 1.0)
+    percent = 100 * np.clip(fit.posterior.information[shown], 0.0, 1.0)
     segments = [segment_name(fit.estimate.segments[i]) for i in shown]
-    best = np.unravel_index(int(np.nanargmax(told)), told.shape)
+    best = np.unravel_index(int(np.nanargmax(percent)), percent.shape)
     alt = (
         f"Map of what the data say about each parameter, in percent; most about {NAMES[best[1]]} of "
-        f"{segments[best[0]]}, {told[best]:.0f} %; median {np.nanmedian(told):.0f} %."
+        f"{segments[best[0]]}, {percent[best]:.0f} %; median {np.nanmedian(percent):.0f} %."
     )
-    rows, columns = np.nonzero(np.isfinite(told))
-    values = told[rows, columns]
+    rows, columns = np.nonzero(np.isfinite(percent))
+    values = percent[rows, columns]
     tiles = {
         "type": "bar",
         "orientation": "h",

@@ -64,7 +64,7 @@ class Difference:
 
 def differences(first: Fit, other: Fit) -> list[Difference]:
     """Of all parameters of the segments that both have, segment by segment."""
-    found = []
+    compared = []
     for segment in first.estimate.segments:
         if segment not in other.estimate.segments:
             continue
@@ -73,8 +73,8 @@ def differences(first: Fit, other: Fit) -> list[Difference]:
         sds = [_sd(fit)[row] for fit, row in zip((first, other), rows, strict=True)]
         for k, parameter in enumerate(PARAMETERS):
             sd = float(np.hypot(sds[0][k], sds[1][k]))
-            found.append(Difference(segment, parameter, UNITS[k], float(values[0][k]), float(values[1][k]), sd))
-    return found
+            compared.append(Difference(segment, parameter, UNITS[k], float(values[0][k]), float(values[1][k]), sd))
+    return compared
 
 
 def _sd(fit: Fit) -> np.ndarray:
@@ -127,12 +127,12 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
         pairs=[
             {
                 "name": other,
-                "count": len(found),
-                "changed": sum(one.changed for one in found),
-                "judged": any(np.isfinite(one.sd) for one in found),
-                "rows": [_row(one) for one in found],
+                "count": len(compared),
+                "changed": sum(one.changed for one in compared),
+                "judged": any(np.isfinite(one.sd) for one in compared),
+                "rows": [_row(one) for one in compared],
             }
-            for other, found in pairs
+            for other, compared in pairs
         ],
         strides={one: stride_rows(fit) for one, fit in fits.items() if _strides(fit)},
         measures=[row.measure for row in next((stride_rows(fit) for fit in fits.values() if _strides(fit)), [])],
@@ -187,9 +187,9 @@ def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
     for joint, title in titles.items():
         for side in FEET:
             traces = [
-                {**mean_line(mean_curve(found)), "name": plain(name), "line": {"color": colour, "width": 2}}
+                {**mean_line(mean_curve(own_curves)), "name": plain(name), "line": {"color": colour, "width": 2}}
                 for (name, own), colour in zip(curves.items(), _COLOURS, strict=False)
-                if (found := own.get((f"{joint}_moment", side)))
+                if (own_curves := own.get((f"{joint}_moment", side)))
             ]
             if traces:
                 panels.append(Panel(f"{style.SIDES[side][0].capitalize()} {title[0].lower()}{title[1:]}", traces))

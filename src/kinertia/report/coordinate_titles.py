@@ -42,13 +42,13 @@ class Coordinate:
 
 def panels_of(skeleton: Skeleton) -> list[Coordinate]:
     """The coordinates of a skeleton in their order, left and right together."""
-    found = by_side(skeleton.coordinates)
+    sides = by_side(skeleton.coordinates)
     known = _GAIT27 if skeleton.name == "gait27" else {}
     return [
         Coordinate(
             base, known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())])
         )
-        for base, columns in found.items()
+        for base, columns in sides.items()
     ]
 
 

@@ -59,11 +59,11 @@ def quantities_of(fit: Fit) -> set[str]:
 
 def curves_of(fit: Fit, stage: Stage) -> Curves:
     """All curves of a fit that figures are drawn from."""
-    found: dict[tuple[str, str], list[CycleCurve]] = {}
+    curves: dict[tuple[str, str], list[CycleCurve]] = {}
     for trial in fit.trials:
         for one in cycle_curves(trial, fit.mass_kg, stage, spread_evenly(trial.strides, MOST_STRIDES)):
-            found.setdefault((one.quantity, one.stride.side), []).append(one)
-    return found
+            curves.setdefault((one.quantity, one.stride.side), []).append(one)
+    return curves
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class _Drawn:
             outline = _outline(norm.percent, norm.mean - norm.sd, norm.mean + norm.sd, style.faded(style.GREY, 0.3))
             yield {**outline, "name": "norm, mean ± SD"}
         for side in FEET:
-            curves, usual = (found.get((quantity, side), []) for found in (self.estimate, self.usual))
+            curves, usual = (each.get((quantity, side), []) for each in (self.estimate, self.usual))
             word, colour = style.SIDES[side]
             if curves:
                 yield from _estimate(curves, word, colour)
@@ -173,9 +173,9 @@ def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
     several = np.isfinite(values).sum(axis=0) > 1
     if not several.any():
         return None
-    found = np.full(values.shape[1], np.nan)
-    found[several] = np.nanstd(values[:, several], axis=0, ddof=1)
-    return found
+    spread = np.full(values.shape[1], np.nan)
+    spread[several] = np.nanstd(values[:, several], axis=0, ddof=1)
+    return spread
 
 
 def _over_strides(statistic: Any, values: np.ndarray) -> np.ndarray:

@@ -37,14 +37,14 @@ def stride_rows(fit: Fit) -> list[MeasureRow]:
     if not columns["side"]:
         return []
     sides = np.array(columns["side"])
-    found = [
-        MeasureRow(title, *(_told(np.array(columns[name])[sides == side], digits) for side in FEET))
+    rows = [
+        MeasureRow(title, *(_mean_and_sd(np.array(columns[name])[sides == side], digits) for side in FEET))
         for name, title, digits in _ROWS
     ]
-    return [MeasureRow("strides", *(str(int((sides == side).sum())) for side in FEET)), *found]
+    return [MeasureRow("strides", *(str(int((sides == side).sum())) for side in FEET)), *rows]
 
 
-def _told(values: np.ndarray, digits: int) -> str:
+def _mean_and_sd(values: np.ndarray, digits: int) -> str:
     """Mean, with the standard deviation of several."""
     known = values[np.isfinite(values)]
     if not len(known):

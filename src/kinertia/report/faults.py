@@ -50,12 +50,12 @@ def faults_markdown(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]
     rows = [["mistake", *(walk.name for walk in sound)], ["---"] * (1 + len(sound))]
     rows += [[name, *(_cell(by_case[walk.name, name]) for walk in sound)] for name in mistakes]
     rows.append(["**named / possible**", *(_named(walk.name, outcomes) for walk in sound)])
-    told = counts(outcomes)
-    possible = sum(told.values())
+    sums = counts(outcomes)
+    possible = sum(sums.values())
     refused = [walk.name for walk in sound if any(one.level == "fail" and one.by == "check" for one in walk.findings)]
     summary = (
-        f"Of {possible} mistakes made, {told['named']} are named ({100 * told['named'] / max(possible, 1):.0f} %), "
-        f"{told['warned']} warned of with another cause, {told['harmless']} harmless, and {told['silent']} do silent "
+        f"Of {possible} mistakes made, {sums['named']} are named ({100 * sums['named'] / max(possible, 1):.0f} %), "
+        f"{sums['warned']} warned of with another cause, {sums['harmless']} harmless, and {sums['silent']} do silent "
         f"harm. Sound walks that `check` refuses: {len(refused)} of {len(sound)}."
     )
     lines = []
@@ -82,7 +82,7 @@ def _named(walk: str, outcomes: Sequence[FaultOutcome]) -> str:
 
 def save_faults(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], folder: str | Path) -> Path:
     """Write the files into a folder; returns the folder."""
-    told = {
+    content = {
         "kinertia": VERSION,
         "sound": {walk.name: [one._asdict() for one in walk.findings] for walk in sound},
         "outcomes": [
@@ -91,6 +91,6 @@ def save_faults(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], fo
         ],
     }
     with complete_folder(folder, "faults") as work:
-        (work / "faults.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+        (work / "faults.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
         (work / "faults.md").write_text(faults_markdown(sound, outcomes), encoding="utf-8")
     return Path(folder)

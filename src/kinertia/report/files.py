@@ -162,7 +162,7 @@ def _posterior_summary(fit: Fit) -> dict[str, Any]:
     noise = {trial.name: asdict(noise) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
     return {
         "iterations": fit.posterior.iterations,
-        "calibration": {name: dict(told) for name, told in fit.posterior.calibration.items()},
+        "calibration": {name: dict(entry) for name, entry in fit.posterior.calibration.items()},
         "marker_noise": noise,
         "identifiability": _identifiability(fit.bsp_columns(), fit.posterior.base),
     }

@@ -99,25 +99,25 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
             "not. Small residuals alone prove nothing about single parameters; the simultaneous method does tell",
         )
     posterior = fit.posterior
-    told = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
-    counts = {word: told.count(word) for word in _EVIDENCE}
-    found = [
-        f"of {len(told)} parameters {counts['measured']} are measured (information above {100 * MEASURED:g} %) "
+    grades = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
+    counts = {word: grades.count(word) for word in _EVIDENCE}
+    sentences = [
+        f"of {len(grades)} parameters {counts['measured']} are measured (information above {100 * MEASURED:g} %) "
         f"and {counts['informed']} informed by the data; {counts['assumed']} are hardly informed (below "
         f'{100 * INFORMED:g} %; "assumed" in the table): their values are essentially {start_of(fit).whose}'
     ]
     masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
         if names := [name for name, one in masses.items() if one == word]:
-            found.append(f"masses {meaning}: {_segments(names)}")
+            sentences.append(f"masses {meaning}: {_segments(names)}")
     if kept := held_sentence(fit):
-        found.append(kept)
+        sentences.append(kept)
     if never := posterior.base.never:
-        found.append(
+        sentences.append(
             f"{hidden_combinations(fit)} combinations cannot be seen in any motion, such as {never[0]}: all are "
             "listed above the table"
         )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def held_sentence(fit: Fit) -> str:
@@ -150,13 +150,13 @@ def _departures(fit: Fit) -> tuple[str, ...]:
     before, after, start = fit.literature.table(), fit.estimate.table(), start_of(fit)
     far = [(int(i), int(k)) for i, k in np.argwhere(np.abs(away) > DEPARTURE_SD)]
     far.sort(key=lambda place: -abs(away[place]))
-    told = []
+    sentences = []
     for i, k in far[:_LISTED_FAR]:
         (unit, factor), digits = read_in(k), decimals(k, scale[i, k])
-        told.append(
+        sentences.append(
             f"{NAMES[k]} of {segment_name(fit.estimate.segments[i])}: {fixed(factor * after[i, k], digits)} {unit}; "
             f"{start.word} {fixed(factor * before[i, k], digits)}; {away[i, k]:+.1f} prior SDs apart"
         )
     if len(far) > _LISTED_FAR:
-        told.append(f"and {len(far) - _LISTED_FAR} more: sort the table by prior SDs to see them")
-    return tuple(told)
+        sentences.append(f"and {len(far) - _LISTED_FAR} more: sort the table by prior SDs to see them")
+    return tuple(sentences)

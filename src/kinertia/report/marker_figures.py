@@ -20,14 +20,14 @@ def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> Figure:
     `wandering` names the markers that drift and are down-weighted.
     """
     labels = trial.kinematics.ik.labels
-    found = {stage: 1e3 * rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
-    order = np.argsort(-np.nan_to_num(found["final"], nan=-1.0))
+    distances_mm = {stage: 1e3 * rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
+    order = np.argsort(-np.nan_to_num(distances_mm["final"], nan=-1.0))
     names = [plain(labels[k]) + (" (down-weighted)" if labels[k] in wandering else "") for k in order]
     traces = [
         {
             "type": "scatter",
             "mode": "markers",
-            "x": compact(found[stage][order]),
+            "x": compact(distances_mm[stage][order]),
             "y": names,
             "name": name,
             "marker": {"symbol": symbol, "size": 9, "color": colour, "line": {"width": 1.5, "color": colour}},
@@ -41,7 +41,7 @@ def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> Figure:
     worst = order[0]
     alt = (
         f"Distance between measured and modelled markers of {trial.name}; the largest after the estimate is "
-        f"{found['final'][worst]:.0f} mm at {labels[worst]}."
+        f"{distances_mm['final'][worst]:.0f} mm at {labels[worst]}."
     )
     layout = base_layout(alt)
     layout |= {

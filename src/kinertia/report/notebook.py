@@ -61,5 +61,5 @@ def recording_html(recording: Recording) -> str:
 def _gappy(markers: Markers) -> list[tuple[str, float]]:
     """Labels of markers that are not always seen, and the percentage of frames that show them; the least seen first."""
     seen = markers.seen.mean(axis=0)
-    found = [(label, 100 * float(share)) for label, share in zip(markers.labels, seen, strict=True) if share < 1]
-    return sorted(found, key=lambda item: item[1])
+    shares = [(label, 100 * float(share)) for label, share in zip(markers.labels, seen, strict=True) if share < 1]
+    return sorted(shares, key=lambda item: item[1])

@@ -158,9 +158,9 @@ def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
     for trial in trials:
         narrow = f"motion's bandwidth ({bandwidths(trial)})"
         full = full_bandwidth(trial.reactions).removeprefix("forces ").removeprefix("at ")
-        for k, (bandwidth, found) in enumerate(((narrow, trial.residuals), (full, trial.full_residuals))):
+        for k, (bandwidth, residuals) in enumerate(((narrow, trial.residuals), (full, trial.full_residuals))):
             row: dict[str, Any] = {"name": "" if k else trial.name, "bandwidth": bandwidth, "stages": {}}
-            for stage, values in found.items():
+            for stage, values in residuals.items():
                 parts = values[:, :3], values[:, 3:]
                 row["stages"][stage] = [(rms_length(p), float(np.linalg.norm(p, axis=1).max())) for p in parts]
             rows.append(row)
@@ -184,9 +184,9 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
                 held = not posterior.prior_sd[i, k] > 0
                 values |= {"prior_sd": posterior.prior_sd[i, k], "sd": posterior.sd[i, k]}
                 size = size if held else posterior.sd[i, k]
-                told = float(posterior.information[i, k])
-                row |= {"away": away[i, k], "information": 0.0 if held else max(100 * told, 0.0), "held": held}
-                row["evidence"] = evidence(told)
+                information = float(posterior.information[i, k])
+                row |= {"away": away[i, k], "information": 0.0 if held else max(100 * information, 0.0), "held": held}
+                row["evidence"] = evidence(information)
                 row["changed"] = not held and abs(after[i, k] - before[i, k]) > INTERVAL_SD * posterior.sd[i, k]
             for name, value in values.items():
                 row[name] = {"value": value * factor, "text": fixed(value * factor, decimals(k, size))}
@@ -199,15 +199,15 @@ def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], wandering: tuple[st
     kinematics = trial.kinematics
     markers = kinematics.trial.markers.select(kinematics.ik.labels)
     seen = markers.seen
-    found = {stage: rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
+    distances_m = {stage: rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
     rows = []
     for k, label in enumerate(markers.labels):
         longest = max((last - first + 1 for first, last in runs(~seen[:, k])), default=0)
         rows.append(
             {
                 "label": label,
-                "ik": 1e3 * found["ik"][k],
-                "final": 1e3 * found["final"][k],
+                "ik": 1e3 * distances_m["ik"][k],
+                "final": 1e3 * distances_m["final"][k],
                 "seen": 100 * float(seen[:, k].mean()),
                 "gap": longest / markers.rate_hz,
                 "sd": 1e3 * sd_m[label] if label in sd_m else None,

@@ -131,11 +131,11 @@ def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: in
     gap = (left_px + 6) / (_NOMINAL_WIDTH_PX - left_px - _RIGHT_PX)
     width = (1 - (columns - 1) * gap) / columns
     top_px = _TITLE_PX + _LEGEND_ROW_PX * math.ceil(legend / _LEGEND_PER_ROW[columns])
-    found: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": left_px}
+    layout: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": left_px}
     for k in range(count):
         row, column = divmod(k, columns)
         suffix = "" if k == 0 else str(k + 1)
         left, top = column * (width + gap), 1 - row * (row_px + _TITLE_PX + _TICKS_PX) / inner_px
-        found[f"xaxis{suffix}.domain"] = [round(left, 5), round(min(left + width, 1.0), 5)]
-        found[f"yaxis{suffix}.domain"] = [round(max(top - row_px / inner_px, 0.0), 5), round(top, 5)]
-    return found
+        layout[f"xaxis{suffix}.domain"] = [round(left, 5), round(min(left + width, 1.0), 5)]
+        layout[f"yaxis{suffix}.domain"] = [round(max(top - row_px / inner_px, 0.0), 5), round(top, 5)]
+    return layout

@@ -27,26 +27,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def sensitivity_frame(found: Sensitivity) -> pd.DataFrame:
+def sensitivity_frame(sensitivity: Sensitivity) -> pd.DataFrame:
     """One row per parameter, one column per condition: RMS error over the literature's."""
-    return pd.DataFrame({"parameter": found.parameters, **found.errors})
+    return pd.DataFrame({"parameter": sensitivity.parameters, **sensitivity.errors})
 
 
-def sensitivity_figure(found: Sensitivity) -> Figure:
+def sensitivity_figure(sensitivity: Sensitivity) -> Figure:
     """A map: parameters down, conditions across; dark is measured, white is no better than the literature."""
     from matplotlib.figure import Figure  # half a second, which the other studies need not wait
 
     figure = Figure(figsize=(9.0, 12.0), layout="constrained")
     axis = figure.subplots()
-    values = np.array(list(found.errors.values())).T
+    values = np.array(list(sensitivity.errors.values())).T
     picture = axis.imshow(values, aspect="auto", cmap="cividis", vmin=0.0, vmax=1.0)
     for i, j in np.ndindex(*values.shape):
         shade = "black" if values[i, j] > 0.55 else "white"
         axis.text(j, i, f"{values[i, j]:.2f}", ha="center", va="center", fontsize=6.5, color=shade)
-    titles = [CONDITIONS[key].title.replace("skin motion, ", "") for key in found.errors]
+    titles = [CONDITIONS[key].title.replace("skin motion, ", "") for key in sensitivity.errors]
     axis.set_xticks(range(len(titles)), titles, rotation=40, ha="right", fontsize=8)
-    axis.set_yticks(range(len(found.parameters)), [name.replace("_", " ") for name in found.parameters], fontsize=7)
-    for row in range(len(SHOWN), len(found.parameters), len(SHOWN)):
+    axis.set_yticks(
+        range(len(sensitivity.parameters)), [name.replace("_", " ") for name in sensitivity.parameters], fontsize=7
+    )
+    for row in range(len(SHOWN), len(sensitivity.parameters), len(SHOWN)):
         axis.axhline(row - 0.5, color="white", linewidth=1.5)
     figure.colorbar(picture, ax=axis, shrink=0.4, label="RMS error / that of the literature")
     return figure
@@ -83,34 +85,34 @@ _PICTURE = """
 """
 
 
-def sensitivity_markdown(found: Sensitivity) -> str:
+def sensitivity_markdown(sensitivity: Sensitivity) -> str:
     """The answer on a page."""
     quarter, twice = (
-        np.max([found.errors[f"{kind} x {amplitude:g}"] for kind in KINDS], axis=0)
+        np.max([sensitivity.errors[f"{kind} x {amplitude:g}"] for kind in KINDS], axis=0)
         for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
     )
-    sensitive = [found.parameters[i] for i in np.flatnonzero((quarter < INSENSITIVE) & (twice >= INSENSITIVE))]
-    never = found.never()
+    sensitive = [sensitivity.parameters[i] for i in np.flatnonzero((quarter < INSENSITIVE) & (twice >= INSENSITIVE))]
+    never = sensitivity.never()
     by_class = {
         what: sum(name.rpartition(".")[2] in members for name in never)
         for what, members in (("masses", SHOWN[:1]), ("CoM coordinates", SHOWN[1:4]), ("moments of inertia", SHOWN[4:]))
     }
-    strides = [f"strides {count}: {found.errors[_of_strides(count)].mean():.2f}" for count in STRIDES]
+    strides = [f"strides {count}: {sensitivity.errors[_of_strides(count)].mean():.2f}" for count in STRIDES]
     heads = ["parameter", *_COLUMNS]
     rows = [heads, ["---", *["--:"] * len(_COLUMNS)]]
-    for i, name in enumerate(found.parameters):
-        rows.append([name, *(f"{found.errors[key][i]:.2f}" for key in _COLUMNS)])
+    for i, name in enumerate(sensitivity.parameters):
+        rows.append([name, *(f"{sensitivity.errors[key][i]:.2f}" for key in _COLUMNS)])
     return _PAGE.format(
         picture=_PICTURE if has_matplotlib() else "",
-        draws=found.draws,
-        percent=100.0 / np.sqrt(2.0 * found.draws),
-        count=len(found.parameters),
-        study=", ".join(found.insensitive("study")) or "none",
-        artefact=", ".join(found.insensitive("artefact")) or "none",
+        draws=sensitivity.draws,
+        percent=100.0 / np.sqrt(2.0 * sensitivity.draws),
+        count=len(sensitivity.parameters),
+        study=", ".join(sensitivity.insensitive("study")) or "none",
+        artefact=", ".join(sensitivity.insensitive("artefact")) or "none",
         sensitive=", ".join(sensitive) or "none",
         never=len(never),
         never_classes=", ".join(f"{what}: {count}" for what, count in by_class.items() if count),
-        strides="; ".join([*strides, f"{WITH_SQUATS}: {found.errors[WITH_SQUATS].mean():.2f}"]),
+        strides="; ".join([*strides, f"{WITH_SQUATS}: {sensitivity.errors[WITH_SQUATS].mean():.2f}"]),
         table="\n".join(f"| {' | '.join(cells)} |" for cells in rows),
     )
 
@@ -119,22 +121,23 @@ def _of_strides(count: int) -> str:
     return f"strides {count}" if f"strides {count}" in CONDITIONS else "artefact x 1"
 
 
-def save_sensitivity(found: Sensitivity, folder: str | Path) -> Path:
+def save_sensitivity(sensitivity: Sensitivity, folder: str | Path) -> Path:
     """Write the files into a folder; returns the folder."""
-    told = {
+    content = {
         "kinertia": VERSION,
-        "seed": found.seed,
-        "draws": found.draws,
-        "small_errors_up_to_twice_the_noise": {kind: found.insensitive(kind) for kind in KINDS},
-        "shown_by_no_condition": found.never(),
+        "seed": sensitivity.seed,
+        "draws": sensitivity.draws,
+        "small_errors_up_to_twice_the_noise": {kind: sensitivity.insensitive(kind) for kind in KINDS},
+        "shown_by_no_condition": sensitivity.never(),
         "rms_error_over_literature": {
-            key: dict(zip(found.parameters, values.tolist(), strict=True)) for key, values in found.errors.items()
+            key: dict(zip(sensitivity.parameters, values.tolist(), strict=True))
+            for key, values in sensitivity.errors.items()
         },
     }
     with complete_folder(folder, "sensitivity") as work:
-        (work / "sensitivity.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-        (work / "sensitivity.md").write_text(sensitivity_markdown(found), encoding="utf-8")
-        sensitivity_frame(found).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")
+        (work / "sensitivity.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        (work / "sensitivity.md").write_text(sensitivity_markdown(sensitivity), encoding="utf-8")
+        sensitivity_frame(sensitivity).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")
         if has_matplotlib():
-            sensitivity_figure(found).savefig(work / "sensitivity.png", dpi=110)
+            sensitivity_figure(sensitivity).savefig(work / "sensitivity.png", dpi=110)
     return Path(folder)

@@ -22,17 +22,17 @@ Table = Mapping[str, Column]
 
 def person_tables(fit: Fit) -> dict[str, Table]:
     """Tables of all trials together: body segment parameters, calibration, strides and curves over the cycle."""
-    found: dict[str, Table] = {"bsp": fit.bsp_columns()}
+    tables: dict[str, Table] = {"bsp": fit.bsp_columns()}
     if fit.posterior is not None:
         names = list(fit.posterior.calibration)
-        told = [fit.posterior.calibration[name] for name in names]
-        values = {key: [one[key] for one in told] for key in ("value", "prior_sd", "sd", "unit")}
-        found["calibration"] = {"quantity": names, **values}
+        entries = [fit.posterior.calibration[name] for name in names]
+        values = {key: [one[key] for one in entries] for key in ("value", "prior_sd", "sd", "unit")}
+        tables["calibration"] = {"quantity": names, **values}
     if any(trial.strides for trial in fit.trials):
-        found["spatiotemporal"] = spatiotemporal_columns(fit.trials)
-        found["cycles"] = cycle_columns(fit.trials, fit.mass_kg)
-        found["cycles_literature"] = cycle_columns(fit.trials, fit.mass_kg, "literature")
-    return found
+        tables["spatiotemporal"] = spatiotemporal_columns(fit.trials)
+        tables["cycles"] = cycle_columns(fit.trials, fit.mass_kg)
+        tables["cycles_literature"] = cycle_columns(fit.trials, fit.mass_kg, "literature")
+    return tables
 
 
 def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
@@ -43,17 +43,17 @@ def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
         return {"time_s": trial.time, **dict(zip(names, values.T, strict=True))}
 
     q = trial.motion.q
-    found = {"coordinates": over_time(np.where(turns, np.degrees(q), q))}
-    found |= {
+    tables = {"coordinates": over_time(np.where(turns, np.degrees(q), q))}
+    tables |= {
         "moments" if stage == "estimate" else f"moments_{stage}": over_time(loads)
         for stage, loads in trial.joint_loads.items()
     }
     if trial.joint_load_sd is not None:
-        found["moments_sd"] = over_time(trial.joint_load_sd)
+        tables["moments_sd"] = over_time(trial.joint_load_sd)
     axes = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
     residual = trial.residuals["estimate"]
-    found["residuals"] = {"time_s": trial.time, **dict(zip(axes, residual.T, strict=True))}
-    return found
+    tables["residuals"] = {"time_s": trial.time, **dict(zip(axes, residual.T, strict=True))}
+    return tables
 
 
 def write_csv(fit: Fit, folder: Path) -> None:
@@ -68,23 +68,23 @@ def write_csv(fit: Fit, folder: Path) -> None:
 
 def write_json(fit: Fit, path: Path) -> None:
     """One file: tables by name, and under "trials" those of every trial; a gap is null."""
-    told: dict[str, Any] = {name: _lists(table) for name, table in person_tables(fit).items()}
-    told["trials"] = {
+    tables: dict[str, Any] = {name: _lists(table) for name, table in person_tables(fit).items()}
+    tables["trials"] = {
         trial.name: {name: _lists(table) for name, table in trial_tables(fit, trial).items()} for trial in fit.trials
     }
-    path.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(tables, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def write_mat(fit: Fit, path: Path) -> None:
     """One file for MATLAB: a struct per table with a field per column, and a struct array `trials`."""
     from scipy.io import savemat
 
-    told: dict[str, Any] = {name: _fields(table) for name, table in person_tables(fit).items()}
-    told["trials"] = [
+    tables: dict[str, Any] = {name: _fields(table) for name, table in person_tables(fit).items()}
+    tables["trials"] = [
         {"name": trial.name, **{name: _fields(table) for name, table in trial_tables(fit, trial).items()}}
         for trial in fit.trials
     ]
-    savemat(path, told, long_field_names=True, oned_as="column")
+    savemat(path, tables, long_field_names=True, oned_as="column")
 
 
 def _lists(table: Table) -> dict[str, list[Any]]:
@@ -101,9 +101,9 @@ def _plain(value: Any) -> Any:
 
 def _fields(table: Table) -> dict[str, Any]:
     """Texts as rows of characters, a hundred times faster than cells (`cellstr` makes them); names as MATLAB allows."""
-    found = {}
+    fields = {}
     for name, values in table.items():
         texts = any(isinstance(value, str) for value in _list(values)[:1])
         word = re.sub(r"\W", "_", name, flags=re.ASCII)
-        found[word if word[:1].isalpha() else f"x{word}"] = np.array(values, dtype=str if texts else None)
-    return found
+        fields[word if word[:1].isalpha() else f"x{word}"] = np.array(values, dtype=str if texts else None)
+    return fields

@@ -53,11 +53,11 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
         ]
         title = f"{kind} {_AXES[k % 3]} (N)" if k < 3 else f"Moment about {_MOMENT_AXES[k - 3]} (N m)"
         panels.append(Panel(title, traces, [*_unused(trial.kinematics, axis), *marks]))
-    told = "; ".join(
+    listed = "; ".join(
         f"{name} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
         for name, (_, values) in stages.items()
     )
-    alt = f"Residual force and moment at the pelvis of {trial.name} over time, RMS: {told}."
+    alt = f"Residual force and moment at the pelvis of {trial.name} over time, RMS: {listed}."
     return small_multiples(panels, alt, axis)
 
 

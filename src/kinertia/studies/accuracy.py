@@ -174,8 +174,8 @@ def run_accuracy(
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, ScenarioAccuracy]:
     """Accuracy in these scenarios, `draws` people each."""
-    found = run_draws(scenarios, draws, seed, workers, progress)
-    return {key: summarised(scenario.title, found[key]) for key, scenario in scenarios.items()}
+    drawn = run_draws(scenarios, draws, seed, workers, progress)
+    return {key: summarised(scenario.title, drawn[key]) for key, scenario in scenarios.items()}
 
 
 def run_draws(
@@ -187,8 +187,8 @@ def run_draws(
 ) -> dict[str, list[Draw]]:
     """All draws of every scenario, in parallel."""
     cases = [(scenario, number) for scenario in scenarios.values() for number in range(draws)]
-    found = in_parallel(partial(run_draw, seed), cases, workers, progress)
-    return {key: found[i * draws : (i + 1) * draws] for i, key in enumerate(scenarios)}
+    drawn = in_parallel(partial(run_draw, seed), cases, workers, progress)
+    return {key: drawn[i * draws : (i + 1) * draws] for i, key in enumerate(scenarios)}
 
 
 def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
@@ -235,12 +235,12 @@ def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> d
     moved, vectors = np.linalg.eigh(prior.given_scale()[1] - root @ root.T)
     error = root @ rng.standard_normal((root.shape[1], _TRIES))
     change = vectors @ (np.sqrt(np.maximum(moved, 0.0))[:, None] * rng.standard_normal((len(moved), _TRIES)))
-    found = {}
+    chances = {}
     for name, columns in CLASSES.items():
         own, before = (part.reshape(-1, 10, _TRIES)[:, columns] for part in (error, error + change))
         squares = (np.square(part).sum(axis=(0, 1)) for part in (own, before))
-        found[name] = float(np.mean(np.less(*squares)))
-    return found
+        chances[name] = float(np.mean(np.less(*squares)))
+    return chances
 
 
 def held(skeleton: Skeleton) -> CalibrationPrior:

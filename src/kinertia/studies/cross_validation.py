@@ -82,14 +82,14 @@ def cross_validate(
             f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
             "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
         )
-    found = []
+    held_out = []
     for k, held in enumerate(trials):
         progress("held out", k / len(trials))
         others = [other for other in trials if other is not held]
         estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidth, ready.uncertainty).result.bsp
         explained = (_explained(ready, bsp, held, bandwidth) for bsp in (ready.prior.mean, estimate))
-        found.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
-    return tuple(found)
+        held_out.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
+    return tuple(held_out)
 
 
 def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:

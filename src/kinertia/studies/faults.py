@@ -116,15 +116,15 @@ def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
     name, subject = case
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), _person(subject, name))
-        found, moments = checked(path), None
+        findings, moments = checked(path), None
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            found.append(Finding("fail", str(error), "fit"))
+            findings.append(Finding("fail", str(error), "fit"))
         else:
-            found += of_fit(fit)
+            findings += of_fit(fit)
             moments = moments_of(fit)
-    return SoundWalk(name, subject, tuple(found), moments)
+    return SoundWalk(name, subject, tuple(findings), moments)
 
 
 def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
@@ -140,19 +140,19 @@ def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), person)
         by_check = checked(path)
-        told = judged(mistake, sound.findings, by_check)
-        if told is not None:
-            return FaultOutcome(sound.name, mistake.name, told[0], told[1], "check")
+        judgement = judged(mistake, sound.findings, by_check)
+        if judgement is not None:
+            return FaultOutcome(sound.name, mistake.name, judgement[0], judgement[1], "check")
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            told = judged(mistake, sound.findings, [Finding("fail", str(error), "fit")])
-            outcome, said = told or ("warned", str(error))
+            judgement = judged(mistake, sound.findings, [Finding("fail", str(error), "fit")])
+            outcome, said = judgement or ("warned", str(error))
             return FaultOutcome(sound.name, mistake.name, outcome, said, "fit")
     sd, nm = change(sound.moments, moments_of(fit))
-    told = judged(mistake, sound.findings, of_fit(fit))
-    if told is not None:
-        return FaultOutcome(sound.name, mistake.name, told[0], told[1], "fit", sd, nm)
+    judgement = judged(mistake, sound.findings, of_fit(fit))
+    if judgement is not None:
+        return FaultOutcome(sound.name, mistake.name, judgement[0], judgement[1], "fit", sd, nm)
     return FaultOutcome(sound.name, mistake.name, "harmless" if sd <= 1.0 else "silent", "", "", sd, nm)
 
 
@@ -167,11 +167,11 @@ def _seed(name: str) -> list[int]:
 def checked(subject: Path) -> list[Finding]:
     """What `kinertia check` doubts."""
     try:
-        found, unreadable = check_files(files_of_subject(read_subject(subject)))
+        checks, unreadable = check_files(files_of_subject(read_subject(subject)))
     except KinertiaError as error:
         return [Finding("fail", str(error))]
-    told = [Finding("fail", sentence) for sentence in unreadable]
-    return told + [Finding(*verdict) for _, one in found for verdict in one.verdicts if verdict.level != "pass"]
+    findings = [Finding("fail", sentence) for sentence in unreadable]
+    return findings + [Finding(*verdict) for _, one in checks for verdict in one.verdicts if verdict.level != "pass"]
 
 
 def of_fit(fit: Fit) -> list[Finding]:
@@ -181,7 +181,7 @@ def of_fit(fit: Fit) -> list[Finding]:
 
 
 def judged(
-    mistake: Mistake, sound: Sequence[Finding], found: Sequence[Finding]
+    mistake: Mistake, sound: Sequence[Finding], findings: Sequence[Finding]
 ) -> tuple[Literal["named", "warned"], str] | None:
     """Whether the first and worst of what is new names the mistake; None where nothing is new.
 
@@ -189,12 +189,12 @@ def judged(
     in words that name the mistake do.
     """
     before = {(one.level, _words(one.sentence)) for one in sound}
-    new = [one for one in found if (one.level, _words(one.sentence)) not in before]
+    new = [one for one in findings if (one.level, _words(one.sentence)) not in before]
     worst = [one for one in new if one.level == "fail"] or new
     if worst:
         named = re.search(mistake.named, worst[0].sentence) is not None
         return ("named" if named else "warned"), worst[0].sentence
-    again = [one for one in found if one not in sound and re.search(mistake.named, one.sentence)]
+    again = [one for one in findings if one not in sound and re.search(mistake.named, one.sentence)]
     return ("named", again[0].sentence) if again else None
 
 

@@ -106,23 +106,25 @@ def plan_measured(
     bandwidth = Bandwidth.of(trials, cutoff_hz)
     used = used_skeleton(skeleton, trials, uncertainty)
 
-    def told(chosen: Sequence[int]) -> Information:
+    def information_of(chosen: Sequence[int]) -> Information:
         seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, uncertainty)
         calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
         return Information(MapProblem(used, prior, calibration, seen.alone, bandwidth.spacing_s), seen.repeats)
 
     everything = tuple(range(len(trials)))
-    whole = told(everything)
+    whole = information_of(everything)
     sets: list[tuple[int, ...]] = [(k,) for k in everything]
     sets += [
         max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
         for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
     ]
     # chosen by the errors of all trials; each set's own errors are what a fit of it would have
-    of_sets = {chosen: whole if chosen == everything else told(chosen) for chosen in sets}
-    found = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
+    of_sets = {chosen: whole if chosen == everything else information_of(chosen) for chosen in sets}
+    predicted = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
     names = [k.trial.name for k in trials]
-    return Plan(prior.mean.segments, prior.sd, {tuple(names[k] for k in chosen): sd for chosen, sd in found.items()})
+    return Plan(
+        prior.mean.segments, prior.sd, {tuple(names[k] for k in chosen): sd for chosen, sd in predicted.items()}
+    )
 
 
 def plan_synthetic() -> Plan:
@@ -136,6 +138,6 @@ def plan_synthetic() -> Plan:
     return plan_measured(skeleton, prior, named, "gcv")
 
 
-def _gain(told: Information, prior: BspPrior, chosen: tuple[int, ...]) -> float:
+def _gain(information: Information, prior: BspPrior, chosen: tuple[int, ...]) -> float:
     """Information on all parameters, summed."""
-    return float((1.0 - np.square(told.sd(chosen) / prior.sd)).sum())
+    return float((1.0 - np.square(information.sd(chosen) / prior.sd)).sum())

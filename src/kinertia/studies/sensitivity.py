@@ -74,18 +74,18 @@ def run_sensitivity(
     progress: Callable[[float], None] = lambda share: None,
 ) -> Sensitivity:
     """The errors in all conditions, `draws` people each."""
-    found = run_draws(CONDITIONS, draws, seed, workers, progress)
+    drawn = run_draws(CONDITIONS, draws, seed, workers, progress)
     segments = walking_subject().literature.segments
     names = list(dict.fromkeys(segment.removesuffix("_r").removesuffix("_l") for segment in segments))
     parameters = tuple(f"{name}.{parameter}" for name in names for parameter in SHOWN)
-    return Sensitivity(parameters, {key: _errors(part, segments, names) for key, part in found.items()}, draws, seed)
+    return Sensitivity(parameters, {key: _errors(part, segments, names) for key, part in drawn.items()}, draws, seed)
 
 
 def _errors(draws: list[Draw], segments: tuple[str, ...], names: list[str]) -> np.ndarray:
     """(len(names) * 7,) RMS over people and sides, over that of the literature."""
-    found, before = (
+    own, before = (
         np.square([getattr(draw, kind) / draw.prior_sd for draw in draws]).mean(axis=0)[:, : len(SHOWN)]
         for kind in ("errors", "literature_errors")
     )
     of_name = [[i for i, s in enumerate(segments) if s.removesuffix("_r").removesuffix("_l") == name] for name in names]
-    return np.sqrt([found[rows].sum(axis=0) / before[rows].sum(axis=0) for rows in of_name]).ravel()
+    return np.sqrt([own[rows].sum(axis=0) / before[rows].sum(axis=0) for rows in of_name]).ravel()

@@ -130,8 +130,8 @@ class Table1:
         return Errors(*np.std(self._values(condition), axis=0, ddof=min(1, len(self.draws) - 1)).tolist())
 
     def _values(self, condition: str) -> np.ndarray:
-        found = [draw.errors[condition] for draw in self.draws if condition in draw.errors]
-        return np.array([list(asdict(errors).values()) for errors in found])
+        errors_of_draws = [draw.errors[condition] for draw in self.draws if condition in draw.errors]
+        return np.array([list(asdict(errors).values()) for errors in errors_of_draws])
 
 
 def two_level(

@@ -112,8 +112,8 @@ def run_variants(
         for number in range(repeats * variant.times)
     ]
     draws: dict[str, list[Draw]] = {title: [] for title in variants}
-    found = in_parallel(_draw, [case for _, case in cases], progress=progress)
-    for (title, _), draw in zip(cases, found, strict=True):
+    courses = in_parallel(_draw, [case for _, case in cases], progress=progress)
+    for (title, _), draw in zip(cases, courses, strict=True):
         draws[title].append(draw)
     tables = {}
     for title, trial in trials.items():

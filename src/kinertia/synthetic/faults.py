@@ -77,15 +77,15 @@ def measured(
         skeleton = skeleton.lock({name: faults.hips_m for name in HIP_OFFSETS if "_x_" in name})
     if faults.axes_rad:
         skeleton = tilted(skeleton, faults.axes_rad, rng)
-    found = []
+    kinematics = []
     for trial, seen in zip(trials, markers, strict=True):
         loads = trial.foot_loads.copy()
         if faults.wobbling:
             loads += _wobbled(trial, faults.wobbling)
         if instruments is not None:
             loads = instruments.read(trial.time, loads)
-        found.append(_kinematics(skeleton, trial.time, seen, loads))
-    return skeleton, found
+        kinematics.append(_kinematics(skeleton, trial.time, seen, loads))
+    return skeleton, kinematics
 
 
 def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator) -> list[Markers]:
@@ -98,7 +98,7 @@ def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.
             skin.append((np.sqrt(linear), SkinMotion.draw(trials[0].skeleton, first, rng, others)))
         if linear < 1.0:
             skin.append((np.sqrt(1.0 - linear), ClusterMotion.draw(trials[0].skeleton, rng)))
-    found = []
+    markers = []
     for trial in trials:
         exact, q = trial.markers, trial.motion.q
         if not skin:
@@ -107,8 +107,8 @@ def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.
             parts = (share * (each.moved(exact, trial.skeleton, q).positions - exact.positions) for share, each in skin)
             moved = np.sum(list(parts), axis=0)
         scaled = replace(exact, positions=exact.positions + faults.amplitude * moved)
-        found.append(camera_noise(scaled, CAMERA_SD_M, rng) if skin else scaled)
-    return found
+        markers.append(camera_noise(scaled, CAMERA_SD_M, rng) if skin else scaled)
+    return markers
 
 
 def _kinematics(skeleton: Skeleton, time: np.ndarray, markers: Markers, loads: np.ndarray) -> Kinematics:

@@ -140,11 +140,11 @@ def plates_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> Measur
     there = middle[:, second] - middle[:, first]
     point[:, first] += there
     point[:, second] -= there
-    found = loads_of(plates, force, point, torque)
+    exchanged = loads_of(plates, force, point, torque)
     pair, other = [first, second], [second, first]
-    force, moment = found.force.copy(), found.moment.copy()
-    force[:, pair], moment[:, pair] = found.force[:, other], found.moment[:, other]
-    return person.with_plates(replace(found, force=force, moment=moment))
+    force, moment = exchanged.force.copy(), exchanged.moment.copy()
+    force[:, pair], moment[:, pair] = exchanged.force[:, other], exchanged.moment[:, other]
+    return person.with_plates(replace(exchanged, force=force, moment=moment))
 
 
 def late(delay_s: float) -> Change:

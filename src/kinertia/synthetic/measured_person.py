@@ -74,8 +74,8 @@ def read_person(wanted: SubjectFile, rng: np.random.Generator) -> MeasuredPerson
     static, inputs, marker_set = read_inputs(wanted)
     walk = inputs[0].recording
     marker_set = marker_set or choose_marker_set(static.markers.labels)
-    told = {key: getattr(wanted.subject, key) or getattr(static, key) for key in ("mass_kg", "height_m")}
-    subject = wanted.subject.model_copy(update=told)
+    stated = {key: getattr(wanted.subject, key) or getattr(static, key) for key in ("mass_kg", "height_m")}
+    subject = wanted.subject.model_copy(update=stated)
     # a static trial needs no forces
     person = MeasuredPerson(subject, marker_set, replace(static, plates=None), walk, inputs[0].window_s)
     return person if walk.plates is None else person.with_plates(_with_idle_noise(walk.plates, rng))

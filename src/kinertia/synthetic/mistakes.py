@@ -33,8 +33,8 @@ def _subject(**factors: float) -> Change:
     """Mass or height times a factor, and the rest as it was."""
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-        told = {key: factor * getattr(person.subject, key) for key, factor in factors.items()}
-        return _said(person, told)
+        stated = {key: factor * getattr(person.subject, key) for key, factor in factors.items()}
+        return _said(person, stated)
 
     return change
 
@@ -50,12 +50,12 @@ def _other_sex(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPers
     return _said(person, {"sex": {"male": "female", "female": "male"}[person.subject.sex or "male"]})
 
 
-def _said(person: MeasuredPerson, told: dict[str, object]) -> MeasuredPerson:
+def _said(person: MeasuredPerson, stated: dict[str, object]) -> MeasuredPerson:
     """In the subject file, and in the static trial where that says it as well."""
-    known = {key: value for key, value in told.items() if getattr(person.static, key, None) is not None}
+    known = {key: value for key, value in stated.items() if getattr(person.static, key, None) is not None}
     static = replace(person.static, **known)  # type: ignore[arg-type]
     walk = replace(person.walk, **{k: v for k, v in known.items() if getattr(person.walk, k) is not None})  # type: ignore[arg-type]
-    return replace(person, subject=person.subject.model_copy(update=told), static=static, walk=walk)
+    return replace(person, subject=person.subject.model_copy(update=stated), static=static, walk=walk)
 
 
 _OUTER = "the outer marker of the (right|left) {joint} is on its inner side"

@@ -238,12 +238,12 @@ class _WalkSeries:
     def read(cls) -> _WalkSeries:
         text = (resources.files("kinertia.synthetic") / "data" / "walk.csv").read_text(encoding="utf-8")
         entries = dict(line[1:].split(" = ") for line in text.splitlines() if line.startswith("#") and " = " in line)
-        told = {key.strip(): [float(part) for part in value.split(",")] for key, value in entries.items()}
-        contacts = tuple((told[f"contact_{side}"][0], told[f"contact_{side}"][1]) for side in "rl")
+        numbers = {key.strip(): [float(part) for part in value.split(",")] for key, value in entries.items()}
+        contacts = tuple((numbers[f"contact_{side}"][0], numbers[f"contact_{side}"][1]) for side in "rl")
         return cls(
             _data("walk.csv").set_index("coordinate"),
-            told["period_s"][0],
-            told["speed_m_s"][0],
+            numbers["period_s"][0],
+            numbers["speed_m_s"][0],
             (contacts[0], contacts[1]),
         )
 

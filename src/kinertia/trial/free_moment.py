@@ -52,15 +52,15 @@ class Turning:
         if not self.contradicts:
             return f"{mean} is near zero, as it should be ({self.moment_nm:+.1f} N m)"
         right, left = self.free_nm
-        told = (
+        text = (
             f"{mean} is {abs(self.moment_nm):.1f} N m to the {'left' if self.moment_nm > 0 else 'right'}; it should "
             f"be near zero (within {self.allowed_nm:.1f})"
         )
         if (right + left) / self.moment_nm < 0.5:
-            return f"{told}; check the places and axes of the plates, and that nothing else was touched"
+            return f"{text}; check the places and axes of the plates, and that nothing else was touched"
         same = "have the same sign" if right * left > 0 else "do not cancel"
         return (
-            f"{told}; the free moments under the feet {same} (right {right:+.1f}, left {left:+.1f} N m, opposite "
+            f"{text}; the free moments under the feet {same} (right {right:+.1f}, left {left:+.1f} N m, opposite "
             f"signs expected): check zero, sign and calibration of the plates' vertical moments, and export them again"
         )
 

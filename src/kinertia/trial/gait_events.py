@@ -21,21 +21,21 @@ class GaitEvent(NamedTuple):
 
 def gait_events(trial: Trial) -> list[GaitEvent]:
     """All events between measured frames, in order: elsewhere a load also begins and ends with the plate."""
-    frames, found = trial.markers.time, load_edges(trial.loads)
-    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S for event in found]
-    return [event for event, around in zip(found, near, strict=True) if around.any() and trial.measured[around].all()]
+    frames, edges = trial.markers.time, load_edges(trial.loads)
+    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S for event in edges]
+    return [event for event, around in zip(edges, near, strict=True) if around.any() and trial.measured[around].all()]
 
 
 def load_edges(loads: FootLoads) -> list[GaitEvent]:
     """When the load under each foot begins and ends, in order: with the contact, or with the plate's edge."""
-    found = []
+    edges = []
     for foot, side in enumerate(FEET):
         loaded = bridged(loads.time, loads.force[:, foot, 1] > LOAD_THRESHOLD_N)
         for first, last in runs(loaded):
             if loads.time[last] - loads.time[first] < SHORTEST_CONTACT_S:
                 continue
             if first > 0:
-                found.append(GaitEvent(float(loads.time[first]), side, "heel strike"))
+                edges.append(GaitEvent(float(loads.time[first]), side, "heel strike"))
             if last < len(loads.time) - 1:
-                found.append(GaitEvent(float(loads.time[last]), side, "toe off"))
-    return sorted(found)
+                edges.append(GaitEvent(float(loads.time[last]), side, "toe off"))
+    return sorted(edges)

@@ -97,15 +97,15 @@ def load_places_doubts(recording: Recording, feet: Mapping[str, Sequence[str]]) 
     if ways is None or recording.plates is None:
         return []
     contacts = _contacts(recording.plates, ways)
-    found = [_offset_doubt(contacts), _both_feet_doubt(recording.plates, contacts)]
-    return [one for one in found if one]
+    doubts = [_offset_doubt(contacts), _both_feet_doubt(recording.plates, contacts)]
+    return [one for one in doubts if one]
 
 
 def _contacts(plates: PlateLoads, ways: tuple[FootWay, FootWay]) -> list[_Contact]:
     """Loads of at least `_SHORTEST_S` while markers are there."""
     first_s, last_s = ways[0].time[0], ways[0].time[-1]
     point = _points(plates)
-    found = []
+    contacts = []
     for p in range(len(plates.names)):
         vertical = plates.force[:, p, 1]
         for first, last in runs(bridged(plates.time, vertical > _EDGE_N)):
@@ -121,7 +121,7 @@ def _contacts(plates: PlateLoads, ways: tuple[FootWay, FootWay]) -> list[_Contac
             ahead = ways[foot].beyond(plates.time[rows], point[rows, p])
             ends_m = (_quantile(ahead[0], vertical[rows], _END), _quantile(ahead[1], vertical[rows], 1 - _END))
             begins, ends = first > 0 and start > first_s, last < len(plates.time) - 1 and end < last_s
-            found.append(
+            contacts.append(
                 _Contact(
                     p,
                     start if begins else np.nan,
@@ -133,7 +133,7 @@ def _contacts(plates: PlateLoads, ways: tuple[FootWay, FootWay]) -> list[_Contac
                     ends_m,
                 )
             )
-    return found
+    return contacts
 
 
 def _points(plates: PlateLoads) -> FloatArray:
@@ -248,17 +248,17 @@ def _time_trouble(plates: PlateLoads, contacts: Sequence[_Contact], ways: tuple[
         return ""
     word = "late" if delay > 0 else "early"
     far = max(map(_half_within, _contacts(replace(plates, time=plates.time - delay), ways)), default=np.inf)
-    told = (
+    lags = (
         f"loads begin {1e3 * begin:+.0f} ms and end {1e3 * end:+.0f} ms after feet land and leave by their markers "
         f"(median of {len(late)})"
     )
     if far > _FAR_M / 2 or abs(delay) > _LONGEST_DELAY_S:
         return (
-            f"{told}, and are up to {1e3 * far:.0f} mm off the feet when moved by that: they are of another trial, or "
+            f"{lags}, and are up to {1e3 * far:.0f} mm off the feet when moved by that: they are of another trial, or "
             f"{1e3 * abs(delay):.0f} ms {word}; give the forces of this trial"
         )
     return (
-        f"the forces are {1e3 * abs(delay):.0f} ms {word}: {told}; correct the start of one of the files (trigger, "
+        f"the forces are {1e3 * abs(delay):.0f} ms {word}: {lags}; correct the start of one of the files (trigger, "
         "delay of the analog channels), or give the forces of this trial if they are of another trial"
     )
 
@@ -316,7 +316,7 @@ def _ends_doubt(contacts: Sequence[_Contact]) -> str:
 
 def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact]) -> str:
     """A load between the feet: both are on the plate, but only the sum of what they do is known."""
-    told = []
+    spans = []
     for contact in contacts:
         distance = np.linalg.norm(contact.off_m, axis=2)
         between = (distance > _BOTH_M).all(axis=0) & (np.prod(contact.off_m, axis=0).sum(axis=1) < 0)
@@ -327,11 +327,11 @@ def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact]) -> str:
         share = float(contact.weight[away].sum() / contact.weight.sum())
         if share > (_MOSTLY if contact.time[-1] - contact.time[0] > _ONE_STEP_S else _OUTSIDE_SHARE):
             when = contact.time[away]
-            told.append(f"{plates.names[contact.plate]} from {when[0]:.3f} to {when[-1]:.3f} s")
-    if not told:
+            spans.append(f"{plates.names[contact.plate]} from {when[0]:.3f} to {when[-1]:.3f} s")
+    if not spans:
         return ""
     return (
-        f"the centre of pressure leaves the foot that stands on the plate: both feet are on it ({', '.join(told)}), "
+        f"the centre of pressure leaves the foot that stands on the plate: both feet are on it ({', '.join(spans)}), "
         "and what each does is not known; use a trial with one foot on each plate, or give a window without that time "
         "(window_s)"
     )

@@ -41,12 +41,12 @@ def spikes_trouble(markers: Markers) -> str:
     often = np.flatnonzero(spike.sum(axis=0) > _FEW_SPIKES)
     if not often.size:
         return ""
-    told = ", ".join(f"{markers.labels[k]} ({spike[:, k].sum()} times)" for k in often[:_LISTED])
+    named = ", ".join(f"{markers.labels[k]} ({spike[:, k].sum()} times)" for k in often[:_LISTED])
     more = f" and {often.size - _LISTED} more" if often.size > _LISTED else ""
     first = float(markers.time[1 + int(np.argmax(spike[:, often[0]]))])
     return (
         f"spikes: single frames in which markers are up to {1e3 * away[spike].max():.0f} mm off their way: "
-        f"{told}{more}; the first at {first:.3f} s: delete those frames of the marker, a gap is bridged, or label them"
+        f"{named}{more}; the first at {first:.3f} s: delete those frames of the marker, a gap is bridged, or label them"
     )
 
 
@@ -100,15 +100,15 @@ def jump_doubts(markers: Markers) -> list[str]:
     if len(markers.time) < 5:
         return []
     size = np.nan_to_num(np.linalg.norm(_steps(markers.positions), axis=-1))
-    told = []
+    jumps = []
     for k in np.flatnonzero((size > _STEP_M * _slowness(markers)).any(axis=0)):
         frame = int(np.argmax(size[:, k]))
-        told.append(f"{markers.labels[k]} by {1e3 * size[frame, k]:.0f} mm at {markers.time[frame + 2]:.3f} s")
-    if not told:
+        jumps.append(f"{markers.labels[k]} by {1e3 * size[frame, k]:.0f} mm at {markers.time[frame + 2]:.3f} s")
+    if not jumps:
         return []
-    more = f" and {len(told) - _LISTED} more" if len(told) > _LISTED else ""
+    more = f" and {len(jumps) - _LISTED} more" if len(jumps) > _LISTED else ""
     return [
-        f"markers jump from one frame to the next: {', '.join(told[:_LISTED])}{more}; another marker or a reflection "
+        f"markers jump from one frame to the next: {', '.join(jumps[:_LISTED])}{more}; another marker or a reflection "
         "has their label from then on, or until then: correct the labels, or delete that part of the marker"
     ]
 
@@ -136,21 +136,21 @@ def straight_doubts(markers: Markers, segments: dict[str, tuple[str, ...]]) -> l
             others = markers.positions[inside][:, mates or range(len(markers.labels))]
             if not _leaves(way, others, alone=not mates):
                 continue
-            told = f"{label} from {markers.time[first]:.3f} to {markers.time[last + count - 1]:.3f} s"
-            (still if np.linalg.norm(way[-1] - way[0]) < 1e-3 else line).append(told)
+            stretch = f"{label} from {markers.time[first]:.3f} to {markers.time[last + count - 1]:.3f} s"
+            (still if np.linalg.norm(way[-1] - way[0]) < 1e-3 else line).append(stretch)
             break
-    found = []
+    doubts = []
     if still:
-        found.append(
+        doubts.append(
             f"a marker stands still while its segment moves: {', '.join(still[:_LISTED])}; it was not seen, and its "
             "last place was written: delete that part, a short gap is bridged"
         )
     if line:
-        found.append(
+        doubts.append(
             f"a marker goes along a straight line at a constant speed while its segment does not: "
             f"{', '.join(line[:_LISTED])}; a gap was filled with it: leave it empty, or fill it from the other markers"
         )
-    return found
+    return doubts
 
 
 def _leaves(way: FloatArray, others: FloatArray, alone: bool) -> bool:

@@ -72,12 +72,12 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
     contact = ground_contact(recording.markers, loads, feet)
     measured = contact.measured(recording.markers.time)
     if window_s is not None:
-        found = _spans(recording.markers.time, measured)
+        spans = _spans(recording.markers.time, measured)
         time = recording.markers.time
         measured = contact.inside & (time >= window_s[0] - 1e-6) & (time <= window_s[1] + 1e-6)
         notes += (
             f"{recording.name}: the window {window_s[0]:.3f} to {window_s[1]:.3f} s was given by the user; "
-            f"by the data, all ground contact is measured in {found}",
+            f"by the data, all ground contact is measured in {spans}",
         )
     if not measured.any():
         raise TrialError(recording.name, _nothing_measured(recording.markers.time, contact, window_s))
@@ -117,7 +117,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
             notes.append(f"{where} has {noise} loads shorter than {1000 * SHORTEST_CONTACT_S:g} ms, taken as noise")
         for first, last in contacts:
             piece = slice(first, last + 1)
-            nearer, told = _nearer_foot(
+            nearer, contact_notes = _nearer_foot(
                 where,
                 plates.time[piece],
                 plates.force[piece, p],
@@ -127,7 +127,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 plates.declared_feet[p],
                 0.0 if plates.corners is None else float(plates.corners[p, :, 1].mean()),
             )
-            notes += told
+            notes += contact_notes
             together[piece] |= _changing(plates.time[piece], nearer)
             for foot in range(2):
                 force[piece, foot] += np.where((nearer == foot)[:, None], plates.force[piece, p], 0.0)
@@ -173,13 +173,13 @@ def _centre(markers: Markers, time: FloatArray) -> FloatArray:
 
 def _contacts(time: FloatArray, loaded: BoolArray) -> tuple[list[tuple[int, int]], int]:
     """First and last sample of every contact, and the number of loads that were too short to be one."""
-    found = runs(bridged(time, loaded))
+    spans = runs(bridged(time, loaded))
     real = [
         (first, last)
-        for first, last in found
+        for first, last in spans
         if time[last] - time[first] >= SHORTEST_CONTACT_S or first == 0 or last == len(time) - 1
     ]
-    return real, len(found) - len(real)
+    return real, len(spans) - len(real)
 
 
 def _nearer_foot(

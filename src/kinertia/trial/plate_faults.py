@@ -47,11 +47,11 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
     """Zeros that are wrong or drift, by what plates read while nobody stands on them."""
     if plates.idle is None:
         return []
-    found = []
+    doubts = []
     for name, idle in zip(plates.names, plates.idle, strict=True):
         drifts = abs(idle.drift_n) > _DRIFT_N
         if drifts:
-            found.append(
+            doubts.append(
                 f"the zero of {name} drifts: its vertical force changes by {idle.drift_n:+.0f} N over the recording "
                 "while nobody stands on it; let the amplifiers warm up and zero them before each trial, or take the "
                 "drift off"
@@ -59,8 +59,8 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
         level = [(axis, value) for axis, value in zip("XYZ", idle.level_n, strict=True) if abs(value) > _ZERO_N]
         off = [(axis, value) for axis, value in level if not (drifts and axis == "Y")]
         if off:
-            found.append(_wrong_zero(name, off))
-    return found
+            doubts.append(_wrong_zero(name, off))
+    return doubts
 
 
 def _wrong_zero(name: str, off: Sequence[tuple[str, float]]) -> str:

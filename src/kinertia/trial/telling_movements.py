@@ -73,9 +73,9 @@ class TellingMovements:
         )
 
 
-def missing_movements(found: Iterable[TellingMovements | None]) -> str | None:
+def missing_movements(movements: Iterable[TellingMovements | None]) -> str | None:
     """What recordings of a person lack, in words; None where they lack nothing, or show nothing of it."""
-    known = [each for each in found if each is not None]
+    known = [each for each in movements if each is not None]
     lacking = [
         name
         for name, there in (

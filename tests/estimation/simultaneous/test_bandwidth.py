@@ -37,5 +37,5 @@ def test_the_fastest_of_several_trials_decides():
 
 
 def test_the_user_may_choose():
-    found = Bandwidth.of([trial(4.0)], 8.0, "none")
-    assert (found.motion_hz, found.force, found.spacing_s) == (8.0, "none", 0.0625)
+    bandwidth = Bandwidth.of([trial(4.0)], 8.0, "none")
+    assert (bandwidth.motion_hz, bandwidth.force, bandwidth.spacing_s) == (8.0, "none", 0.0625)

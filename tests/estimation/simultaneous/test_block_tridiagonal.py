@@ -47,8 +47,8 @@ def test_two_parts_of_a_matrix_do_as_the_whole(cut):
     rest[0] -= reach @ begun[-1]
     second = BlockBand.factor(left, below[cut:])
     ended = second.backward(second.forward(rest))
-    found = np.concatenate([first.backward(begun, ended[0]), ended])
-    np.testing.assert_allclose(found, whole.backward(whole.forward(right)), atol=1e-12)
+    solution = np.concatenate([first.backward(begun, ended[0]), ended])
+    np.testing.assert_allclose(solution, whole.backward(whole.forward(right)), atol=1e-12)
     after, below_after = second.inverse_blocks()
     before, below_before = first.inverse_blocks(after[0])
     expected = whole.inverse_blocks()

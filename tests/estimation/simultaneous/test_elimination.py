@@ -19,8 +19,8 @@ from small_problem import point, small_ground, small_problem, small_skin
 DAMPING = 1e-3
 
 
-def close(found: np.ndarray, expected: np.ndarray, share: float = 1e-9) -> None:
-    np.testing.assert_allclose(found, expected, rtol=share, atol=share * np.abs(expected).max())
+def close(actual: np.ndarray, expected: np.ndarray, share: float = 1e-9) -> None:
+    np.testing.assert_allclose(actual, expected, rtol=share, atol=share * np.abs(expected).max())
 
 
 def longer_problem() -> MapProblem:
@@ -66,11 +66,11 @@ def here(whole):
 
 
 def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
-    expected, found = whole.normal(0, *here), cut.trial_normal(0, *here)
-    close(found.static, expected.static)
-    close(found.static_right, expected.static_right)
-    close(found.right, expected.right)
-    assert found.cost == pytest.approx(expected.cost, rel=1e-12)
+    expected, actual = whole.normal(0, *here), cut.trial_normal(0, *here)
+    close(actual.static, expected.static)
+    close(actual.static_right, expected.static_right)
+    close(actual.right, expected.right)
+    assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
     band, border = np.zeros_like(expected.band), np.zeros_like(expected.border)
     for stretch in cut.stretches[0]:
         part = cut.normal(0, *here, stretch)
@@ -80,21 +80,21 @@ def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
     close(border, expected.border)
 
 
-@pytest.mark.parametrize("told", [DAMPING, 0.0], ids=["damping known beforehand", "made anew"])
-def test_elimination_and_step_are_those_of_the_whole(whole, cut, here, told):
+@pytest.mark.parametrize("damping", [DAMPING, 0.0], ids=["damping known beforehand", "made anew"])
+def test_elimination_and_step_are_those_of_the_whole(whole, cut, here, damping):
     expected = reduced(whole.trial_normal(0, *here), DAMPING)
-    found = reduced(cut.trial_normal(0, *here, told), DAMPING)
-    close(found.information, expected.information)
-    close(found.right, expected.right)
+    actual = reduced(cut.trial_normal(0, *here, damping), DAMPING)
+    close(actual.information, expected.information)
+    close(actual.right, expected.right)
     step = np.random.default_rng(0).normal(0.0, 1e-3, len(here[1]))
-    close(found.motion_step(step), expected.motion_step(step))
+    close(actual.motion_step(step), expected.motion_step(step))
 
 
 def test_deviations_of_moments_are_those_of_the_whole(whole, cut, here):
-    expected, found = (reduced(each.trial_normal(0, *here), 0.0) for each in (whole, cut))
+    expected, actual = (reduced(each.trial_normal(0, *here), 0.0) for each in (whole, cut))
     information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
     root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
-    sd = [joint_moment_sd(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, found))]
+    sd = [joint_moment_sd(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, actual))]
     close(sd[1], sd[0])
 
 
@@ -104,14 +104,14 @@ def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
     given = (whole.skeleton, whole.prior, whole.calibration, [whole.trials[0], small_problem().trials[0]], 0.05)
     expected = estimate_simultaneous(*given)
     monkeypatch.setattr(limits, "TOGETHER_BYTES", 1)
-    found = estimate_simultaneous(*given)
-    assert found.iterations == expected.iterations
-    assert found.cost == pytest.approx(expected.cost, rel=1e-9)
-    close(found.bsp.table(), expected.bsp.table())
-    close(found.bsp_covariance, expected.bsp_covariance)
+    actual = estimate_simultaneous(*given)
+    assert actual.iterations == expected.iterations
+    assert actual.cost == pytest.approx(expected.cost, rel=1e-9)
+    close(actual.bsp.table(), expected.bsp.table())
+    close(actual.bsp_covariance, expected.bsp_covariance)
     for k in range(2):
-        close(found.motions[k].qdd, expected.motions[k].qdd)
-        close(found.moment_sd[k], expected.moment_sd[k])
+        close(actual.motions[k].qdd, expected.motions[k].qdd)
+        close(actual.moment_sd[k], expected.moment_sd[k])
 
 
 @pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])

@@ -60,17 +60,19 @@ def test_information_is_between_nothing_and_everything(plain):
 
 
 def test_calibration_is_told_with_its_deviations(plain):
-    told = plain.posterior.calibration
-    assert told["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
-    assert told["plate right foot: x"]["prior_sd"] == pytest.approx(np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd))
-    assert told["plate left foot: gain"]["prior_sd"] == PLATE_PRIOR["gain"].sd
-    assert told["clock: forces late by"] == {
+    calibration = plain.posterior.calibration
+    assert calibration["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
+    assert calibration["plate right foot: x"]["prior_sd"] == pytest.approx(
+        np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd)
+    )
+    assert calibration["plate left foot: gain"]["prior_sd"] == PLATE_PRIOR["gain"].sd
+    assert calibration["clock: forces late by"] == {
         "value": plain.result.clock_s[0],
         "prior_sd": CLOCK_PRIOR_S.sd,
         "sd": plain.result.clock_s[1],
         "unit": "s",
     }
-    for name, one in told.items():
+    for name, one in calibration.items():
         assert 0 < one["sd"] <= one["prior_sd"] * (1 + 1e-9), name
 
 
@@ -95,12 +97,12 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
             [kinematics_of(off, noisy, trial.foot_loads)],
             uncertainty=GAIT27_UNCERTAINTY.with_axes(),
         )
-    told = outcome.posterior.calibration
+    calibration = outcome.posterior.calibration
     for name, put_in in wrong.items():
-        assert told[name]["unit"] == "rad"
-        assert told[name]["prior_sd"] == pytest.approx(np.radians(5.0))
-        assert told[name]["sd"] < 0.7 * told[name]["prior_sd"]
-        assert abs(told[name]["value"] + put_in) < 3.0 * told[name]["sd"]
+        assert calibration[name]["unit"] == "rad"
+        assert calibration[name]["prior_sd"] == pytest.approx(np.radians(5.0))
+        assert calibration[name]["sd"] < 0.7 * calibration[name]["prior_sd"]
+        assert abs(calibration[name]["value"] + put_in) < 3.0 * calibration[name]["sd"]
     assert "knee_tilt_1_r" not in fitted(trial).posterior.calibration
 
 
@@ -201,8 +203,8 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
         loads[:, 1, 4] += 0.008 * loads[:, 1, 1]
 
     outcome = fitted(trial, disturb=crosstalk)
-    told = outcome.posterior.calibration["plate left foot: free moment"]
-    assert told["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
+    entry = outcome.posterior.calibration["plate left foot: free moment"]
+    assert entry["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
     assert any(w.startswith("plate left foot: free moment: -") and "N m/kN" in w for w in outcome.warnings)
 
 
@@ -235,12 +237,12 @@ def test_files_of_a_simultaneous_fit(measured, tmp_path):
     bsp = pd.read_csv(folder / "bsp.csv")
     assert len(bsp) == 120
     np.testing.assert_allclose(bsp["information"], 1 - (bsp["sd"] / bsp["prior_sd"]) ** 2, atol=1e-9)
-    told = json.loads((folder / "fit.json").read_text())
-    assert told["method"] == "simultaneous"
-    assert told["converged"] is True
-    assert told["iterations"] > 1
-    assert set(told["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
-    noise = told["marker_noise"][measured.trials[0].name]
+    summary = json.loads((folder / "fit.json").read_text())
+    assert summary["method"] == "simultaneous"
+    assert summary["converged"] is True
+    assert summary["iterations"] > 1
+    assert set(summary["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
+    noise = summary["marker_noise"][measured.trials[0].name]
     assert noise["correlation_s"] > 0
     assert min(noise["sd_m"].values()) >= 0.001
     assert isinstance(noise["wandering"], list)

@@ -18,37 +18,37 @@ def shown(plates, seed=0):
 
 
 def test_what_a_posterior_adds_is_what_was_put_in():
-    told, rng = shown(("a", "b")), np.random.default_rng(1)
+    session, rng = shown(("a", "b")), np.random.default_rng(1)
     before = [(np.diag(rng.uniform(1e4, 1e6, 11)), rng.normal(size=11)) for _ in range(2)]
-    covariance = np.linalg.inv(told.information + sum(each for each, _ in before))
-    mean = covariance @ (told.right + sum(each for _, each in before))
-    found = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
-    np.testing.assert_allclose(found.information, told.information, rtol=1e-6, atol=1e-3)
-    np.testing.assert_allclose(found.right, told.right, rtol=1e-6, atol=1e-3)
+    covariance = np.linalg.inv(session.information + sum(each for each, _ in before))
+    mean = covariance @ (session.right + sum(each for _, each in before))
+    added = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
+    np.testing.assert_allclose(added.information, session.information, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(added.right, session.right, rtol=1e-6, atol=1e-3)
 
 
 def test_a_posterior_that_knows_less_than_before_adds_nothing_negative():
     before = [(np.diag([1e6] * 7), np.zeros(7))]
     covariance = np.linalg.inv(np.diag([4e6, 0.9e6, *[2e6] * 5]))
-    found = InstrumentInformation.of_posterior(("a",), np.full(7, 1e-3), covariance, before)
-    np.testing.assert_allclose(np.linalg.eigvalsh(found.information), [0.0, *[1e6] * 5, 3e6], atol=1.0)
+    added = InstrumentInformation.of_posterior(("a",), np.full(7, 1e-3), covariance, before)
+    np.testing.assert_allclose(np.linalg.eigvalsh(added.information), [0.0, *[1e6] * 5, 3e6], atol=1.0)
 
 
 @pytest.mark.parametrize("plates", [("a", "b"), ("b", "a"), ("b",), ("c", "b"), ("c",)])
 def test_plates_that_are_not_there_are_marginalised(plates):
     """Against the dense posterior of all plates."""
-    told = shown(("a", "b"))
+    session = shown(("a", "b"))
     every = tuple(dict.fromkeys([*plates, "a", "b"]))
-    wide = told.among(every, PRIOR)
+    wide = session.among(every, PRIOR)
     sd = np.array([*[PRIOR.plate[name].sd for _ in every for name in ("x", "z", "gain", "free moment")], *[1e-3] * 3])
     precision = np.diag(1.0 / np.square(sd))
     covariance = np.linalg.inv(wide.information + precision)
     kept = [*range(4 * len(plates)), *range(len(sd) - 3, len(sd))]
-    found = told.among(plates, PRIOR)
-    own = np.linalg.inv(found.information + precision[np.ix_(kept, kept)])
+    narrow = session.among(plates, PRIOR)
+    own = np.linalg.inv(narrow.information + precision[np.ix_(kept, kept)])
     np.testing.assert_allclose(own, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)
     mean = covariance @ wide.right
-    np.testing.assert_allclose(own @ found.right, mean[kept], rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(own @ narrow.right, mean[kept], rtol=1e-6, atol=1e-12)
 
 
 def test_what_the_laboratory_states_replaces_the_literature():
@@ -64,15 +64,15 @@ def test_what_the_laboratory_states_replaces_the_literature():
 def test_the_session_counts_in_the_normal_equations():
     """Cost, right-hand side and information go together: by finite differences."""
     problem = small_problem()
-    told = shown(problem.plates)
-    calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(told, told)))
+    session = shown(problem.plates)
+    calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(session, session)))
     with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials, 0.1)
     places, static = problem.layout.instruments, problem.start_static.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
     (before, right_before, cost_before), (information, right, cost) = (
         each.prior_terms(static) for each in (problem, with_session)
     )
-    np.testing.assert_allclose((information - before)[places, places], 2.0 * told.information)
+    np.testing.assert_allclose((information - before)[places, places], 2.0 * session.information)
 
     def extra(values):
         moved = static.copy()

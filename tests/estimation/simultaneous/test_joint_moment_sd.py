@@ -85,11 +85,11 @@ def test_derivatives_agree_with_finite_differences(estimate):
                 moments(problem, coefficients + s * h[:n].reshape(coefficients.shape), static + s * h[n:])
                 for s in (1.0, -1.0)
             )
-            found = derivative @ h
+            change = derivative @ h
             # a step under load, which there is none of, makes the splines through the loads swing for some samples
             away = np.abs(problem.trials[0].time[problem.trials[0].dynamic] - SWITCH_S) > 0.05
             expected = (ahead - behind) / 2.0
-            np.testing.assert_allclose(found[away], expected[away], atol=1e-6 * np.abs(found).max())
+            np.testing.assert_allclose(change[away], expected[away], atol=1e-6 * np.abs(change).max())
 
 
 def test_deviations_are_those_of_the_dense_covariance(estimate):
@@ -106,8 +106,8 @@ def test_deviations_are_those_of_the_dense_covariance(estimate):
     information = prior_information(problem, static) + part.information
     root = StaticInformation.of(information, problem.layout.in_root.stop).root_of_covariance()
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
-    found = joint_moment_sd(problem, 0, coefficients, static, part, root)
-    np.testing.assert_allclose(found, expected, rtol=1e-3)
+    moment_sd = joint_moment_sd(problem, 0, coefficients, static, part, root)
+    np.testing.assert_allclose(moment_sd, expected, rtol=1e-3)
 
 
 def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
@@ -122,10 +122,12 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
     here = here.under(GaussianPrior.of(pair.instruments), pair.layout.instruments)
     chains, information, right = dense_pair(pair, here)
     covariance = inverse(information)
-    found, moment_sd = _deviations(pair, here)
+    static_covariance, moment_sd = _deviations(pair, here)
     s = pair.layout.size
-    scale = np.sqrt(np.diag(found))
-    np.testing.assert_allclose(found / np.outer(scale, scale), covariance[:s, :s] / np.outer(scale, scale), atol=1e-6)
+    scale = np.sqrt(np.diag(static_covariance))
+    np.testing.assert_allclose(
+        static_covariance / np.outer(scale, scale), covariance[:s, :s] / np.outer(scale, scale), atol=1e-6
+    )
     _, promised, _ = _step(pair, here, _eliminated(pair, here, 0.0), 0.0, np.zeros(s))
     assert promised == pytest.approx(0.5 * right @ covariance @ right, rel=1e-6)
 

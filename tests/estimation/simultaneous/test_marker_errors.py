@@ -40,10 +40,10 @@ def test_news_is_what_a_frame_shows_beyond_the_two_before_it():
 @pytest.mark.parametrize("frames", [1.0, 3.0, 12.0, 60.0])
 def test_a_process_with_a_double_pole_is_found_again(frames):
     process = ErrorProcess.alike_over(frames)
-    found, variance = ErrorProcess.read(frames, together(made(process, 4000, np.random.default_rng(1)))[None])
+    recovered, variance = ErrorProcess.read(frames, together(made(process, 4000, np.random.default_rng(1)))[None])
     assert variance == pytest.approx(1.0, abs=0.03)
-    assert found.larger == pytest.approx(process.larger, abs=0.04)
-    assert found.smaller == pytest.approx(process.smaller, abs=0.08)
+    assert recovered.larger == pytest.approx(process.larger, abs=0.04)
+    assert recovered.smaller == pytest.approx(process.smaller, abs=0.08)
 
 
 @pytest.mark.parametrize("white", [0.001, 0.03, 0.3])
@@ -54,12 +54,12 @@ def test_no_less_news_than_in_the_errors_where_the_cameras_add_theirs(white):
     errors = np.sqrt(1.0 - white) * slow + np.sqrt(white) * rng.standard_normal(slow.shape)
     seen, frames = together(errors), 46.0 * (1.0 - white) + white
     double = ErrorProcess.alike_over(frames)
-    found, variance = ErrorProcess.read(frames, seen[None])
-    for process, told, least, most in ((found, variance, 0.6, 1.0 + 1e-9), (double, 1.0, 1.4, np.inf)):
+    recovered, variance = ErrorProcess.read(frames, seen[None])
+    for process, scale, least, most in ((recovered, variance, 0.6, 1.0 + 1e-9), (double, 1.0, 1.4, np.inf)):
         beyond = np.array([1.0, *(-each for each in process.of_before)])
-        assert least < (beyond @ seen @ beyond) / (told * process.new) < most
-    assert found.frames * variance == pytest.approx(frames, rel=1e-6)
-    assert found.smaller < double.smaller
+        assert least < (beyond @ seen @ beyond) / (scale * process.new) < most
+    assert recovered.frames * variance == pytest.approx(frames, rel=1e-6)
+    assert recovered.smaller < double.smaller
 
 
 @pytest.mark.parametrize("process", PROCESSES)
@@ -68,9 +68,9 @@ def test_information_is_the_inverse_of_the_covariance_of_every_run(process, gaps
     n, sd = 12, 0.003
     seen = np.ones((n, 1), dtype=bool)
     seen[gaps] = False
-    found = ErrorInformation.of(seen, np.array([sd]), process)
-    dense = np.diag(found.own[:, 0])
-    for later, part in ((1, found.next), (2, found.second)):
+    information = ErrorInformation.of(seen, np.array([sd]), process)
+    dense = np.diag(information.own[:, 0])
+    for later, part in ((1, information.next), (2, information.second)):
         dense += np.diag(part[:, 0], later) + np.diag(part[:, 0], -later)
     expected = np.zeros((n, n))
     there = np.flatnonzero(seen[:, 0])

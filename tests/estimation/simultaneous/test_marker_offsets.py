@@ -8,7 +8,7 @@ SIZE = 10
 
 
 @pytest.fixture
-def told():
+def terms():
     """Information and right-hand side of a trial, that of everything else, and deviations, two of them zero."""
     rng = np.random.default_rng(0)
     rows = rng.normal(size=(30, SIZE))
@@ -26,27 +26,27 @@ def together(information, right, elsewhere, sd, own):
     return whole, chain.T @ right - np.concatenate([np.zeros(SIZE), own]), chain
 
 
-def test_eliminated_is_what_the_whole_system_gives(told):
-    information, right, elsewhere, sd, own = told
+def test_eliminated_is_what_the_whole_system_gives(terms):
+    information, right, elsewhere, sd, own = terms
     whole, both, _ = together(information, right, elsewhere, sd, own)
     expected = np.linalg.solve(whole, both)
-    found = Displaced.of(information, right, PLACES, sd, own)
-    step = np.linalg.solve(found.information + elsewhere, found.right)
+    displaced = Displaced.of(information, right, PLACES, sd, own)
+    step = np.linalg.solve(displaced.information + elsewhere, displaced.right)
     np.testing.assert_allclose(step, expected[:SIZE], rtol=1e-10)
-    np.testing.assert_allclose(found.step(step), expected[SIZE:], rtol=1e-10)
-    np.testing.assert_allclose(np.linalg.inv(found.information + elsewhere), np.linalg.inv(whole)[:SIZE, :SIZE])
+    np.testing.assert_allclose(displaced.step(step), expected[SIZE:], rtol=1e-10)
+    np.testing.assert_allclose(np.linalg.inv(displaced.information + elsewhere), np.linalg.inv(whole)[:SIZE, :SIZE])
 
 
-def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(told):
-    information, right, elsewhere, sd, own = told
+def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(terms):
+    information, right, elsewhere, sd, own = terms
     whole, _, chain = together(information, right, elsewhere, sd, own)
     expected = chain @ np.linalg.inv(whole) @ chain.T
-    found = information + as_displaced(elsewhere, PLACES, sd)
-    np.testing.assert_allclose(np.linalg.inv(found), expected, rtol=1e-9, atol=1e-12)
+    in_trial = information + as_displaced(elsewhere, PLACES, sd)
+    np.testing.assert_allclose(np.linalg.inv(in_trial), expected, rtol=1e-9, atol=1e-12)
 
 
-def test_without_deviation_there_are_no_displacements(told):
-    information, right, _, _, _ = told
-    found = Displaced.of(information, right, PLACES, np.zeros(6), np.zeros(6))
-    np.testing.assert_array_equal(found.information, information)
-    assert not found.step(np.ones(SIZE)).any()
+def test_without_deviation_there_are_no_displacements(terms):
+    information, right, _, _, _ = terms
+    displaced = Displaced.of(information, right, PLACES, np.zeros(6), np.zeros(6))
+    np.testing.assert_array_equal(displaced.information, information)
+    assert not displaced.step(np.ones(SIZE)).any()

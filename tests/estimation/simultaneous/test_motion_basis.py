@@ -48,8 +48,8 @@ def test_polynomials_up_to_the_degree_are_met_exactly(basis, degree):
     design = np.zeros((len(TIME), basis.size))
     np.put_along_axis(design, basis.active, basis.values[0], axis=1)
     coefficients = np.linalg.lstsq(design, polynomial(at)[:, None])[0]
-    for derivative, found in enumerate(basis.evaluate(coefficients)):
-        np.testing.assert_allclose(found[:, 0], polynomial.deriv(derivative)(at), atol=1e-7)
+    for derivative, values in enumerate(basis.evaluate(coefficients)):
+        np.testing.assert_allclose(values[:, 0], polynomial.deriv(derivative)(at), atol=1e-7)
     # the fit has a small ridge, which tells where splines hardly show in the data
     np.testing.assert_allclose(basis.evaluate(basis.fit(polynomial(at)[:, None]))[0][:, 0], polynomial(at), atol=1e-5)
 

@@ -91,13 +91,13 @@ def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
     normal = problem.normal(0, coefficients, static)
 
     tolerance = 1e-6 * np.sqrt(np.outer(np.diag(dense), np.diag(dense))) + 1e-6
-    found = np.block(
+    normal_matrix = np.block(
         [
             [dense_band(normal.band), normal.border.reshape(size * c, -1)],
             [normal.border.reshape(size * c, -1).T, normal.static],
         ]
     )
-    assert (np.abs(found - dense) <= tolerance).all()
+    assert (np.abs(normal_matrix - dense) <= tolerance).all()
     right = np.concatenate([normal.right.ravel(), normal.static_right])
     np.testing.assert_allclose(-right, gradient, atol=1e-6 * np.abs(gradient).max())
 
@@ -111,8 +111,8 @@ def test_prior_information_is_the_derivative_of_its_gradient(problem):
     def under(static):
         at = replace(here, point=replace(here.point, static=static))
         information, right, value = problem.prior_terms(static)
-        found = replace(at, information=information, right=right, cost=value).under(instruments, places)
-        return found.information, found.right, found.cost
+        linearised = replace(at, information=information, right=right, cost=value).under(instruments, places)
+        return linearised.information, linearised.right, linearised.cost
 
     information, right, value = under(static)
     np.testing.assert_allclose(right / np.sqrt(np.diag(information)), 0.0, atol=1e-6)
@@ -214,17 +214,17 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
     def right(linearised):
         return linearised.right + linearised.normals[0].static_right
 
-    found = at(static)
-    bends = problem.bends(found)
+    start = at(static)
+    bends = problem.bends(start)
     assert (bends[rows] >= 0.0).all()
-    pulled = [row for row in rows if right(found)[row] < 0.0]
+    pulled = [row for row in rows if right(start)[row] < 0.0]
     assert pulled
     step = 1e-5
     for row in pulled:
         change = np.zeros_like(static)
         change[row] = step
         second = -(right(at(static + change))[row] - right(at(static - change))[row]) / (2.0 * step)
-        left_out = second - found.information[row, row] - found.normals[0].static[row, row]
+        left_out = second - start.information[row, row] - start.normals[0].static[row, row]
         assert bends[row] == pytest.approx(left_out, rel=1e-3)
-    others = [row for row in rows if right(found)[row] > 0.0]
+    others = [row for row in rows if right(start)[row] > 0.0]
     np.testing.assert_array_equal(bends[others], 0.0)

@@ -10,9 +10,9 @@ STRIDE = 60
 def stride():
     """(STRIDE, 30) slow periodic errors."""
     rng = np.random.default_rng(0)
-    found = np.cumsum(rng.normal(size=(STRIDE, 30)), axis=0)
-    found -= np.linspace(0, 1, STRIDE)[:, None] * (found[-1] - found[0])
-    return found - found.mean(axis=0)
+    errors = np.cumsum(rng.normal(size=(STRIDE, 30)), axis=0)
+    errors -= np.linspace(0, 1, STRIDE)[:, None] * (errors[-1] - errors[0])
+    return errors - errors.mean(axis=0)
 
 
 def steps(stride: np.ndarray, count: float, start: int = 0) -> np.ndarray:
@@ -23,23 +23,23 @@ def steps(stride: np.ndarray, count: float, start: int = 0) -> np.ndarray:
 def test_noise_that_comes_back_with_every_stride_says_nothing_new(stride, count):
     """A stride, not two, is found to come back, whichever of the peaks is the largest."""
     rng = np.random.default_rng(1)
-    found = Repetition.of(steps(stride, count) + 0.05 * stride.std() * rng.normal(size=(count * STRIDE, 30)))
-    assert found.period == pytest.approx(STRIDE, abs=1)
-    assert found.strides == pytest.approx(count, rel=0.1)
+    repetition = Repetition.of(steps(stride, count) + 0.05 * stride.std() * rng.normal(size=(count * STRIDE, 30)))
+    assert repetition.period == pytest.approx(STRIDE, abs=1)
+    assert repetition.strides == pytest.approx(count, rel=0.1)
 
 
 def test_noise_of_the_cameras_hides_no_repeats(stride):
     rng = np.random.default_rng(1)
     noisy = [steps(stride, 3) + 0.5 * stride.std() * rng.normal(size=(3 * STRIDE, 30)) for _ in range(2)]
-    found = repeats(noisy, [100.0, 100.0])
-    assert found == pytest.approx(np.full((2, 2), 3.0), rel=0.12)
+    counts = repeats(noisy, [100.0, 100.0])
+    assert counts == pytest.approx(np.full((2, 2), 3.0), rel=0.12)
     assert Repetition.of(noisy[0]).slow == pytest.approx(0.8, abs=0.08)
 
 
 def test_white_noise_is_alike_over_one_frame_and_never_comes_back():
-    found = Repetition.of(np.random.default_rng(0).normal(size=(480, 30)))
-    assert (found.frames, found.strides) == pytest.approx((1.0, 1.0), abs=0.1)
-    assert found.period is None
+    repetition = Repetition.of(np.random.default_rng(0).normal(size=(480, 30)))
+    assert (repetition.frames, repetition.strides) == pytest.approx((1.0, 1.0), abs=0.1)
+    assert repetition.period is None
 
 
 def test_nothing_to_see():
@@ -58,10 +58,10 @@ def test_length_of_slow_noise():
 
 def test_other_trials_with_the_same_errors_count_by_their_strides(stride):
     trials = [steps(stride, 2), steps(stride, 4, 17), 3.0 * steps(stride, 1, 40)]
-    found = repeats(trials, [100.0] * 3)
-    assert found.sum(axis=1) == pytest.approx(np.full(3, 7.0), rel=0.15)
-    assert found[0, 1] == pytest.approx(4.0, rel=0.15)
-    assert found[1, 0] == pytest.approx(2.0, rel=0.15)
+    counts = repeats(trials, [100.0] * 3)
+    assert counts.sum(axis=1) == pytest.approx(np.full(3, 7.0), rel=0.15)
+    assert counts[0, 1] == pytest.approx(4.0, rel=0.15)
+    assert counts[1, 0] == pytest.approx(2.0, rel=0.15)
 
 
 def test_trials_with_errors_of_their_own_do_not_count():
@@ -81,8 +81,8 @@ def test_pace_may_differ(stride, pace, count):
         walks.append(
             np.stack([np.interp(phase, np.arange(STRIDE + 1), [*c, c[0]], period=STRIDE) for c in stride.T], 1)
         )
-    found = repeats(walks, [100.0, 100.0])
-    assert found == pytest.approx(np.full((2, 2), float(count)), rel=0.15)
+    counts = repeats(walks, [100.0, 100.0])
+    assert counts == pytest.approx(np.full((2, 2), float(count)), rel=0.15)
 
 
 def test_white_noise_and_flicker_never_come_back():

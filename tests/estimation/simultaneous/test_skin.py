@@ -25,8 +25,8 @@ def trial():
 
 @pytest.fixture(scope="module")
 def patterns(trial):
-    (found,) = skin_patterns(trial.skeleton, [trial.motion.q])
-    return found
+    (of_trial,) = skin_patterns(trial.skeleton, [trial.motion.q])
+    return of_trial
 
 
 def drawn(patterns: SkinPatterns, rng: np.random.Generator) -> np.ndarray:
@@ -58,8 +58,8 @@ def test_few_patterns_per_segment_and_none_of_the_whole_body(trial, patterns):
     assert (patterns.last - patterns.first).max() == MOST_PATTERNS
     turned = trial.motion.q.copy()
     turned[:, :6] += 0.3
-    (found,) = skin_patterns(trial.skeleton, [turned])
-    np.testing.assert_allclose(found.values, patterns.values, atol=1e-12)
+    (of_turned,) = skin_patterns(trial.skeleton, [turned])
+    np.testing.assert_allclose(of_turned.values, patterns.values, atol=1e-12)
 
 
 def test_trials_share_their_patterns(trial):
@@ -70,10 +70,10 @@ def test_trials_share_their_patterns(trial):
 
 
 def test_a_motionless_trial_has_no_patterns(trial):
-    (found,) = skin_patterns(trial.skeleton, [np.tile(trial.motion.q[:1], (20, 1))])
-    assert found.size == 0
-    assert not found.displaced(np.zeros(0)).any()
-    assert found.information().shape == (0, 0)
+    (of_still,) = skin_patterns(trial.skeleton, [np.tile(trial.motion.q[:1], (20, 1))])
+    assert of_still.size == 0
+    assert not of_still.displaced(np.zeros(0)).any()
+    assert of_still.information().shape == (0, 0)
 
 
 def test_regression_takes_what_goes_with_the_joints_and_leaves_the_rest(trial, patterns):
@@ -83,11 +83,11 @@ def test_regression_takes_what_goes_with_the_joints_and_leaves_the_rest(trial, p
     errors[10:20, 3] = np.nan
     middle = np.nanmean(errors, axis=0)
     errors -= middle
-    found = WithoutSkin.of([errors], middle[None], [patterns], [1.0])
-    assert np.isnan(found.varying[0][10:20, 3]).all()
-    assert np.nanstd(found.varying[0]) == pytest.approx(0.001, rel=0.1)
+    rest = WithoutSkin.of([errors], middle[None], [patterns], [1.0])
+    assert np.isnan(rest.varying[0][10:20, 3]).all()
+    assert np.nanstd(rest.varying[0]) == pytest.approx(0.001, rel=0.1)
     # where a marker was seen in all frames its patterns are zero on average: what is left of the place is the place
-    np.testing.assert_allclose(np.delete(found.displaced[0], 3, axis=0), np.delete(middle, 3, axis=0), atol=1e-9)
+    np.testing.assert_allclose(np.delete(rest.displaced[0], 3, axis=0), np.delete(middle, 3, axis=0), atol=1e-9)
 
 
 def test_another_posture_is_no_displacement(trial):
@@ -97,8 +97,8 @@ def test_another_posture_is_no_displacement(trial):
     coefficients = drawn(skin[0], np.random.default_rng(2))
     moved = [each.displaced(coefficients) for each in skin]
     places = np.array([each.mean(axis=0) for each in moved])
-    found = WithoutSkin.of([each - each.mean(axis=0) for each in moved], places, skin, [1.0, 1.0])
-    before, after = (np.abs(each[0] - each[1]).max() for each in (places, found.displaced))
+    rest = WithoutSkin.of([each - each.mean(axis=0) for each in moved], places, skin, [1.0, 1.0])
+    before, after = (np.abs(each[0] - each[1]).max() for each in (places, rest.displaced))
     assert after < 0.25 * before
 
 

@@ -162,8 +162,8 @@ def test_halves_pooled_give_about_the_whole(person, prior, calibration):
 
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_what_was_put_in_comes_back_within_its_error_bars(name):
-    found = calibrated(DISTURBANCES[name], seed=1, duration_s=1.3, compare=False)
-    for quantity, (error, sd) in found.deviations.items():
+    recovered = calibrated(DISTURBANCES[name], seed=1, duration_s=1.3, compare=False)
+    for quantity, (error, sd) in recovered.deviations.items():
         assert abs(error) < 3.0 * sd, quantity
         assert sd < 0.75 * {"clock": 0.010, "right plate, x": 0.020}.get(quantity, 0.010), quantity
 
@@ -223,6 +223,6 @@ def test_deviations_of_every_size_have_a_covariance(trial, prior, calibration):
     result = estimate_simultaneous(
         trial.skeleton, replace(prior, covariance=covariance), calibration, [seen], SPACING_S
     )
-    found = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
-    assert (found > 0).all()
-    assert (found <= sd * 1.001).all()
+    posterior_sd = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
+    assert (posterior_sd > 0).all()
+    assert (posterior_sd <= sd * 1.001).all()

@@ -28,18 +28,18 @@ def test_one_quantity_has_the_mean_and_deviation_of_the_product(mean, sd):
 
         return quad(value, -0.1, 0.1, points=[0.0, mean], limit=200, epsabs=0, epsrel=1e-6)[0]
 
-    found, covariance = posterior([PLATE], np.eye(1) / sd**2, np.array([mean / sd**2]))
+    posterior_mean, covariance = posterior([PLATE], np.eye(1) / sd**2, np.array([mean / sd**2]))
     expected = part(1) / part(0)
-    assert found[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
+    assert posterior_mean[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
     assert covariance[0, 0] == pytest.approx(part(2) / part(0) - expected**2, rel=1e-3)
 
 
 def test_a_certain_prior_stays_what_it_is():
     priors = [SoundOrFaulty.certain(0.01), SoundOrFaulty.certain(0.2)]
     covariance = np.array([[2e-5, 1e-5], [1e-5, 0.01]])
-    found = GaussianPrior.of(priors).updated(priors, np.array([0.02, -0.1]), covariance)
-    np.testing.assert_allclose(found.precision, np.diag([1e4, 25.0]), atol=1e-6)
-    np.testing.assert_allclose(found.pull, 0.0, atol=1e-9)
+    updated = GaussianPrior.of(priors).updated(priors, np.array([0.02, -0.1]), covariance)
+    np.testing.assert_allclose(updated.precision, np.diag([1e4, 25.0]), atol=1e-6)
+    np.testing.assert_allclose(updated.pull, 0.0, atol=1e-9)
 
 
 def posterior(priors, data, right):

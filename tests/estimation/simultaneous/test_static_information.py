@@ -19,13 +19,15 @@ def test_root_gives_the_inverse(singular_first, n):
 
 
 def test_first_unknowns_alone_are_those_of_all_together(singular_first):
-    found = StaticInformation.of(singular_first, 6)
+    information = StaticInformation.of(singular_first, 6)
     right = np.arange(9.0)
     np.testing.assert_allclose(
-        np.linalg.solve(found.first, found.first_of(right)), np.linalg.solve(singular_first, right)[:6], rtol=1e-8
+        np.linalg.solve(information.first, information.first_of(right)),
+        np.linalg.solve(singular_first, right)[:6],
+        rtol=1e-8,
     )
     covariance = np.linalg.inv(singular_first)[:6, :6]
-    np.testing.assert_allclose(np.linalg.inv(found.first), covariance, rtol=1e-8, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.inv(information.first), covariance, rtol=1e-8, atol=1e-14)
 
 
 def test_singular_information_has_a_covariance():

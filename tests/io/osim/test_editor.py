@@ -26,13 +26,13 @@ def other_bsp(bsp: BodySegmentParameters, seed: int = 0) -> BodySegmentParameter
 def opensim_table(opensim, path) -> dict[str, np.ndarray]:
     loaded = opensim.Model(str(path))
     loaded.initSystem()
-    found = {}
+    table = {}
     for i in range(loaded.getBodySet().getSize()):
         body = loaded.getBodySet().get(i)
         moments, products = body.getInertia().getMoments(), body.getInertia().getProducts()
         rest = [v.get(k) for v in (body.getMassCenter(), moments, products) for k in range(3)]
-        found[body.getName()] = np.array([body.getMass(), *rest])
-    return found
+        table[body.getName()] = np.array([body.getMass(), *rest])
+    return table
 
 
 def warnings_of(opensim, path, log) -> list[str]:
@@ -169,8 +169,8 @@ def test_the_27_dof_model_as_a_file(opensim, tmp_path):
     q = random_coordinates(skeleton, 5)
     order = [skeleton.coordinates.index(name) for name in ours.skeleton.coordinates]
     expected = skeleton.marker_positions(skeleton.pose(q))
-    found = ours.skeleton.marker_positions(ours.skeleton.pose(q[:, order]))
-    np.testing.assert_allclose(found, expected, atol=1e-12)
+    positions = ours.skeleton.marker_positions(ours.skeleton.pose(q[:, order]))
+    np.testing.assert_allclose(positions, expected, atol=1e-12)
     rows = [ours.bsp.segments.index(segment) for segment in bsp.segments]
     np.testing.assert_array_equal(ours.bsp.table()[rows], bsp.table())
     assert warnings_of(opensim, path, tmp_path / "log") == []

@@ -43,7 +43,7 @@ def test_inverse_dynamics_of_a_walk_is_opensims(opensim, shared_data, tmp_path):
     loads = np.concatenate([plates.force, plates.moment], axis=-1)
     loads[plates.force[..., 1] < LOAD_THRESHOLD_N] = 0.0
     at = np.stack([np.interp(time, plates.time, column) for column in loads.reshape(len(loads), -1).T], axis=1)
-    found = inverse_dynamics(skeleton, ours.bsp, motion, at.reshape(len(time), 2, 6), ("calcn_r", "calcn_l"))
+    joint_loads = inverse_dynamics(skeleton, ours.bsp, motion, at.reshape(len(time), 2, 6), ("calcn_r", "calcn_l"))
 
     theirs = inverse_dynamics_tool(
         opensim, ours.path, tmp_path / "q.mot", loads_above_threshold(folder, tmp_path), tmp_path
@@ -51,5 +51,5 @@ def test_inverse_dynamics_of_a_walk_is_opensims(opensim, shared_data, tmp_path):
     for column, name in enumerate(skeleton.coordinates):
         kind = "moment" if skeleton.rotational[column] else "force"
         expected = np.interp(time, theirs.index, theirs[f"{name}_{kind}"])
-        gap = np.abs(found[:, column] - expected).max()
+        gap = np.abs(joint_loads[:, column] - expected).max()
         assert gap < 0.01 * np.abs(expected).max(), f"{name}: {gap:.3g}"

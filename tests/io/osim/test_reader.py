@@ -90,10 +90,10 @@ def test_degrees_where_opensim_has_degrees(opensim, shared_data, name):
     ours = read_osim(shared_data / name)
     theirs = opensim.Model(str(shared_data / name))
     theirs.initSystem()
-    found = theirs.getCoordinateSet()
+    coordinate_set = theirs.getCoordinateSet()
     rotational = opensim.Coordinate.Rotational
     assert [c.angle for c in ours.coordinates] == [
-        found.get(c.name).getMotionType() == rotational for c in ours.coordinates
+        coordinate_set.get(c.name).getMotionType() == rotational for c in ours.coordinates
     ]
 
 

@@ -112,10 +112,10 @@ class Reduced:
         """(size, c) step of the coefficients that goes with a step (S,) of the static unknowns."""
         result, after = np.empty_like(self.normal.right), None
         for part in self.backwards():
-            found = part.band.backward(part.motion - part.border @ step[:, None], after)
+            stretch_step = part.band.backward(part.motion - part.border @ step[:, None], after)
             own = result[part.stretch.splines]
-            own[:] = found.reshape(-1, own.shape[1])[: len(own)]
-            after = found[0]
+            own[:] = stretch_step.reshape(-1, own.shape[1])[: len(own)]
+            after = stretch_step[0]
         return result
 
 

@@ -68,12 +68,12 @@ class Information:
     def _of_instruments(self, rest: np.ndarray) -> np.ndarray:
         """(n, n) information of the instruments' priors where the data, of which the rest tells, show them sound."""
         priors, places = self.problem.instruments, self.problem.layout.instruments
-        found, result = GaussianPrior.of(priors), np.zeros_like(rest)
+        gaussian, result = GaussianPrior.of(priors), np.zeros_like(rest)
         for _ in range(_ROUNDS):
-            result[places, places] = found.precision
+            result[places, places] = gaussian.precision
             covariance = np.linalg.inv(rest + result)[places, places]
-            found = found.updated(priors, np.zeros(len(priors)), covariance)
-        result[places, places] = found.precision
+            gaussian = gaussian.updated(priors, np.zeros(len(priors)), covariance)
+        result[places, places] = gaussian.precision
         return result
 
     def sd(self, trials: Iterable[int]) -> np.ndarray:

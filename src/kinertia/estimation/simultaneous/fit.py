@@ -113,10 +113,10 @@ def fit_simultaneous(
     together = seen.together
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
     result = estimate_simultaneous(used, prior, calibration, together, bandwidth.spacing_s)
-    found = result.skeleton.carrying(None)
+    calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:
-        found = found.with_markers(used.markers)
+        calibrated = calibrated.with_markers(used.markers)
     motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
@@ -135,8 +135,10 @@ def fit_simultaneous(
     return SimultaneousFit(
         result,
         uncertainty.whole(result.bsp),
-        found,
-        tuple(found.with_places(found.marker_locals + (0.0 if staying else m)) for m in result.displacements_m),
+        calibrated,
+        tuple(
+            calibrated.with_places(calibrated.marker_locals + (0.0 if staying else m)) for m in result.displacements_m
+        ),
         posterior,
         motions,
         loads,
@@ -179,22 +181,22 @@ def calibration_prior(
 def _calibration(
     skeleton: Skeleton, uncertainty: ModelUncertainty, result: SimultaneousResult
 ) -> dict[str, dict[str, float | str]]:
-    found: dict[str, dict[str, float | str]] = {}
+    calibration: dict[str, dict[str, float | str]] = {}
     known = uncertainty.instruments
     for name, (value, sd) in result.coordinates.items():
         change = value - skeleton.locked[name]
-        told = {"value": change, "prior_sd": uncertainty.coordinates[name], "sd": sd}
-        found[name] = {**told, "unit": "rad" if name in uncertainty.axes else "m"}
+        entry = {"value": change, "prior_sd": uncertainty.coordinates[name], "sd": sd}
+        calibration[name] = {**entry, "unit": "rad" if name in uncertainty.axes else "m"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
         for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
             floor = known.floor[unknown].sd if unknown in known.floor else 0.0
             expected = float(np.hypot(known.plate[unknown].sd, floor))
-            told = {"value": float(value), "prior_sd": expected, "sd": float(deviation)}
-            found[f"{name}: {unknown}"] = {**told, "unit": unit}
+            entry = {"value": float(value), "prior_sd": expected, "sd": float(deviation)}
+            calibration[f"{name}: {unknown}"] = {**entry, "unit": unit}
     clock, clock_sd = result.clock_s
-    found["clock: forces late by"] = {"value": clock, "prior_sd": known.clock_s.sd, "sd": clock_sd, "unit": "s"}
-    return found
+    calibration["clock: forces late by"] = {"value": clock, "prior_sd": known.clock_s.sd, "sd": clock_sd, "unit": "s"}
+    return calibration
 
 
 SHOWN_UNIT = {
@@ -214,38 +216,38 @@ def _warnings(
     posterior: Posterior,
     trials: Sequence[Kinematics],
 ) -> list[str]:
-    found = []
+    warnings = []
     if not result.converged:
-        found.append(
+        warnings.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
-    found += _instrument_warnings(posterior.calibration)
+    warnings += _instrument_warnings(posterior.calibration)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
-            found.append(f"{kinematics.trial.name}: drifting markers, down-weighted: {listed}")
-    found += _attached_anew(result, trials)
+            warnings.append(f"{kinematics.trial.name}: drifting markers, down-weighted: {listed}")
+    warnings += _attached_anew(result, trials)
     away = (result.bsp.table() - prior.mean.table()) / prior.sd
     far = [
         f"{PARAMETERS[k]} of {result.bsp.segments[i]} {away[i, k]:+.1f}"
         for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD)
     ]
     if far:
-        found.append(
+        warnings.append(
             f"the data contradict the model: {', '.join(far)} prior SDs from {uncertainty.source}; a wrong joint, "
             f"plate or marker is more likely than an unusual body"
         )
-    return found
+    return warnings
 
 
 def _instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) -> list[str]:
     """One sentence per plate, and one for the clock, with all that is off."""
     off: dict[str, list[str]] = {}
-    for name, told in calibration.items():
+    for name, entry in calibration.items():
         instrument, colon, what = name.partition(":")
-        value, sd = float(told["value"]), float(told["prior_sd"])
+        value, sd = float(entry["value"]), float(entry["prior_sd"])
         if colon and abs(value) > _NOTABLE * sd:
-            scale, unit = SHOWN_UNIT[str(told["unit"])]
+            scale, unit = SHOWN_UNIT[str(entry["unit"])]
             said = f"{what}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit})"
             off.setdefault(instrument, []).append(said)
     return [f"{instrument}:{','.join(said)}; check the instruments" for instrument, said in off.items()]
@@ -256,16 +258,16 @@ def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> 
     labels = result.skeleton.labels
     shown = np.array([np.isin(labels, k.ik.labels) for k in trials])
     places = np.where(shown[..., None], result.displacements_m, np.nan)
-    found = []
+    warnings = []
     for k, kinematics in enumerate(trials):
         away = np.linalg.norm(places[k] - np.delete(places, k, axis=0), axis=-1)
         closest = np.where(np.isnan(away), np.inf, away).min(axis=0, initial=np.inf)
         far = [(label, value) for label, value in zip(labels, closest, strict=True) if _DISPLACED_M < value < np.inf]
         if far:
             listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in far)
-            found.append(
+            warnings.append(
                 f"{kinematics.trial.name}: markers sit elsewhere in their segments than in the other trials: {listed}; "
                 f"skin moves up to some {_DISPLACED_M * 1e3:.0f} mm; correct their labels, or fit the trials "
                 "before and after they were reattached separately"
             )
-    return found
+    return warnings

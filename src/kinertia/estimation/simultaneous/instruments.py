@@ -68,8 +68,8 @@ class InstrumentInformation:
         # rounding, and what one Gaussian cannot say of two components, may leave directions below zero
         scale = np.sqrt(np.diag(after))
         values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        told = vectors[:, values > 0.0] * scale[:, None]
-        information = told * values[values > 0.0] @ told.T
+        scaled = vectors[:, values > 0.0] * scale[:, None]
+        information = scaled * values[values > 0.0] @ scaled.T
         kept = vectors[:, values > 0.0]
         return cls(tuple(plates), information, scale * (kept @ (kept.T @ (right / scale))))
 

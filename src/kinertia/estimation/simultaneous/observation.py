@@ -77,23 +77,23 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, ba
     frames = [frames_alike(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
     places = np.stack([each.displaced for each in errors])
     rest = WithoutSkin.of([each.varying for each in errors], places, skin, frames)
-    found = [
+    pairs = [
         _observed(skeleton, *each, mass_kg, bandwidth)
         for each in zip(trials, errors, rest.varying, skin, frames, strict=True)
     ]
     displaced = _displacement_sd(skeleton, rest.displaced)
     # what the estimate finds to go with the joints comes back, too: it counts as often as before it was found
     alike = [
-        repeats([weighed(e, o.marker_sd) for e, (o, _) in zip(every, found, strict=True)], rates)
+        repeats([weighed(e, o.marker_sd) for e, (o, _) in zip(every, pairs, strict=True)], rates)
         for every in ([each.varying for each in errors], rest.varying)
     ]
     counts = np.maximum(*alike)
     by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))
     noise = [
         replace(one, repeats=float(count), displacement_sd_m={label: by_label[label] for label in one.sd_m})
-        for (_, one), count in zip(found, counts.sum(axis=1), strict=True)
+        for (_, one), count in zip(pairs, counts.sum(axis=1), strict=True)
     ]
-    together = tuple(replace(o, displacement_sd_m=displaced) for o, _ in found)
+    together = tuple(replace(o, displacement_sd_m=displaced) for o, _ in pairs)
     return Observations(together, tuple(noise), _misplaced(skeleton, rest.displaced), counts)
 
 

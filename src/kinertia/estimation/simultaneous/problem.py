@@ -302,10 +302,10 @@ class MapProblem:
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))
         theta, skin, instruments = self.layout.theta, self.layout.skin, self.layout.instruments
-        told = self.session.information @ static[instruments]
+        by_session = self.session.information @ static[instruments]
         information[instruments, instruments] += self.session.information
-        right[instruments] += self.session.right - told
-        cost += float(static[instruments] @ (told - 2.0 * self.session.right))
+        right[instruments] += self.session.right - by_session
+        cost += float(static[instruments] @ (by_session - 2.0 * self.session.right))
         information[skin, skin] += self.skin_information
         pulled = self.skin_information @ static[skin]
         right[skin] -= pulled

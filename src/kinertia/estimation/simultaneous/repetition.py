@@ -85,13 +85,13 @@ def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarr
     slowest = min(rates_hz)
     alike = [_resampled(each, rate / slowest) for each, rate in zip(errors, rates_hz, strict=True)]
     own = [Repetition.of(each) for each in alike]
-    found = np.diag([each.strides for each in own])
+    counts = np.diag([each.strides for each in own])
     for a, b in np.argwhere(~np.eye(len(own), dtype=bool)):
         first, second = own[a].period, own[b].period
         other = alike[b] if first is None or second is None else _resampled(alike[b], second / first)
         slow = float(np.sqrt(own[a].slow * own[b].slow))
-        found[a, b] = _in_other(alike[a], other, first or second, slow)
-    return found
+        counts[a, b] = _in_other(alike[a], other, first or second, slow)
+    return counts
 
 
 def _in_other(errors: np.ndarray, other: np.ndarray, period: float | None, slow: float) -> float:
@@ -126,12 +126,12 @@ def _resampled(errors: np.ndarray, step: float) -> np.ndarray:
 
 def _refined(alike: np.ndarray, period: int) -> float:
     """The period by the last of its multiples that still shows a peak: a frame matters after ten strides."""
-    found, k = float(period), 2
-    while round(found * k) + 2 < len(alike) and alike[round(found * k)] > 0:
-        near = round(found * k) + np.arange(-2, 3)
-        found = float(near[np.argmax(alike[near])]) / k
+    refined, k = float(period), 2
+    while round(refined * k) + 2 < len(alike) and alike[round(refined * k)] > 0:
+        near = round(refined * k) + np.arange(-2, 3)
+        refined = float(near[np.argmax(alike[near])]) / k
         k += 1
-    return found
+    return refined
 
 
 def _first_peak(alike: np.ndarray, wide: int) -> int | None:

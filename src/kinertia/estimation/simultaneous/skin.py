@@ -106,10 +106,10 @@ def skin_patterns(skeleton: Skeleton, trials: Sequence[np.ndarray]) -> tuple[Ski
     away, varying = every - every.mean(axis=0), np.std(every, axis=0)
     turns, first, last = [np.zeros((every.shape[1], 0))], {}, {}
     for segment in np.unique(skeleton.marker_segments):
-        found = _directions(skeleton, skeleton.segments[segment], away, varying)
+        directions = _directions(skeleton, skeleton.segments[segment], away, varying)
         first[segment] = sum(each.shape[1] for each in turns)
-        last[segment] = first[segment] + found.shape[1]
-        turns.append(found)
+        last[segment] = first[segment] + directions.shape[1]
+        turns.append(directions)
     patterns = np.split(away @ np.hstack(turns), np.cumsum([len(each) for each in trials])[:-1])
     begin, end = (np.array([part[s] for s in skeleton.marker_segments], dtype=int) for part in (first, last))
     return tuple(SkinPatterns(each, begin, end) for each in patterns)

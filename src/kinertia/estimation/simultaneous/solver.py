@@ -93,12 +93,12 @@ def estimate_simultaneous(
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
     problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
-    found = _searched(problem)
-    covariance, moment_sd = _deviations(problem, found.under)
-    return _result(problem, found, covariance, moment_sd)
+    ended = _searched(problem)
+    covariance, moment_sd = _deviations(problem, ended.under)
+    return _result(problem, ended, covariance, moment_sd)
 
 
-class _Found(NamedTuple):
+class _Ended(NamedTuple):
     """Where the search ended, under the instruments' last Gaussian; whether short of its limit, after how many steps,
     and from which cost.
     """
@@ -110,7 +110,7 @@ class _Found(NamedTuple):
     begin: float
 
 
-def _searched(problem: MapProblem) -> _Found:
+def _searched(problem: MapProblem) -> _Ended:
     """Gauss-Newton steps from the beginning until one is short."""
     state = _State(problem.at(problem.beginning, _FIRST_DAMPING), GaussianPrior.of(problem.instruments))
     begin, iterations = state.here.cost, 0
@@ -118,7 +118,7 @@ def _searched(problem: MapProblem) -> _Found:
         iterations += 1
         state = _iterated(problem, state, iterations > 1)
     under = state.here.under(state.instruments, problem.layout.instruments)
-    return _Found(under, state.instruments, state.converged, iterations, begin)
+    return _Ended(under, state.instruments, state.converged, iterations, begin)
 
 
 class _State(NamedTuple):
@@ -155,23 +155,23 @@ def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instr
     under = here.under(instruments, places)
     information = under.information + sum(each.information for each in eliminated.displaced)
     right = under.right + sum(each.right for each in eliminated.displaced)
-    found = StaticInformation.of(information, problem.layout.in_root.stop)
-    covariance = np.linalg.inv(found.first)
-    mean = here.point.static[places] + (covariance @ found.first_of(right))[places]
+    static_information = StaticInformation.of(information, problem.layout.in_root.stop)
+    covariance = np.linalg.inv(static_information.first)
+    mean = here.point.static[places] + (covariance @ static_information.first_of(right))[places]
     return instruments.updated(problem.instruments, mean, covariance[places, places])
 
 
 def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     """Posterior covariance (S, S) of the static unknowns, and deviations of the joint moments of every trial."""
     parts, displaced = _eliminated(problem, here, 0.0)
-    told = [each.information for each in displaced]
+    by_trial = [each.information for each in displaced]
     first = problem.layout.in_root.stop
-    root = StaticInformation.of(here.information + sum(told), first).root_of_covariance()
+    root = StaticInformation.of(here.information + sum(by_trial), first).root_of_covariance()
     moment_sd = []
     for k, (motion, part) in enumerate(zip(here.point.coefficients, parts, strict=True)):
         in_trial, sd = root, problem.displacement_sd_m[k]
         if sd.any():
-            elsewhere = here.information + sum(told[:k] + told[k + 1 :])
+            elsewhere = here.information + sum(by_trial[:k] + by_trial[k + 1 :])
             elsewhere = as_displaced(elsewhere, problem.layout.locals, sd)
             in_trial = StaticInformation.of(part.information + elsewhere, first).root_of_covariance()
         static = problem.in_trial(k, here.point)
@@ -226,7 +226,7 @@ def _step(
 
 
 def _result(
-    problem: MapProblem, ended: _Found, covariance: np.ndarray, moment_sd: tuple[np.ndarray, ...]
+    problem: MapProblem, ended: _Ended, covariance: np.ndarray, moment_sd: tuple[np.ndarray, ...]
 ) -> SimultaneousResult:
     point, layout = ended.under.point, problem.layout
     values = point.static
@@ -234,18 +234,18 @@ def _result(
     chain = block_diagonal(table_jacobian(values[layout.theta]))
     sd = np.sqrt(np.diag(covariance))
     names = list(problem.calibration.coordinates)
-    found = {
+    coordinates = {
         name: (float(value), float(dev))
         for name, value, dev in zip(names, values[layout.coordinates], sd[layout.coordinates], strict=True)
     }
     markers = problem.placed(values).markers
-    skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in found.items()})
+    skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in coordinates.items()})
     plates = zip(problem.plate_values(values), problem.plate_sd(covariance), strict=True)
     return SimultaneousResult(
         bsp,
         chain @ covariance[layout.theta, layout.theta] @ chain.T,
         skeleton,
-        found,
+        coordinates,
         dict(zip(problem.plates, plates, strict=True)),
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),

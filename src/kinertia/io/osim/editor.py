@@ -59,12 +59,12 @@ def write_osim(
     spans, rows = [], []
     for edit in edits:
         old = edit.element.child(edit.tag)
-        told = "" if old is None else " ".join(old.text.split())
-        if told and np.array_equal(np.array(told.split(), dtype=float), edit.values):
+        before = "" if old is None else " ".join(old.text.split())
+        if before and np.array_equal(np.array(before.split(), dtype=float), edit.values):
             continue
         new = " ".join(repr(float(value)) for value in edit.values)
         spans.append(_replacement(edit.element, edit.tag, old, new))
-        rows.append((edit.element.name, edit.tag, told, new))
+        rows.append((edit.element.name, edit.tag, before, new))
     Path(path).write_bytes(replaced(model.content, spans))
     import pandas as pd
 

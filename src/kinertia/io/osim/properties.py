@@ -55,8 +55,8 @@ class Values:
 
     def text(self, element: Element, tag: str) -> str:
         """Text of a property, without blanks around; empty where it is left out."""
-        found = self.property(element, tag)
-        return "" if found is None else found.text.strip()
+        entry = self.property(element, tag)
+        return "" if entry is None else entry.text.strip()
 
     def flag(self, element: Element, tag: str, otherwise: bool) -> bool:
         """A true or false."""
@@ -67,14 +67,14 @@ class Values:
 
     def numbers(self, element: Element, tag: str, count: int, otherwise: list[float] | None = None) -> np.ndarray:
         """`count` finite numbers; `otherwise` where the property is left out."""
-        found = self.property(element, tag)
-        if found is None:
+        entry = self.property(element, tag)
+        if entry is None:
             if otherwise is None:
                 self.fail(element, f"{element.tag} '{element.name}' has no {tag}; expected {count} number(s)")
             return np.array(otherwise)
-        values = self._list(found, element.name)
+        values = self._list(entry, element.name)
         if len(values) != count:
-            self.fail(found, f"{tag} of '{element.name}' has {len(values)} numbers; expected {count}")
+            self.fail(entry, f"{tag} of '{element.name}' has {len(values)} numbers; expected {count}")
         return values
 
     def _list(self, element: Element, owner: str) -> np.ndarray:
@@ -112,8 +112,8 @@ class Values:
         )
 
     def _of_coefficients(self, element: Element, owner: str) -> PiecewisePolynomial:
-        found = self.property(element, "coefficients")
-        values = self._list(found, owner) if found is not None else np.array([1.0, 0.0])
+        entry = self.property(element, "coefficients")
+        values = self._list(entry, owner) if entry is not None else np.array([1.0, 0.0])
         if element.tag == "LinearFunction":
             if len(values) != 2:
                 self.fail(

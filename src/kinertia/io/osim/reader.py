@@ -78,24 +78,24 @@ def _model(path: Path, content: bytes) -> tuple[Element, int]:
     model = document.child("Model")
     if document.tag != "OpenSimDocument" or model is None:
         raise OsimError(path, f"no Model in it (outermost element <{document.tag}>); expected an OpenSim model")
-    told = document.attributes.get("Version", "")
-    version = int(told) if re.fullmatch("[0-9]{1,9}", told) else 0
+    stated = document.attributes.get("Version", "")
+    version = int(stated) if re.fullmatch("[0-9]{1,9}", stated) else 0
     if version > NEWEST_VERSION:
         raise OsimError(
             path,
-            f"format {told} is newer than {NEWEST_VERSION}, the newest known here; save it with OpenSim 4.6 or "
+            f"format {stated} is newer than {NEWEST_VERSION}, the newest known here; save it with OpenSim 4.6 or "
             f"earlier, or update Kinertia",
             document.line,
         )
     if version not in _FORMAT_3 and version not in _FORMAT_4:
-        raise OsimError(path, f"format '{told}' is not known; open it in OpenSim 4 and save it again", document.line)
+        raise OsimError(path, f"format '{stated}' is not known; open it in OpenSim 4 and save it again", document.line)
     return model, version
 
 
 def _objects(model: Element, tag: str) -> list[Element]:
     """The members of one of the model's sets."""
-    found = model.child(tag)
-    objects = None if found is None else found.child("objects")
+    model_set = model.child(tag)
+    objects = None if model_set is None else model_set.child("objects")
     return [] if objects is None else objects.children
 
 
@@ -161,7 +161,7 @@ def _ordered(values: Values, joints: Sequence[JointElement], bodies: Sequence[El
 def _couplings(values: Values, model: Element, joints: Sequence[JointElement]) -> tuple[Coupling, ...]:
     """Couplings in an order in which leaders are known before those that follow them."""
     names = {coordinate.name for joint in joints for coordinate in joint.coordinates}
-    found = []
+    couplings = []
     for element in _objects(model, "ConstraintSet"):
         if values.flag(element, "isDisabled", False) or not values.flag(element, "isEnforced", True):
             continue
@@ -184,12 +184,12 @@ def _couplings(values: Values, model: Element, joints: Sequence[JointElement]) -
             )
         function = values.function(holder.children[0], element.name)
         scale = float(values.numbers(element, "scale_factor", 1, [1.0])[0])
-        found.append((element, Coupling(dependent, leaders[0], function.scaled(scale))))
-    return _leaders_first(values, found)
+        couplings.append((element, Coupling(dependent, leaders[0], function.scaled(scale))))
+    return _leaders_first(values, couplings)
 
 
-def _leaders_first(values: Values, found: Sequence[tuple[Element, Coupling]]) -> tuple[Coupling, ...]:
-    left, ordered = list(found), []
+def _leaders_first(values: Values, couplings: Sequence[tuple[Element, Coupling]]) -> tuple[Coupling, ...]:
+    left, ordered = list(couplings), []
     while left:
         following = {coupling.dependent for _, coupling in left}
         ready = next((item for item in left if item[1].independent not in following), None)

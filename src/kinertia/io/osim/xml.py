@@ -76,8 +76,8 @@ def parse(content: bytes) -> Element:
         if len(stack) > _DEEPEST:
             raise XmlError(f"more than {_DEEPEST} elements inside one another", parser.CurrentLineNumber)
         at = parser.CurrentByteIndex
-        found = _START_TAG.match(content, at)
-        end = found.end() if found else at
+        match = _START_TAG.match(content, at)
+        end = match.end() if match else at
         inner = None if content[end - 2 : end] == b"/>" else (end, end)
         element = Element(tag, attributes, parser.CurrentLineNumber, (at, end), inner)
         stack[-1].children.append(element)
