@@ -151,7 +151,7 @@ def test_a_motion_without_strides_stays_over_time(fit):
     assert still.cycles().empty
     page = render(still)
     assert 'id="cycle"' not in page
-    assert page.count('<details class="seconds" open>') == 2
+    assert page.count('<details class="seconds" open>') == page.count('<details class="seconds"') >= 1
     walking = Elements(render(fit))
     assert "cycle-moment" in str(walking.__dict__)
 

@@ -47,6 +47,9 @@ def test_fit_json_keeps_its_contract(saved):
         "sex": "male",
         "mass_kg": fit.subject.mass_kg,
         "height_m": fit.subject.height_m,
+        "knee_width_mm": None,
+        "ankle_width_mm": None,
+        "elbow_width_mm": None,
     }
     assert fit_summary["settings"] == Settings(method="two-level").model_dump()
     assert fit_summary["total_mass_kg"] == {

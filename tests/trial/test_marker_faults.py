@@ -50,6 +50,11 @@ def test_a_sound_motion():
     assert jump_doubts(markers) == straight_doubts(markers, SEGMENTS) == []
 
 
+def test_noisy_cameras_lose_no_frames():
+    noise = np.random.default_rng(2).normal(0.0, 0.003, (200, 2, 3))
+    assert lost_frames_trouble(replace(_walking(), positions=_walking().positions + noise)) == ""
+
+
 @pytest.mark.parametrize("size_m", [0.05, -0.1])
 def test_jumps(size_m):
     def jump(places, time):

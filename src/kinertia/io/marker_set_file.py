@@ -50,11 +50,20 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
 
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
-    """The preset that shares most of its labels with these, be it many or few; of such that are part of one another,
-    the larger.
+    """The preset that shares most of its labels with these, be it many or few; if several share as many, the one that
+    does so but for capitals and punctuation; of such that are part of one another, the larger.
     """
-    presets = map(read_marker_set, preset_names())
-    return max(presets, key=lambda preset: (share_worn(preset, labels), len(preset.labels)))
+    letters = {_letters(label) for label in labels}
+
+    def nearness(preset: MarkerSet) -> tuple[float, float, int]:
+        own = {_letters(label) for label in preset.labels}
+        return share_worn(preset, labels), len(own & letters) / len(own), len(preset.labels)
+
+    return max(map(read_marker_set, preset_names()), key=nearness)
+
+
+def _letters(label: str) -> str:
+    return "".join(letter for letter in label if letter.isalnum()).lower()
 
 
 def _marker_set(document: TomlFile, path: Path) -> MarkerSet:

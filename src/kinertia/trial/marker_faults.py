@@ -15,7 +15,9 @@ _SPIKE_M, _FEW_SPIKES = 0.08, 2
 _STEP_M = 0.04
 _LANDING_M = 0.04
 """Two markers exchanged their labels where each is this near to the other's way."""
-_LOST_M = 0.006
+_LOST_M, _LOST_TIMES = 0.006, 3.0
+"""Step of the median marker where frames are missing: at least so far, and so many times as far as it usually is. Noisy
+cameras move all markers, in every frame."""
 _USUAL_HZ = 60.0
 """At lower rates steps are larger, with the square of the time between frames."""
 _STRAIGHT_M = 1.5e-4
@@ -58,7 +60,8 @@ def lost_frames_trouble(markers: Markers) -> str:
     shown = np.isfinite(size).sum(axis=1) > 0.5 * len(markers.labels)
     median = np.zeros(len(size))
     median[shown] = np.nanmedian(size[shown], axis=1)
-    if not (median > _LOST_M * _slowness(markers)).any():
+    usually = float(np.median(median[shown])) if shown.any() else 0.0
+    if not (median > max(_LOST_M * _slowness(markers), _LOST_TIMES * usually)).any():
         return ""
     worst = int(np.argmax(median))
     went = np.linalg.norm(np.diff(markers.positions, axis=0), axis=-1)
