@@ -193,7 +193,12 @@ def test_measured_walks(measured_recording, name):
 
 @pytest.mark.parametrize(
     ("name", "unit", "vertical"),
-    [("bts", "mm", "+Y"), ("ist", "m", "+Z"), ("motion_analysis_walk", "mm", "+Z"), ("plates_type1", "m", "+Y")],
+    [
+        pytest.param("bts", "mm", "+Y", marks=pytest.mark.slow),
+        ("ist", "m", "+Z"),
+        ("motion_analysis_walk", "mm", "+Z"),
+        ("plates_type1", "m", "+Y"),
+    ],
 )
 def test_files_of_other_laboratories(shared_data, name, unit, vertical):
     recording = read_recording(shared_data / "c3d_variety" / f"{name}.c3d")

@@ -92,6 +92,7 @@ def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
         assert re.search(rf"{segment} literature [\d.]+ -?\d+ ", text)
 
 
+@pytest.mark.slow
 def test_progress_is_plain_lines_in_a_log(fit_of):
     assert fit_of("gait2354").outcome.err.splitlines() == ["reading", "calibration", "inverse kinematics", "estimate"]
 
@@ -222,6 +223,7 @@ def test_quiet_progress(monkeypatch):
     assert screen.getvalue() == ""
 
 
+@pytest.mark.slow
 def test_results_never_go_among_somebody_elses_files_unasked(fit_at_once, tmp_path):
     """Refused before any work; with --force the others stay; its own results are replaced unasked."""
     out = tmp_path / "out"

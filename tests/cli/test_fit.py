@@ -24,6 +24,7 @@ def subjects(demo_run, tmp_path, monkeypatch, fit):
     return folder
 
 
+@pytest.mark.slow
 def test_several_people_are_fitted_each_into_a_folder_of_their_own(subjects, tmp_path):
     out = tmp_path / "out"
     told = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", out, "--json")
@@ -110,6 +111,7 @@ def test_check_tells_scripts_what_it_tells_people(subjects):
     assert wrong.status == 2
 
 
+@pytest.mark.slow
 def test_shells_complete_commands_and_options():
     program = "from kinertia.cli.start import main; main()"
     for typed, expected in (("kinertia com", "compare"), ("kinertia report --no", "--norms")):

@@ -13,7 +13,11 @@ from command_line import run
 from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
 
-CASES = [("gait2354", False), ("gait2354", True), ("rajagopal", True)]
+CASES = [
+    ("gait2354", False),
+    pytest.param("gait2354", True, marks=pytest.mark.slow),
+    pytest.param("rajagopal", True, marks=pytest.mark.slow),
+]
 
 
 def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndarray, np.ndarray]:
@@ -108,6 +112,7 @@ def test_walks_and_squats_pooled(fit_with_model):
     assert (folder / "walking2" / "kinematics.mot").is_file()
 
 
+@pytest.mark.slow
 def test_page_of_the_benchmark(fit_with_model):
     runs = {}
     for calibrate in (False, True):

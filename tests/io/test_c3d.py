@@ -46,7 +46,10 @@ VARIETY = {
 }
 
 
-@pytest.mark.parametrize("name", VARIETY)
+LARGE = ("bts.c3d", "plates_kistler_type3.c3d")
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE)) for name in VARIETY])
 def test_every_maker(shared_data, name):
     expected = VARIETY[name]
     path = shared_data / "c3d_variety" / name

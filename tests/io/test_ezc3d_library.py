@@ -24,6 +24,7 @@ def _python(code, *arguments):
     return subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
 
 
+@pytest.mark.slow
 def test_without_ezc3d_a_c3d_file_says_what_to_install(measured_walk):
     code = "from kinertia.cli.app import main; main(['check', sys.argv[1]])"
     done = _python(code, measured_walk / "walk.c3d")

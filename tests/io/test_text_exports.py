@@ -7,7 +7,7 @@ import lab_files
 from kinertia.io.recording import read_recording
 
 
-@pytest.mark.parametrize("kind", ["tsv", "csv"])
+@pytest.mark.parametrize("kind", ["tsv", pytest.param("csv", marks=pytest.mark.slow)])
 def test_a_measured_walk_comes_back(shared_data, tmp_path, monkeypatch, kind):
     walk = read_recording(shared_data / "pig_c3d" / "subject_a_walk.c3d")
     corners = np.stack([plate @ lab_files.LAB for plate in walk.plates.corners])

@@ -62,6 +62,7 @@ def test_a_figure_is_a_file(fit, tmp_path, ending, begin):
         assert width * unit == pytest.approx(180)
 
 
+@pytest.mark.slow
 def test_every_figure_is_drawn_with_and_without_error_bars(fit, two_level):
     for one in (fit, two_level):
         for name, make in FIGURES.items():

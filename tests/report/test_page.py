@@ -391,6 +391,7 @@ def test_recording_shows_itself():
     assert "no force plates" in still
 
 
+@pytest.mark.slow
 def test_pictures_are_those_of_the_report(fit, page):
     written = figures_of(page)
     plot = fit.plot

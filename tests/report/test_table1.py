@@ -51,6 +51,7 @@ def test_rows_fit_a_terminal_of_100_columns(table):
     assert sum(max(len(row[k]) for row in rows) + 1 for k in range(5)) + 3 <= 100
 
 
+@pytest.mark.slow
 def test_four_files_are_written(table, tmp_path):
     folder = save_table1(table, tmp_path / "deep" / "out")
     names = sorted(path.name for path in folder.glob("[!.]*"))

@@ -32,6 +32,7 @@ def test_farthest_from_the_literature():
     assert measured_trials.farthest(bsp) == "com_x of b -4.0"
 
 
+@pytest.mark.slow
 def test_page_of_measured_trials(fit_of):
     runs = {
         name: {**fit_of(name).summary, "bsp": pd.read_csv(fit_of(name).folder / "bsp.csv")}

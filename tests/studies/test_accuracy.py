@@ -152,6 +152,7 @@ def test_calibration_errors_move_everything(trial):
     assert 0.0 < abs(share - 1.0) < 0.08
 
 
+@pytest.mark.slow
 @in_one_process()
 def test_command(tmp_path, monkeypatch):
     chosen = {key: replace(SCENARIOS[key], walk_s=0.6) for key in ("study_calibration", "gain")}

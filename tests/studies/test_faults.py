@@ -42,7 +42,7 @@ LEFT_TO_THE_FIT = {
     "the other sex",
 }
 """What `check` says nothing about: the study in `docs/faults.md` tells what becomes of it."""
-QUICK_EVERY = 4
+QUICK_EVERY = 6
 
 
 @pytest.fixture(scope="module")

@@ -47,6 +47,7 @@ def assert_exact(errors, published):
         assert ours <= theirs
 
 
+@pytest.mark.slow
 @in_one_process()
 @mock.patch("kinertia.studies.table1.CONDITIONS", CLEAN)
 @mock.patch.multiple("kinertia.estimation.two_level", _FREE_EVALUATIONS=100, _MAX_EVALUATIONS=30)

@@ -261,6 +261,7 @@ def test_where_a_tolerance_stops():
     assert stopped_by(costs, 0.9) == 1
 
 
+@pytest.mark.slow
 def test_draws_of_variants(trial):
     """Their number, and that they depend on nothing but seed and number, like those of Table 1."""
     still = Setup(estimate=partial(trust_region, most_iterations=1))

@@ -26,7 +26,7 @@ def trial(subject):
     return walk(subject, 2.7, RATE_HZ, 0.75)
 
 
-@pytest.fixture(scope="module", params=["noisy", "perfect"])
+@pytest.fixture(scope="module", params=["noisy", pytest.param("perfect", marks=pytest.mark.slow)])
 def measured(request, subject, trial):
     noise = LabNoise() if request.param == "noisy" else PERFECT
     return record(subject, trial, noise, np.random.default_rng(7), RATIO)

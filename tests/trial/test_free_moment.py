@@ -181,7 +181,9 @@ def test_measured_trials(measured_file, measured_recording, name):
     assert [v.level for v in verdicts(recording, own)] == ([] if level is None else [level])
 
 
-@pytest.mark.parametrize(("name", "warned"), [("gait2354", True), ("rajagopal", False)])
+@pytest.mark.parametrize(
+    ("name", "warned"), [("gait2354", True), pytest.param("rajagopal", False, marks=pytest.mark.slow)]
+)
 def test_a_fit_warns(fit_of, name, warned):
     warnings = [w for w in fit_of(name).summary["warnings"] if "it should be near zero" in w]
     assert len(warnings) == int(warned)

@@ -106,6 +106,7 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
     assert "knee_tilt_1_r" not in fitted(trial).posterior.calibration
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [slice(40, 41), slice(40, 48), slice(2, 14)])
 def test_the_motion_is_known_in_every_frame_of_the_window_though_the_pelvis_is_not_seen(trial, gap):
     pelvis = [trial.markers.labels.index(m.label) for m in trial.skeleton.markers if m.segment == "pelvis"]
@@ -131,6 +132,7 @@ def test_a_displaced_plate_is_named(trial):
     assert said.startswith("plate right foot: z: -")
 
 
+@pytest.mark.slow
 def test_a_wandering_marker_is_named(trial):
     def wander(positions, loads):
         at = trial.markers.labels.index("R.Bicep")

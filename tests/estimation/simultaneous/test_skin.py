@@ -34,6 +34,7 @@ def drawn(patterns: SkinPatterns, rng: np.random.Generator) -> np.ndarray:
     return np.linalg.solve(np.linalg.cholesky(patterns.information()).T, rng.standard_normal(patterns.size))
 
 
+@pytest.mark.slow
 def test_the_prior_displaces_markers_by_what_is_expected(trial, patterns):
     rng = np.random.default_rng(0)
     moved = np.array([patterns.displaced(drawn(patterns, rng)) for _ in range(300)])

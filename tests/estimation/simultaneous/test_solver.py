@@ -121,6 +121,7 @@ def test_two_trials_tell_more_than_either(trial, prior, calibration):
         assert ratio.mean() < 0.99
 
 
+@pytest.mark.slow
 def test_markers_displaced_in_one_trial_are_found_and_hurt_nothing(trial, prior, calibration):
     """Thigh markers 10 mm forward in the second of two trials: without displacements of its own, it bends the first."""
     first, second = (observation(trial, noise_m=0.001, seed=seed) for seed in (1, 2))
@@ -145,6 +146,7 @@ def test_markers_displaced_in_one_trial_are_found_and_hurt_nothing(trial, prior,
     assert off[0] < 0.5 * off[1]
 
 
+@pytest.mark.slow
 def test_halves_pooled_give_about_the_whole(person, prior, calibration):
     trial = walk(person, 1.6, 60.0, trapezoid=False)
     middle = len(trial.time) // 2
@@ -160,7 +162,9 @@ def test_halves_pooled_give_about_the_whole(person, prior, calibration):
     assert (np.sqrt(np.diag(pooled.bsp_covariance)) / sd.ravel()).mean() == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize("name", DISTURBANCES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "all three")) for name in DISTURBANCES]
+)
 def test_what_was_put_in_comes_back_within_its_error_bars(name):
     recovered = calibrated(DISTURBANCES[name], seed=1, duration_s=1.3, compare=False)
     for quantity, (error, sd) in recovered.deviations.items():
@@ -196,6 +200,7 @@ def test_wrong_forces_in_unmeasured_frames_do_not_matter(trial, prior, calibrati
     assert np.abs(away).max() < 0.1
 
 
+@pytest.mark.slow
 def test_impossible_priors_still_give_a_possible_body(trial, prior, calibration):
     table = prior.mean.table()
     table[:, 4] *= 3.0

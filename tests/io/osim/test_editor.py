@@ -116,7 +116,7 @@ def test_properties_that_the_file_leaves_out_or_empty(tmp_path):
     np.testing.assert_array_equal(read_osim(path).bsp.table(), wanted.table())
 
 
-@pytest.mark.parametrize("name", [MODELS[0], MODELS[3]])
+@pytest.mark.parametrize("name", [MODELS[0], pytest.param(MODELS[3], marks=pytest.mark.slow)])
 def test_markers_and_joints_that_moved(opensim, shared_data, tmp_path, name):
     ours = read_osim(shared_data / name)
     positions = {m.label: m.position + np.array([0.01, -0.02, 0.03]) for m in ours.skeleton.markers[::5]}

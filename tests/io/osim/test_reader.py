@@ -38,7 +38,7 @@ def written(tmp_path):
 # --- whole models
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [MODELS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in MODELS[1:])])
 def test_opensim_agrees_on_markers_forces_and_mass_matrix(opensim, shared_data, name):
     ours = read_osim(shared_data / name)
     assert_opensim_agrees(shared_data / name, ours)
