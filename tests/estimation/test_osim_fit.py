@@ -97,6 +97,7 @@ def assert_targets(folder: Path) -> None:
         assert any("contradict" in warning and named in warning for warning in summary["warnings"]), named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gait2354", "rajagopal"])
 def test_residuals_markers_and_parameters(fit_with_model, name):
     assert_targets(fit_with_model(name, True))
