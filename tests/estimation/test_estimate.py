@@ -15,7 +15,7 @@ walks = pytest.mark.parametrize(
     "name",
     [
         "gait2354",
-        "pig_a",
+        pytest.param("pig_a", marks=pytest.mark.slow),
         pytest.param("pig_b", marks=pytest.mark.slow),
         pytest.param("rajagopal", marks=pytest.mark.slow),
     ],

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy.interpolate import BSpline
@@ -61,6 +61,7 @@ PLAIN = st.recursive(
 )
 
 
+@settings(max_examples=40)
 @given(PLAIN)
 def test_plain_things_come_back_as_they_were(thing):
     assert repr(there_and_back(thing, FOLDER)[0]) == repr(thing)

@@ -19,6 +19,9 @@ RECORDS = [
 ]
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def cohort(short_fit, tmp_path_factory):
     """A cohort of people with the same results, and one without."""
@@ -77,7 +80,6 @@ def test_csv_files_have_the_same_rows_and_no_formula(cohort):
     assert (clara.person, clara.status, clara.sentence) == ("Clara", 2, "trial 'walk': no force plates")
 
 
-@pytest.mark.slow
 def test_the_same_people_give_the_same_bytes_and_csv_files_are_never_of_others(cohort):
     before = hashes(cohort)
     write_tables(cohort, RECORDS, with_csv=False)

@@ -88,6 +88,7 @@ def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_p
     assert gap.max() < case.peak, f"{gap.idxmax()}: {gap.max():.4f}"
 
 
+@pytest.mark.slow
 def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tmp_path):
     """OpenSim's Inverse Dynamics, cut at the heel strikes and divided by body mass, against `cycles.csv`."""
     folder = folder_of(CASES["gait2354"])

@@ -54,7 +54,8 @@ def test_files_are_written(tables, without, tmp_path):
     assert not (save_variants(tables, tmp_path / "again") / "variants.png").exists()
 
 
-@pytest.mark.parametrize("measured", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("measured", [False, True])
 def test_command_prints_and_writes(tables, measured, tmp_path, monkeypatch):
     asked = {}
 

@@ -36,7 +36,8 @@ def planned(prior, trials):
     return plan_measured(trials[0], prior, trials[1], "gcv")
 
 
-@pytest.mark.parametrize("chosen", [("walk",), pytest.param(("walk", "squat"), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("chosen", [("walk",), ("walk", "squat")])
 def test_prediction_is_what_a_fit_then_reports(prior, trials, planned, chosen):
     """A prediction is made at the literature and at the motion of inverse kinematics, a report at the estimate."""
     skeleton, kinematics = trials
