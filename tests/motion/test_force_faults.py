@@ -11,13 +11,7 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.plate_faults import loads_trouble
-
-WALKS = {
-    "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
-    "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
-    "plug-in gait a": ("pig_c3d/subject_a_walk.c3d", None),
-    "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
-}
+from recorded_walks import WALKS
 
 
 @pytest.fixture(params=WALKS)

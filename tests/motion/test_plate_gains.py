@@ -8,15 +8,12 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.plate_assignment import build_trial
+from recorded_walks import WALKS
 
-WALKS = {
-    "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
-    "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
-    "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
-}
+SOUND = ("gait2354", "rajagopal", "plug-in gait b")
 
 
-@pytest.fixture(params=WALKS)
+@pytest.fixture(params=SOUND)
 def walk(request, measured_recording):
     """A measured walk."""
     return measured_recording(*WALKS[request.param])

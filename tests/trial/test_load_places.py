@@ -9,16 +9,10 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
+from recorded_walks import WALKS
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
 from walk_on_plates import walk as simple_walk
-
-WALKS = {
-    "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
-    "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
-    "plug-in gait a": ("pig_c3d/subject_a_walk.c3d", None),
-    "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
-}
 
 
 @pytest.fixture(params=WALKS)

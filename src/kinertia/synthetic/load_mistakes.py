@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.synthetic.marker_mistakes import Change
 from kinertia.synthetic.measured_person import MeasuredPerson, acting, loads_of
@@ -29,8 +30,7 @@ def with_signs(x: float, y: float, z: float) -> Change:
 
 def turned_about_vertical(degrees: float) -> Change:
     """Each plate turned about the vertical through its middle: the forces' directions and points."""
-    angle = np.radians(degrees)
-    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
 
     def change(plates: PlateLoads) -> PlateLoads:
         force, point, torque = acting(plates)
@@ -42,8 +42,7 @@ def turned_about_vertical(degrees: float) -> Change:
 
 def directions_turned(degrees: float) -> Change:
     """Forces turned about the vertical at the same points."""
-    angle = np.radians(degrees)
-    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
 
     def change(plates: PlateLoads) -> PlateLoads:
         force, point, torque = acting(plates)
