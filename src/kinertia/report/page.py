@@ -5,13 +5,11 @@ plotly.js is in the page once; its policy (Content-Security-Policy) forbids ever
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
@@ -35,9 +33,10 @@ from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
-from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
+from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
-from kinertia.report.skeleton_view import packed, scene
+from kinertia.report.scene import view
+from kinertia.report.skeleton_view import scene
 from kinertia.report.time_figures import (
     MOST_EVENTS,
     MOST_FRAMES,
@@ -52,8 +51,8 @@ from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
-_VIEW_FRAMES = 400
-"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
+VIEW_FRAMES = 400
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
 
 
 def render(
@@ -96,6 +95,7 @@ def render(
         information=_written(information_figure(fit)),
         residuals=residual_rows(fit.trials),
         trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
+        scenes=view({trial.name: scene(fit, trial, VIEW_FRAMES // len(shown)) for trial in shown}),
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
         provenance=provenance,
@@ -147,8 +147,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
         ),
         "noise": noise,
-        "gaps": _written(gap_figure(trial)),
-        "scene": Markup(json.dumps(packed(scene(fit, trial, _VIEW_FRAMES // count)))),
+        "gaps": _written(fit_gap_figure(trial)),
     }
 
 
