@@ -48,7 +48,9 @@ def force_figure(check: RecordingCheck) -> Figure | None:
     ]
     told = "; ".join(f"{check.plates[p].name}: {check.plates[p].stood_on()}" for p in shown)
     alt = f"Forces on {len(shown)} plates of {check.recording.name} over time, contacts by foot: {told}."
-    return small_multiples(panels, alt, {"title": {"text": "time (s)", "standoff": 2, "font": {"size": 11}}, "range": [start, end]})
+    return small_multiples(
+        panels, alt, {"title": {"text": "time (s)", "standoff": 2, "font": {"size": 11}}, "range": [start, end]}
+    )
 
 
 def _forces(plates: PlateLoads, p: int) -> list[dict[str, Any]]:
@@ -159,7 +161,13 @@ def _plate(plates: PlateLoads, p: int) -> dict[str, Any]:
     assert plates.corners is not None
     ring = plates.corners[p][[0, 1, 2, 3, 0]]
     look = {"mode": "lines", "line": {"color": style.GREY, "width": 1.5}, "fill": "toself", "fillcolor": "#F3F3F3"}
-    return {"X": ring[:, 0], "Z": ring[:, 2], "name": "plate", "text": plain(plates.names[p]), "hoverinfo": "text"} | look
+    return {
+        "X": ring[:, 0],
+        "Z": ring[:, 2],
+        "name": "plate",
+        "text": plain(plates.names[p]),
+        "hoverinfo": "text",
+    } | look
 
 
 def _path(plates: PlateLoads, p: int, contact: Contact) -> dict[str, Any] | None:

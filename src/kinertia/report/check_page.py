@@ -64,7 +64,7 @@ def render_check(
 
 
 def check_figures(check: RecordingCheck) -> dict[str, Any]:
-    """What the page draws of a recording, by name: "forces", "pressure", "gaps"; None where there is nothing to draw."""
+    """What the page draws of a recording: "forces", "pressure", "gaps"; None where there is nothing to draw."""
     labels = [one.label for one in check.markers]
     window_s = check.windows[0] if check.windows else None
     figures: dict[str, Figure | None] = {

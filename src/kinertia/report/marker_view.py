@@ -12,13 +12,17 @@ from kinertia.trial.data import Recording
 
 _CHAIN = (
     ("pelvis", "torso"),
-    *((parent.format(side), f"{child}_{side}") for side in "rl" for parent, child in (
-        ("pelvis", "thigh"),
-        ("thigh_{}", "shank"),
-        ("shank_{}", "foot"),
-        ("torso", "upper_arm"),
-        ("upper_arm_{}", "forearm"),
-    )),
+    *(
+        (parent.format(side), f"{child}_{side}")
+        for side in "rl"
+        for parent, child in (
+            ("pelvis", "thigh"),
+            ("thigh_{}", "shank"),
+            ("shank_{}", "foot"),
+            ("torso", "upper_arm"),
+            ("upper_arm_{}", "forearm"),
+        )
+    ),
 )
 """Segments of a marker set that are drawn as joined, by the middle of their markers."""
 

@@ -98,7 +98,7 @@ def _centres(bsp: BodySegmentParameters, rotation: np.ndarray, translation: np.n
 
 
 def semi_axes(bsp: BodySegmentParameters) -> np.ndarray:
-    """(s, 3, 3) m, semi-axes (rows, in segment axes) of the uniform ellipsoids that have each segment's mass and inertia.
+    """(s, 3, 3) m, semi-axes (rows, in segment axes) of the uniform ellipsoids with each segment's mass and inertia.
 
     With principal moments I the square of a semi-axis is 5/(2 m) (I_j + I_k - I_i). NaN for a segment without mass, and
     for one whose inertia no body can have.
