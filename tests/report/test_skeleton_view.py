@@ -18,9 +18,10 @@ def test_scene_has_everything_where_it_is(fit):
         pose.rotation[:, torso] @ com + pose.translation[:, torso],
         atol=1e-12,
     )
-    shift = fit.estimate.com_m[fit.estimate.segments.index("torso")] - fit.literature.com_m[
-        fit.literature.segments.index("torso")
-    ]
+    shift = (
+        fit.estimate.com_m[fit.estimate.segments.index("torso")]
+        - fit.literature.com_m[fit.literature.segments.index("torso")]
+    )
     row = fit.estimate.segments.index("torso")
     np.testing.assert_allclose(
         shown.com[:, row] - shown.com_before[:, row], pose.rotation[:, torso] @ shift, atol=1e-12

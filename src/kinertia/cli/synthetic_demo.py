@@ -68,7 +68,7 @@ class Demo:
 
     def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
         """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
-        return truth_of(self.walk, self.fit).parameter_errors(source)
+        return Truth(self.walk.bsp, {}).parameter_errors(source)
 
 
 def truth_of(made: SyntheticTrial, fit: Fit) -> Truth:
