@@ -47,10 +47,8 @@ def render_check(
 ) -> str:
     """The page as text; arguments as those of `save_check_page`. The first six recordings have pictures."""
     pictured = recordings[:MOST_TRIALS]
-    scenes = {
-        title: marker_scene(found.recording, found.used_set, max(VIEW_FRAMES // len(pictured), 2))
-        for title, found in pictured
-    }
+    most_frames = VIEW_FRAMES // max(len(pictured), 1)
+    scenes = [(title, marker_scene(found.recording, found.used_set, most_frames)) for title, found in pictured]
     return rendered(
         "check.html.j2",
         title="Kinertia check",

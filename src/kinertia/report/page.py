@@ -52,7 +52,7 @@ from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
-VIEW_FRAMES = 400
+VIEW_FRAMES = 300
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
 
 
@@ -103,7 +103,7 @@ def render(
         residuals=residual_rows(fit.trials),
         truth=None if truth is None else truth_rows(fit, truth),
         trials=[_trial(fit, trial, k, len(shown), truth) for k, trial in enumerate(shown)],
-        scenes=view({trial.name: scene(fit, trial, VIEW_FRAMES // len(shown)) for trial in shown}),
+        scenes=view([(trial.name, scene(fit, trial, VIEW_FRAMES // len(shown))) for trial in shown]),
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
         provenance=provenance,

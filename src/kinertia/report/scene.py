@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -110,13 +110,13 @@ def _millimetres(positions: np.ndarray) -> str:
     return base64.b64encode(whole.astype("<i2").tobytes()).decode("ascii")
 
 
-def view(scenes: Mapping[str, Scene]) -> dict[str, Any]:
-    """Scenes by the names of their trials as the templates take them, for one view with a selector."""
+def view(scenes: Sequence[tuple[str, Scene]]) -> dict[str, Any]:
+    """Scenes with the names of their trials as the templates take them, for one view with a selector."""
     parts: dict[str, str] = {}
-    for one in scenes.values():
+    for _, one in scenes:
         parts |= one.parts()
     return {
-        "names": list(scenes),
-        "scenes": [Markup(json.dumps(packed(one)).replace("<", "\\u003c")) for one in scenes.values()],
+        "names": [name for name, _ in scenes],
+        "scenes": [Markup(json.dumps(packed(one)).replace("<", "\\u003c")) for _, one in scenes],
         "parts": {name: words for name, words in PARTS.items() if name in parts},
     }
