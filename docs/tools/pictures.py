@@ -19,13 +19,13 @@ import kinertia
 FOLDER = Path(__file__).resolve().parents[1] / "figures"
 WALK = Path(kinertia.__file__).parent / "cli" / "measured_walk"
 PAGES = {
-    "report": ("report.html", "#verdict", [".headline", ".uses", "#body-mass", "#changes"], 1180),
-    "report-cycle": ("report.html", "#cycle", ["#cycle table", "#cycle-moments", "[data-of=cycle-moments]"], 1100),
-    "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 1100),
-    "check": ("check.html", "#recording2", [".checks", "#recording2-forces", "#recording2-pressure"], 1150),
+    "report": ("report.html", "#verdict", [".headline", ".uses", "#body-mass", "#changes"], 1160),
+    "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 880),
+    "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
+    "check": ("check.html", "#recording2", [".checks", "#recording2-forces", "#recording2-pressure"], 1400),
 }
 """Picture: page, the part of it, what is numbered there, and the height from its top in px."""
-GALLERY = ("moments", "angles", "powers", "bsp")
+GALLERY = ("moments", "angles", "bsp")
 
 _NUMBERED = """([part, marked]) => {
     const place = document.querySelector(part).getBoundingClientRect();
