@@ -20,7 +20,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "figures"
 WALK = Path(kinertia.__file__).parent / "cli" / "measured_walk"
 PAGES = {
     "report": ("report.html", "#verdict", [".headline", ".uses", "#body-mass", "#changes"], 1160),
-    "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 880),
+    "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 1130),
     "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
     "check": ("check.html", "#recording2", [".checks", "#recording2-forces", "#recording2-pressure"], 1400),
 }
@@ -41,7 +41,9 @@ _NUMBERED = """([part, marked]) => {
     scrollTo(0, place.top + scrollY - 10);
 }"""
 
-_UNDRAWN = "[...document.querySelectorAll('.plot:not([data-drawn])')].some(plot => !plot.closest('details:not([open])'))"
+_UNDRAWN = (
+    "[...document.querySelectorAll('.plot:not([data-drawn])')].some(plot => !plot.closest('details:not([open])'))"
+)
 
 
 def main() -> None:
