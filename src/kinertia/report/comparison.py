@@ -114,7 +114,7 @@ def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
 
 
 def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
-    """What `kinertia compare --json` prints: remarks, and every parameter against that of the first result; SI units."""
+    """What `kinertia compare --json` prints: remarks, and every parameter against the first result; SI units."""
     (first_name, first), *others = fits.items()
     return {
         "first": first_name,
