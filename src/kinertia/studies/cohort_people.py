@@ -40,20 +40,20 @@ def people_of(study: Path, output: Path) -> list[Person]:
         FileError: no such study, nobody in it, columns missing, or names that cannot be folders side by side.
     """
     if study.is_dir():
-        found = list(_of_folders(study, output.resolve()))
-        if not found:
+        people = list(_of_folders(study, output.resolve()))
+        if not people:
             raise FileError(
                 study,
                 "none of its folders holds a subject file or recordings; give the folder with the people's folders",
             )
-        _check_names(study, [(None, person.name) for person in found])
+        _check_names(study, [(None, person.name) for person in people])
     elif study.is_file():
         rows = list(_of_rows(study))
-        found = [person for _, person in rows]
+        people = [person for _, person in rows]
         _check_names(study, [(line, person.name) for line, person in rows])
     else:
         raise FileError(study, "no such folder or file; give a folder with a folder per person, or a CSV file")
-    return found
+    return people
 
 
 def _of_folders(study: Path, output: Path) -> Iterator[Person]:
