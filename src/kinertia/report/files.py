@@ -90,7 +90,9 @@ def _write_model(fit: Fit, folder: Path) -> None:
 
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
-    changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
+    own = fit.file.skeleton.segments
+    welds = {joint.child: joint.parent for joint in fit.skeleton.joints if joint.child not in own}
+    changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts, welds)
     changes.map(inert).to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
 
 
