@@ -96,7 +96,7 @@ def fit(
     for one in runs:
         names = [trial.name for trial in one.wanted.trials]
         results_folder(one.folder, force, names if len(names) > 1 else ())
-    told, status = [], 0
+    summaries, status = [], 0
     for one in runs:
         try:
             result = _fitted(one)
@@ -108,13 +108,13 @@ def fit(
             continue
         judged = verdicts(result)
         status = max(status, int(stands_against(judged)))
-        told.append({"folder": str(one.folder), **summary(result)})
+        summaries.append({"folder": str(one.folder), **summary(result)})
         if not (out.quiet or as_json):
             report_fit(result)
             report_verdicts(judged, result, verbose)
             out.print(f"results in {one.folder}", soft_wrap=True)
     if as_json:
-        print_json(told if len(runs) > 1 else told[0])
+        print_json(summaries if len(runs) > 1 else summaries[0])
     raise typer.Exit(status)
 
 

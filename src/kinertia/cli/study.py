@@ -25,12 +25,21 @@ from kinertia.report.accuracy import (
 )
 from kinertia.report.extras import HOW, has_matplotlib
 from kinertia.report.faults import counts, faults_summary, save_faults
+from kinertia.report.populations import (
+    CAPTION,
+    population_rows,
+    populations_summary,
+    rucksack_sentence,
+    save_populations,
+)
+from kinertia.report.populations import HEADINGS as POPULATION_HEADINGS
 from kinertia.report.sensitivity import save_sensitivity, sensitivity_summary
 from kinertia.report.table1 import save_table1, table1_rows, table1_summary
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.table1_variants import save_variants, variants_frame, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.faults import run_faults, synthetic_walk
+from kinertia.studies.populations import run_populations
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.studies.table1_variants import run_variants
@@ -153,6 +162,39 @@ def accuracy(
             out.print(shown)
     out.print(JOINT_CAPTION)
     out.print(f"\nresults in {output}: accuracy.html, accuracy.json, accuracy.md")
+
+
+@study.command()
+def populations(
+    people: Annotated[int, typer.Option(min=2, help="People of each population.")] = 20,
+    seed: Seed = 1,
+    workers: Workers = None,
+    output: Output = Path("out"),
+    as_json: AsJson = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """What does a wrong prior cost? Children, obese, old people, prostheses, with the adults' prior and their own.
+
+    Also: is a rucksack of unknown mass found?
+
+    [bold]Example[/]
+
+    kinertia study populations -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        accuracies, rucksack = run_populations(people, seed, workers, lambda share: progress("people", share))
+    save_populations(accuracies, rucksack, seed, output)
+    if as_json:
+        print_json(populations_summary(accuracies, rucksack, seed))
+        return
+    shown = plain_table(*POPULATION_HEADINGS)
+    for row in population_rows(accuracies):
+        shown.add_row(*row)
+    out.print(shown)
+    out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksack)}")
+    out.print(f"\nresults in {output}: populations.html, populations.json, populations.md", soft_wrap=True)
 
 
 @study.command()
