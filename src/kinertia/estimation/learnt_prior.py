@@ -111,14 +111,29 @@ def information_of(fit: Fit) -> PersonInformation:
     if fit.posterior is None:
         raise PriorError(f"{name}: estimated by the two-level method, which has no error bars")
     literature = literature_prior(fit.literature)
-    sd = literature.sd.ravel()
     own = population_prior(literature, fit.subject).prior
     if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
         raise PriorError(f"{name}: leant on another prior than the literature's of the built-in model")
-    correlation, before = (prior.covariance / np.outer(sd, sd) for prior in (literature, own))
-    posterior = fit.posterior.covariance / np.outer(sd, sd)
-    moved = (fit.estimate.table() - fit.literature.table()).ravel() / sd
-    # in coordinates in which the fit's own prior is the unit matrix; what says next to nothing there is left out
+    return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
+
+
+def person_information(
+    name: str, literature: BspPrior, own: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
+) -> PersonInformation:
+    """What recordings say by an estimate that leant on a prior of the literature's mean.
+
+    Args:
+        name: whose.
+        literature: whose deviations are the units.
+        own: that the estimate leant on.
+        estimate, covariance: with the posterior covariance (10 s, 10 s) of its table.
+    """
+    sd = literature.sd.ravel()
+    correlation, before, posterior = (
+        each / np.outer(sd, sd) for each in (literature.covariance, own.covariance, covariance)
+    )
+    moved = (estimate.table() - literature.mean.table()).ravel() / sd
+    # in coordinates in which the estimate's prior is the unit matrix; what says next to nothing there is left out
     root = np.linalg.cholesky(before)
     inverse = np.linalg.inv(root)
     left, vectors = np.linalg.eigh(inverse @ posterior @ inverse.T)
@@ -126,9 +141,7 @@ def information_of(fit: Fit) -> PersonInformation:
     shown = left < 1.0 - _LEAST_SHARE
     back = (inverse.T @ vectors)[:, shown]
     information = (back * (1.0 / left[shown] - 1.0)) @ back.T
-    return PersonInformation(
-        name, fit.literature.segments, information, back @ (along[shown] / left[shown]), correlation
-    )
+    return PersonInformation(name, estimate.segments, information, back @ (along[shown] / left[shown]), correlation)
 
 
 def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None) -> LearntPrior:
