@@ -58,6 +58,13 @@ def test_somebody_short_may_be_a_child():
     assert "height 1.2 m: the tables are of adults; give age_years" in warning
 
 
+def test_of_somebody_of_unknown_height_nothing_is_said():
+    """A user's OpenSim model needs no height."""
+    result = population_prior(PRIOR, subject(height_m=None))
+    assert (result.notes, result.warnings) == ((), ())
+    np.testing.assert_array_equal(result.prior.covariance, PRIOR.covariance)
+
+
 def test_masses_of_the_elderly_are_those_of_their_table():
     prior = population_prior(PRIOR, subject(population="elderly")).prior
     share = dict(zip(SEGMENTS, prior.mean.mass_kg / prior.mean.total_mass_kg, strict=True))

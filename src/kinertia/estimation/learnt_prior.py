@@ -30,6 +30,9 @@ PSEUDO_PEOPLE = 30.0
 FEWEST_PEOPLE = 5
 _ITERATIONS, _SETTLED = 200, 1e-4
 _OWN_PRIOR = 1e-6
+_LEAST_SHARE = 0.01
+"""Of its prior variance that the recordings take away from a combination, or nothing is learnt from it: below, what the
+fit's curvature moves is more than what the recordings say, and all people's would add up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,16 +111,37 @@ def information_of(fit: Fit) -> PersonInformation:
     if fit.posterior is None:
         raise PriorError(f"{name}: estimated by the two-level method, which has no error bars")
     literature = literature_prior(fit.literature)
-    sd = literature.sd.ravel()
     own = population_prior(literature, fit.subject).prior
     if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
         raise PriorError(f"{name}: leant on another prior than the literature's of the built-in model")
-    correlation, before = (prior.covariance / np.outer(sd, sd) for prior in (literature, own))
-    posterior = np.linalg.inv(fit.posterior.covariance / np.outer(sd, sd))
-    moved = (fit.estimate.table() - fit.literature.table()).ravel() / sd
-    values, vectors = np.linalg.eigh(posterior - np.linalg.inv(before))
-    information = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    return PersonInformation(name, fit.literature.segments, information, posterior @ moved, correlation)
+    return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
+
+
+def person_information(
+    name: str, literature: BspPrior, own: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
+) -> PersonInformation:
+    """What recordings say by an estimate that leant on a prior of the literature's mean.
+
+    Args:
+        name: whose.
+        literature: whose deviations are the units.
+        own: that the estimate leant on.
+        estimate, covariance: with the posterior covariance (10 s, 10 s) of its table.
+    """
+    sd = literature.sd.ravel()
+    correlation, before, posterior = (
+        each / np.outer(sd, sd) for each in (literature.covariance, own.covariance, covariance)
+    )
+    moved = (estimate.table() - literature.mean.table()).ravel() / sd
+    # in coordinates in which the estimate's prior is the unit matrix; what says next to nothing there is left out
+    root = np.linalg.cholesky(before)
+    inverse = np.linalg.inv(root)
+    left, vectors = np.linalg.eigh(inverse @ posterior @ inverse.T)
+    along = vectors.T @ inverse @ moved
+    shown = left < 1.0 - _LEAST_SHARE
+    back = (inverse.T @ vectors)[:, shown]
+    information = (back * (1.0 / left[shown] - 1.0)) @ back.T
+    return PersonInformation(name, estimate.segments, information, back @ (along[shown] / left[shown]), correlation)
 
 
 def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None) -> LearntPrior:
@@ -135,18 +159,18 @@ def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None)
     segments = people[0].segments
     if other := next((one for one in people if one.segments != segments), None):
         raise PriorError(f"{other.name} was estimated with another model than {people[0].name}")
-    literature = np.mean([one.correlation for one in people], axis=0)
-    information = np.array([one.information for one in people])
-    right = np.array([one.right for one in people])
-    of_mean = np.linalg.inv(BETWEEN_SHARE * literature)
-    anchor = (1.0 - BETWEEN_SHARE) * literature
-    mean = np.zeros(len(literature)) if start is None else start.mean
-    within, count = anchor, len(people)
+    # in coordinates in which the literature's people are uncorrelated, where nothing is close to singular
+    root = np.linalg.cholesky(np.mean([one.correlation for one in people], axis=0))
+    seen = _Seen.of(root, people)
+    size, count = len(root), len(people)
+    anchor = (1.0 - BETWEEN_SHARE) * np.eye(size)
+    mean = np.zeros(size) if start is None else np.linalg.solve(root, start.mean)
+    within = anchor
     for _ in range(_ITERATIONS):
-        inverse = np.linalg.inv(within)
-        posterior = np.linalg.inv(information + inverse)
-        estimates = np.einsum("pij,pj->pi", posterior, right + inverse @ mean)
-        new_mean = np.linalg.solve(of_mean + count * inverse, inverse @ estimates.sum(axis=0))
+        posterior = seen.posterior(within)
+        estimates = mean + np.einsum("pij,pj->pi", posterior, seen.right - seen.information @ mean)
+        # a mean between nothing and the estimates' own, by how far the group's mean may be from the tables
+        new_mean = np.linalg.solve(within / BETWEEN_SHARE + count * np.eye(size), estimates.sum(axis=0))
         away = estimates - new_mean
         spread = posterior.sum(axis=0) + away.T @ away
         new_within = (PSEUDO_PEOPLE * anchor + spread) / (PSEUDO_PEOPLE + count)
@@ -154,8 +178,36 @@ def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None)
         mean, within = new_mean, 0.5 * (new_within + new_within.T)
         if change < _SETTLED:
             break
-    # of each person's estimate with a flat prior, the variance is that of the data plus the spread
-    inverse = np.linalg.inv(within)
-    each = inverse - inverse @ np.linalg.inv(information + inverse) @ inverse
-    of_group = np.linalg.inv(of_mean + each.sum(axis=0))
-    return LearntPrior(segments, mean, np.sqrt(np.diag(of_group)), within + of_group, count)
+    of_mean = np.linalg.inv(np.eye(size) / BETWEEN_SHARE + seen.of_mean(within))
+    of_group, whole = (root @ part @ root.T for part in (of_mean, within + of_mean))
+    return LearntPrior(segments, root @ mean, np.sqrt(np.diag(of_group)), 0.5 * (whole + whole.T), count)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What all people's recordings say: roots (p, k, k) of the information, itself, and the right-hand sides (p, k)."""
+
+    roots: np.ndarray
+    information: np.ndarray
+    right: np.ndarray
+
+    @classmethod
+    def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Seen:
+        """In the coordinates x of root x."""
+        values, vectors = np.linalg.eigh([root.T @ one.information @ root for one in people])
+        roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+        return cls(roots, roots @ roots.transpose(0, 2, 1), np.array([root.T @ one.right for one in people]))
+
+    def posterior(self, within: np.ndarray) -> np.ndarray:
+        """(p, k, k) covariances of the people, given the spread within the group."""
+        seen = within @ self.roots
+        inner = np.eye(len(within)) + self.roots.transpose(0, 2, 1) @ seen
+        result: np.ndarray = within - seen @ np.linalg.solve(inner, seen.transpose(0, 2, 1))
+        return result
+
+    def of_mean(self, within: np.ndarray) -> np.ndarray:
+        """(k, k) information of all people on their mean."""
+        inner = np.eye(len(within)) + self.roots.transpose(0, 2, 1) @ within @ self.roots
+        total: np.ndarray = (self.roots @ np.linalg.solve(inner, self.roots.transpose(0, 2, 1))).sum(axis=0)
+        result: np.ndarray = 0.5 * (total + total.T)
+        return result

@@ -1,0 +1,53 @@
+"""Run the notebooks of the site, keep what they show, and write each as a page beside it.
+
+    python docs/tools/notebooks.py
+
+Needs the extra "docs", and the measured trials beside the repository.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import nbformat
+from nbclient import NotebookClient
+from nbconvert import MarkdownExporter
+
+from examples import ROOT, link_measured
+
+FOLDER = ROOT / "docs" / "notebooks"
+MEASURED = {"paper_figure": None, "opensim_day": "rajagopal_walk"}
+"""Each notebook, and the folder of measured trials that it runs beside."""
+
+
+def main() -> None:
+    """Run and write all."""
+    for name, measured in MEASURED.items():
+        path = FOLDER / f"{name}.ipynb"
+        notebook = nbformat.read(path, as_version=4)
+        with TemporaryDirectory() as folder:
+            if measured is not None:
+                link_measured(measured, Path(folder))
+            NotebookClient(notebook, timeout=600, resources={"metadata": {"path": folder}}).execute()
+        for cell in notebook.cells:
+            cell.metadata.pop("execution", None)  # when, which is of no interest
+        nbformat.write(notebook, path)
+        write_page(path)
+
+
+def write_page(path: Path) -> None:
+    """The notebook as Markdown, with its pictures in files."""
+    text, resources = MarkdownExporter().from_filename(str(path), resources={"output_files_dir": f"{path.stem}_files"})
+    for name, picture in resources["outputs"].items():
+        (path.parent / name).parent.mkdir(exist_ok=True)
+        (path.parent / name).write_bytes(picture)
+    download = f"\n[This page as a notebook]({path.name}), to run and to change.\n"
+    heading, rest = text.split("\n", 1)
+    path.with_suffix(".md").write_text(heading + "\n" + download + rest, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    main()
