@@ -38,7 +38,7 @@ def report(
     """
     saved = read_saved(results)
     bands = {} if norms is None else _norms_for(saved.fit, norms)
-    page = render(saved.fit, saved.provenance, saved.versions, bands)
+    page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
     write_then_rename(results / "report.html", page)
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)
 

@@ -51,7 +51,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None,
     """
     with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
-        write_fit(fit, provenance, work / FIT_FILE)
+        write_fit(fit, provenance, work / FIT_FILE, truth)
         (work / "report.html").write_text(render(fit, provenance, truth=truth), encoding="utf-8")
         write_columns(work / "bsp.csv", fit.bsp_columns())
         _write_cycles(fit, work)

@@ -24,6 +24,7 @@ from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
+from kinertia.report.truth import Truth
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import FootLoads, Markers, Trial
 
@@ -38,15 +39,17 @@ class SavedFit:
         fit: the result.
         provenance: command and files that it is from, if they are known.
         versions: of what computed it.
+        truth: of a synthetic person.
     """
 
     fit: Fit
     provenance: Provenance | None
     versions: Mapping[str, str]
+    truth: Truth | None = None
 
 
 _KINDS = (
-    SavedFit, Provenance, Fit, TrialFit, Subject, Settings,
+    SavedFit, Provenance, Truth, Fit, TrialFit, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
@@ -55,9 +58,9 @@ _KINDS = (
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
 
 
-def write_fit(fit: Fit, provenance: Provenance | None, path: Path) -> None:
+def write_fit(fit: Fit, provenance: Provenance | None, path: Path, truth: Truth | None = None) -> None:
     """Write everything that a result is into one file."""
-    write_archive(path, SavedFit(fit, provenance, versions()), _KINDS, {"kinertia": VERSION})
+    write_archive(path, SavedFit(fit, provenance, versions(), truth), _KINDS, {"kinertia": VERSION})
 
 
 def read_saved(folder: str | Path) -> SavedFit:
