@@ -105,3 +105,15 @@ def test_fit_takes_a_folder_with_a_subject_file(tmp_path):
     (tmp_path / "b.toml").write_text("")
     outcome = run("fit", tmp_path, "-o", tmp_path / "out")
     assert "several .toml files (a.toml, b.toml)" in " ".join(outcome.err.split())
+
+
+def test_compare_prints_json_for_scripts(demo_run, tmp_path):
+    outcome = run("compare", demo_run[1], demo_run[1] / "two-level", "-o", tmp_path / "out", "--json")
+    assert outcome.status == 0, outcome.err
+    content = json.loads(outcome.out)
+    ((name, rows),) = content["against_first"].items()
+    assert "two-level" in name
+    table = pd.read_csv(tmp_path / "out" / "compare.csv")
+    assert [row["segment"] for row in rows] == table.segment.tolist()[-len(rows) :]
+    assert rows[0]["change"] == pytest.approx(rows[0]["other"] - rows[0]["first"])
+    assert {row["sd"] for row in rows} == {None}, "two-level has no error bars"
