@@ -197,7 +197,7 @@ def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
     prior_sd[-1] = sd[-1] = 0.0
     posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
     with terminal.out.capture() as captured:
-        report_fit(replace(fit, posterior=posterior, file=SimpleNamespace()))
+        report_fit(replace(fit, posterior=posterior, file=SimpleNamespace(bsp=fit.estimate)))
     shown = captured.get()
     assert "literature" not in shown.replace("from the literature", "")
     assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)

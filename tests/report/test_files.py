@@ -47,6 +47,8 @@ def test_fit_json_keeps_its_contract(saved):
         "sex": "male",
         "mass_kg": fit.subject.mass_kg,
         "height_m": fit.subject.height_m,
+        "age_years": None,
+        "population": None,
         "knee_width_mm": None,
         "ankle_width_mm": None,
         "elbow_width_mm": None,

@@ -97,7 +97,10 @@ def of_model(fit):
     table[rows] = fit.literature.table()[rows]
     estimate = BodySegmentParameters.from_table(fit.estimate.segments, table)
     return replace(
-        fit, estimate=estimate, posterior=replace(fit.posterior, prior_sd=prior_sd, sd=sd), file=SimpleNamespace()
+        fit,
+        estimate=estimate,
+        posterior=replace(fit.posterior, prior_sd=prior_sd, sd=sd),
+        file=SimpleNamespace(bsp=fit.estimate),
     )
 
 
