@@ -43,13 +43,13 @@ def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk,
     shutil.copytree(measured_walk, lacking / "Clara")
     outcome = run("cohort", lacking, "-o", tmp_path / "out", "--dry-run")
     assert outcome.status == 1
-    told = " ".join(outcome.out.split())
-    assert "no subject file; kinertia init" in told
-    assert "did you mean 'mass_kg'" in told
-    assert "Clara to fit 1" in told
-    assert "3 people: 1 to fit, 0 as before, 2 without what a fit needs" in told
-    assert "On this computer, in 1 process, each with one thread" in told
-    assert "very roughly 1 min" in told
+    printed = " ".join(outcome.out.split())
+    assert "no subject file; kinertia init" in printed
+    assert "did you mean 'mass_kg'" in printed
+    assert "Clara to fit 1" in printed
+    assert "3 people: 1 to fit, 0 as before, 2 without what a fit needs" in printed
+    assert "On this computer, in 1 process, each with one thread" in printed
+    assert "very roughly 1 min" in printed
     assert not (tmp_path / "out").exists()
 
 
@@ -82,7 +82,7 @@ def test_bad_input_is_one_line(tmp_path, monkeypatch):
     (tmp_path / "people.csv").write_text("file\na.toml\n", encoding="utf-8")
     outcome = run("cohort", tmp_path / "people.csv", "-o", tmp_path / "out")
     assert outcome.status == 2
-    assert "no column 'subject'" in outcome.err
+    assert "lacks the column subject" in outcome.err
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setattr("kinertia.studies.cohort_cluster.find_spec", lambda name: None if name == "pyarrow" else name)
     outcome = run("cohort", tmp_path, "-o", tmp_path / "out")
@@ -124,9 +124,9 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
         for worker in workers:
             with contextlib.suppress(psutil.NoSuchProcess):
                 worker.kill()
-        told, errors = process.communicate()
+        printed, errors = process.communicate()
     assert process.returncode == 1, errors
-    assert "not fitted: Clara: trial 'walk': no force plates" in told
+    assert "not fitted: Clara: trial 'walk': no force plates" in printed
     people = pd.read_csv(out / "people.csv").set_index("person")
     assert people.status["Clara"] == 2
     assert set(people.status[["Anna", "Ben"]]) <= {0, 1}

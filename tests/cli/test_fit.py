@@ -27,9 +27,9 @@ def subjects(demo_run, tmp_path, monkeypatch, fit):
 @pytest.mark.slow
 def test_several_people_are_fitted_each_into_a_folder_of_their_own(subjects, tmp_path):
     out = tmp_path / "out"
-    told = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", out, "--json")
-    assert told.status in (0, 1), told.err
-    anna, ben = json.loads(told.out)
+    outcome = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", out, "--json")
+    assert outcome.status in (0, 1), outcome.err
+    anna, ben = json.loads(outcome.out)
     assert [anna["folder"], ben["folder"]] == [str(out / "anna"), str(out / "ben")]
     for name, one in (("anna", anna), ("ben", ben)):
         written = json.loads((out / name / "fit.json").read_text())
@@ -52,10 +52,10 @@ def test_an_error_of_one_person_does_not_keep_the_others_from_being_fitted(subje
     monkeypatch.setattr("kinertia.cli.fit.fit_subject", fitted_or_not)
     text = (subjects / "anna.toml").read_text()
     (subjects / "anna.toml").write_text(text.replace("72.6", "60.0"))
-    told = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", tmp_path / "out", "--quiet")
-    assert told.status == 2
-    assert "anna.toml" in told.err
-    assert "is of somebody else" in told.err
+    outcome = run("fit", subjects / "anna.toml", subjects / "ben.toml", "-o", tmp_path / "out", "--quiet")
+    assert outcome.status == 2
+    assert "anna.toml" in outcome.err
+    assert "is of somebody else" in outcome.err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"ben"}
 
 
@@ -67,40 +67,40 @@ def test_several_people_need_subject_files_of_different_names(subjects, tmp_path
         ((subjects / "anna.toml", walk), "walk.trc: is no subject file"),
         ((subjects / "anna.toml", subjects / "nobody.toml"), "nobody.toml: no such file"),
     ):
-        told = run("fit", *wrong, "-o", tmp_path / "out")
-        assert (told.status, words in told.err) == (2, True), told.err
+        outcome = run("fit", *wrong, "-o", tmp_path / "out")
+        assert (outcome.status, words in outcome.err) == (2, True), outcome.err
     (subjects / "more" / "anna.toml").write_text((subjects / "anna.toml").read_text())
-    told = run("fit", subjects / "anna.toml", subjects / "more" / "anna.toml", "-o", tmp_path / "out")
-    assert told.status == 2
-    assert "its results would go to anna, as those of" in told.err
+    outcome = run("fit", subjects / "anna.toml", subjects / "more" / "anna.toml", "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "its results would go to anna, as those of" in outcome.err
     assert not (tmp_path / "out").exists()
 
 
 def test_numbers_and_sex_as_people_write_them(subjects, tmp_path):
     walk, forces = subjects / "walk.trc", subjects / "walk_grf.mot"
     given = ("fit", walk, "--forces", forces, "--static", subjects / "static.trc")
-    told = run(*given, "--mass", "72,6", "--height", "1,803", "--sex", "M", "-o", tmp_path / "out", "--json")
-    assert told.status in (0, 1), told.err
-    subject = json.loads(told.out)["subject"]
+    outcome = run(*given, "--mass", "72,6", "--height", "1,803", "--sex", "M", "-o", tmp_path / "out", "--json")
+    assert outcome.status in (0, 1), outcome.err
+    subject = json.loads(outcome.out)["subject"]
     assert (subject["mass_kg"], subject["height_m"], subject["sex"]) == (72.6, 1.803, "male")
     for option, text, words in (
         ("--mass", "72.6kg", "'72.6kg' is not a number"),
         ("--mass", "1.072,6", "'1.072,6' is not a number"),
         ("--sex", "x", "neither male (m) nor female (f)"),
     ):
-        told = run("check", walk, option, text)
-        assert told.status == 2
-        assert words in " ".join(told.err.replace("│", " ").split())
+        outcome = run("check", walk, option, text)
+        assert outcome.status == 2
+        assert words in " ".join(outcome.err.replace("│", " ").split())
     wrong = subjects / "ben.toml"
     wrong.write_text(wrong.read_text().replace("72.6", "72,6"))
-    told = run("fit", wrong, "-o", tmp_path / "out")
-    assert "a number has a decimal point, not a comma: 72.6" in told.err
+    outcome = run("fit", wrong, "-o", tmp_path / "out")
+    assert "a number has a decimal point, not a comma: 72.6" in outcome.err
 
 
 def test_check_tells_scripts_what_it_tells_people(subjects):
     files = (subjects / "walk.trc", subjects / "walk_grf.mot", "--mass", 72.6)
-    told = run("check", *files, "--json")
-    (recording,) = json.loads(told.out)["recordings"]
+    outcome = run("check", *files, "--json")
+    (recording,) = json.loads(outcome.out)["recordings"]
     shown = " ".join(run("check", *files).out.split())
     assert len(recording["verdicts"]) > 3
     for verdict in recording["verdicts"]:

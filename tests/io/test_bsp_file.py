@@ -28,14 +28,14 @@ def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (",sd\n", ",other\n", r"line 1: has no column sd; expected the bsp.csv of a simultaneous fit"),
+        (",sd\n", ",other\n", r"line 1: lacks the column sd; found .*; expected the bsp.csv of a simultaneous fit"),
         ("thigh_r,mass", "thigh_r,weight", r"line 2: unknown parameter 'weight'; expected one of mass, com_x"),
         ("thigh_r,mass,kg", "thigh_r,mass,lb", r"line 2: thigh_r mass is in 'lb'; expected kg"),
-        ("thigh_l,mass,kg,9,0.0,", "thigh_l,mass,kg,9,,", r"line 12: estimate = '' is no number"),
+        ("thigh_l,mass,kg,9,0.0,", "thigh_l,mass,kg,9,,", r"line 12: estimate is ''; expected a number"),
         ("kg,9,0.0,0.01", "kg,9,0.0,0", r"line 2: the sd of thigh_r mass must be positive"),
         ("thigh_r,com_x", "thigh_r,mass", "is in 'm'; expected kg"),
         ("thigh_l,com_x,m,9,0.1,0.02\n", "", "thigh_l lacks com_x"),
-        (GOOD[GOOD.index("\n") + 1 :], "", "holds no rows"),
+        (GOOD[GOOD.index("\n") + 1 :], "", "a heading and no rows"),
     ],
 )
 def test_what_cannot_be_is_told_with_its_line(tmp_path, old, new, words):
@@ -47,5 +47,5 @@ def test_what_cannot_be_is_told_with_its_line(tmp_path, old, new, words):
 
 
 def test_no_such_file(tmp_path):
-    with pytest.raises(FileError, match="No such file"):
+    with pytest.raises(FileError, match="no such file"):
         read_bsp(tmp_path / "bsp.csv")

@@ -371,15 +371,15 @@ def test_real_file_cut_anywhere(shared_data, tmp_path):
             read_c3d(tmp_path / "x.c3d")
 
 
-@pytest.mark.parametrize("told", ["", "m", "inch"])
-def test_a_stated_length_unit_goes_before_what_the_file_says(tmp_path, told):
+@pytest.mark.parametrize("unit_in_file", ["", "m", "inch"])
+def test_a_stated_length_unit_goes_before_what_the_file_says(tmp_path, unit_in_file):
     person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (0.6, 0.5, 1.8), (4, 9, 3))
-    file = write_c3d(tmp_path / "x.c3d", 100.0 * person, [f"M{k}" for k in range(9)], unit=told)
-    found = read_recording(file, length_unit="cm")
-    assert found.length_unit == "cm"
-    extents = np.ptp(found.markers.positions[..., 1], axis=1)
+    file = write_c3d(tmp_path / "x.c3d", 100.0 * person, [f"M{k}" for k in range(9)], unit=unit_in_file)
+    recording = read_recording(file, length_unit="cm")
+    assert recording.length_unit == "cm"
+    extents = np.ptp(recording.markers.positions[..., 1], axis=1)
     np.testing.assert_allclose(extents, np.ptp(person[..., 2], axis=1), atol=1e-6)
-    assert f"read in cm, as stated; POINT:UNITS says '{told}'" in " ".join(found.notes)
+    assert f"read in cm, as stated; POINT:UNITS says '{unit_in_file}'" in " ".join(recording.notes)
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 0.001), ("cm", 0.01), ("m", 1.0)])

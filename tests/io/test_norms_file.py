@@ -39,10 +39,11 @@ def test_norms_are_read_in_the_order_of_percent(tmp_path, text, encoding):
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ("sd\n", "spread\n", 1, "lacks the columns sd; found quantity, percent, mean, spread"),
+        ("sd\n", "spread\n", 1, "lacks the column sd; found quantity, percent, mean, spread"),
         ("10.5", "ten", 2, "mean is 'ten'; expected a number"),
         ("10.5", "nan", 2, "mean is 'nan'; expected a finite number"),
-        (",3.5\n", "\n", 3, "3 cells in a row; expected 4"),
+        (",3.5\n", "\n", 3, "sd is ''; expected a number"),
+        ("5.25,", "5,25,", 3, "5 cells in a row; expected 4 as in the heading; a number has a decimal point"),
         (",3.5\n", ",-3.5\n", 3, "sd is -3.5"),
         ("angle,50", "angle,500", 2, "percent is 500; expected 0 to 100 %"),
         ("angle,50", "angle,0", 3, "knee_angle_angle at 0 % is there already"),
@@ -56,5 +57,5 @@ def test_a_wrong_file_is_told_with_its_line(tmp_path, old, new, line, words):
 
 
 def test_a_file_without_rows_is_told(tmp_path):
-    with pytest.raises(FileError, match="a header and no rows"):
+    with pytest.raises(FileError, match="a heading and no rows"):
         norms(tmp_path, PLAIN.partition("\n")[0])

@@ -1,21 +1,16 @@
 import os
 import re
-import shutil
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kinertia.errors import FileError
-from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.io.toml_lines import TomlFile
 from kinertia.settings import Settings, Subject
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
 elsewhere = pytest.mark.skipif(os.name == "nt", reason="Windows has drives")
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured data are not at {DATA}")
 
 GOOD = """\
 [subject]
@@ -297,169 +292,6 @@ def test_locator_finds_every_key(tables):
     for place, line in expected.items():
         assert document.line(place) == line
     assert document.line(("nowhere", 1)) is None
-
-
-def completed(text):
-    """A draft as a user would complete it: nothing but the sex."""
-    return text.replace("# sex", "sex", 1)
-
-
-def draft(folder, text):
-    (folder / "subject.toml").write_text(text, encoding="utf-8")
-    return read_subject(folder / "subject.toml")
-
-
-@needs_data
-@pytest.mark.parametrize(
-    ("name", "static", "trials"),
-    [
-        (
-            "gait2354",
-            "subject01_static.trc",
-            [("subject01_walk1.trc", "subject01_walk1_grf.mot", "subject01_walk1_grf.xml")],
-        ),
-        (
-            "rajagopal_walk",
-            "static_walk_1.trc",
-            [("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")],
-        ),
-        (
-            "subject4",
-            "static1.trc",
-            [(f"{t}.trc", f"{t}_grf.mot", f"{t}_external_forces.xml") for t in ("squats1", "walking1", "walking2")],
-        ),
-    ],
-)
-def test_init_matches_measured_files(name, static, trials, tmp_path):
-    text = init_subject(DATA / name)
-    for file in (DATA / name).iterdir():
-        (tmp_path / file.name).touch()
-    with pytest.raises(FileError, match="lacks 'sex'"):
-        draft(tmp_path, text)
-    result = draft(tmp_path, completed(text))
-    assert result.model.static.name == static
-    assert [(t.markers.name, t.forces.name, t.loads.name) for t in result.trials] == trials
-    assert result.settings == Settings()
-    assert "# mass_kg = 70.0  # FILL IN" in text
-    assert "Left out" not in text
-
-
-@needs_data
-def test_init_takes_the_first_of_two_subjects_and_says_so(tmp_path):
-    text = init_subject(DATA / "pig_c3d")
-    for file in (DATA / "pig_c3d").iterdir():
-        (tmp_path / file.name).touch()
-    result = draft(tmp_path, completed(text))
-    assert result.model.static.name == "subject_a_static.c3d"
-    assert [trial.markers.name for trial in result.trials] == ["subject_a_walk.c3d"]
-    assert (result.subject.mass_kg, result.subject.height_m) == pytest.approx((41.5, 1.61))
-    left_out = next(line for line in text.splitlines() if line.startswith("# Left out"))
-    assert "subject_b_static.c3d, subject_b_walk.c3d" in left_out
-
-
-def trc(path, frames):
-    rows = [f"{k + 1}\t{k / 100:.2f}\t1\t2\t3" for k in range(frames)]
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"100\t100\t{frames}\t1\tmm\t100\t1\t{frames}",
-        "Frame#\tTime\tA\t\t",
-        "\t\tX1\tY1\tZ1",
-        "",
-    ]
-    path.write_text("\n".join(head + rows) + "\n")
-
-
-def test_init_takes_the_shortest_where_no_name_says_static(tmp_path):
-    for name, frames in (("a.trc", 30), ("b.trc", 9), ("calf_raise.trc", 20)):
-        trc(tmp_path / name, frames)
-    text = init_subject(tmp_path)
-    assert 'static = "b.trc"' in text
-    assert "shortest" in text
-    result = draft(tmp_path, completed(text))
-    assert [trial.markers.name for trial in result.trials] == ["a.trc", "calf_raise.trc"]
-    assert text.count("# forces = ") == 2
-
-
-def test_init_matches_one_force_file_to_each_trial(tmp_path):
-    for name in ("cal_01.trc", "walk_1.trc", "walk_2.trc", "run_12.trc"):
-        (tmp_path / name).touch()
-    for name in ("walk_2_forces.mot", "walk_1_forces.mot", "cal_01_forces.mot"):
-        (tmp_path / name).write_text("x\nendheader\ntime\tground_force_vx\tground_force_vy\n")
-    (tmp_path / "run_12_ik.mot").write_text("x\nendheader\ntime\tpelvis_tilt\n")
-    result = draft(tmp_path, completed(init_subject(tmp_path)))
-    forces = {trial.name: trial.forces and trial.forces.name for trial in result.trials}
-    assert forces == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
-
-
-def laboratory(tmp_path, force_folder):
-    """Markers of a person in a folder, forces in another one."""
-    person = tmp_path / "person"
-    for name in ("MarkerData", force_folder):
-        (person / name).mkdir(parents=True)
-    data = DATA / "gait2354"
-    for name in ("subject01_static.trc", "subject01_walk1.trc"):
-        shutil.copy(data / name, person / "MarkerData")
-    for name in ("subject01_walk1_grf.mot", "subject01_walk1_grf.xml"):
-        shutil.copy(data / name, person / force_folder)
-    return person
-
-
-@needs_data
-@pytest.mark.parametrize("force_folder", ["ID", "MarkerData/forces"])
-def test_init_finds_forces_in_folders_beside_and_within(tmp_path, force_folder):
-    person = laboratory(tmp_path, force_folder)
-    path = person / "MarkerData" / "subject.toml"
-    text = init_subject(path.parent)
-    beside = "../ID" if force_folder == "ID" else "forces"
-    assert f'forces = "{beside}/subject01_walk1_grf.mot"' in text
-    assert f'loads = "{beside}/subject01_walk1_grf.xml"' in text
-    assert "No forces" not in text
-    (trial,) = draft(path.parent, completed(text)).trials
-    assert trial.forces.samefile(person / force_folder / "subject01_walk1_grf.mot")
-
-
-@needs_data
-def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path):
-    person = laboratory(tmp_path, "ID")
-    shutil.copy(DATA / "gait2354" / "subject01_walk1.trc", person / "ID" / "subject02_walk1.trc")
-    text = init_subject(person / "MarkerData")
-    assert "# No forces were found for subject01_walk1.trc" in text
-    assert "# forces = " in text
-    with pytest.raises(FileError, match="holds no file of markers, but its folder ID does"):
-        init_subject(person)
-
-
-def test_init_prefers_c3d_to_its_export_and_says_so(tmp_path):
-    for name in ("static.trc", "walk.c3d", "walk.trc"):
-        (tmp_path / name).touch()
-    text = init_subject(tmp_path)
-    assert 'markers = "walk.c3d"' in text
-    assert re.search("Left out.*walk.trc", text)
-
-
-@pytest.mark.parametrize("name", ["static.trc", "walk.trc"])
-def test_init_with_one_recording_leaves_the_other_to_fill_in(tmp_path, name):
-    (tmp_path / name).touch()
-    text = init_subject(tmp_path)
-    missing = '# markers = "walk.trc"' if name == "static.trc" else '# static = "static.trc"'
-    assert f"{missing}  # FILL IN" in text
-    with pytest.raises(FileError):
-        draft(tmp_path, completed(text))
-
-
-def test_init_explains_every_setting(tmp_path):
-    (tmp_path / "walk.trc").touch()
-    lines = init_subject(tmp_path).splitlines()
-    for name in Settings.model_fields:
-        assert any(re.match(rf"{name} = .+  # .{{10,}}", line) for line in lines)
-
-
-def test_init_without_recordings(tmp_path):
-    with pytest.raises(FileError, match=r"holds no file of markers \(\.trc"):
-        init_subject(tmp_path)
-    with pytest.raises(FileError, match="no such folder"):
-        init_subject(tmp_path / "nowhere")
 
 
 OWN = """\

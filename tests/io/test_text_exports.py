@@ -22,8 +22,8 @@ def test_a_measured_walk_comes_back(shared_data, tmp_path, monkeypatch, kind):
         lab_files.write_qtm(path, walk, local=True)
     else:
         lab_files.write_nexus(path, walk, np.diag([1.0, -1.0, -1.0]))
-    found = read_recording(path)
-    assert found.markers.labels == walk.markers.labels
-    np.testing.assert_allclose(found.markers.positions, walk.markers.positions, atol=1e-6)
-    np.testing.assert_allclose(found.plates.force, walk.plates.force, atol=1e-5)
-    np.testing.assert_allclose(found.plates.moment, walk.plates.moment, atol=1e-4)
+    recording = read_recording(path)
+    assert recording.markers.labels == walk.markers.labels
+    np.testing.assert_allclose(recording.markers.positions, walk.markers.positions, atol=1e-6)
+    np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-5)
+    np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-4)

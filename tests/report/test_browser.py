@@ -383,7 +383,7 @@ def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
     page.get_by_role("button", name="Summary, two pages").click()
     page.emulate_media(media="print")
     shown = page.locator("h2:visible, h3:visible").all_text_contents()
-    told = page.locator(".ident:visible").all_inner_texts()
+    headings = page.locator(".ident:visible").all_inner_texts()
     page.emulate_media(media="null")
     assert shown == [
         "Verdict",
@@ -393,8 +393,8 @@ def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
         "Strides",
         "Joint moments",
     ]
-    assert len(told) == 2
-    assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in told)
+    assert len(headings) == 2
+    assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in headings)
     assert pages(page) == 2
     assert page.locator("body.summary").count() == 0, "once it is printed, everything is there again"
     assert pages(page) > 8

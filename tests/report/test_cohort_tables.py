@@ -73,8 +73,8 @@ def test_curves_are_those_of_the_fit(cohort, short_fit):
 
 def test_csv_files_have_the_same_rows_and_no_formula(cohort):
     for name in ("cohort", "trials", "people"):
-        told, table = pd.read_csv(cohort / f"{name}.csv"), pd.read_parquet(cohort / f"{name}.parquet")
-        assert told.shape == table.shape
+        csv, table = pd.read_csv(cohort / f"{name}.csv"), pd.read_parquet(cohort / f"{name}.parquet")
+        assert csv.shape == table.shape
     assert "\n'=cmd," in (cohort / "people.csv").read_text(encoding="utf-8")
     clara = pd.read_csv(cohort / "people.csv").iloc[-1]
     assert (clara.person, clara.status, clara.sentence) == ("Clara", 2, "trial 'walk': no force plates")

@@ -86,8 +86,8 @@ def test_a_minute_takes_little_more_memory_than_a_walk():
 
 def test_page_of_field_trials(fit_of):
     summary = fit_of("gait2354").summary
-    told = {"command": "fit", "status": 1, "seconds": 12.3, "said": "", "fit": summary}
-    told["bsp"] = pd.read_csv(fit_of("gait2354").folder / "bsp.csv")
+    outcome = {"command": "fit", "status": 1, "seconds": 12.3, "said": "", "fit": summary}
+    outcome["bsp"] = pd.read_csv(fit_of("gait2354").folder / "bsp.csv")
     refused = {"command": "fit", "status": 2, "seconds": 1.0, "said": "error: no\nforces"}
     checked = {
         "command": "check",
@@ -95,7 +95,7 @@ def test_page_of_field_trials(fit_of):
         "seconds": 1.0,
         "said": "markers\n\npass: a\nfail: b is\nlost\nassumed: c",
     }
-    page = field_trials.document({"walk": told, "jump": refused, "x.c3d": checked})
+    page = field_trials.document({"walk": outcome, "jump": refused, "x.c3d": checked})
     (trial,) = summary["trials"]
     residual = trial["residual_force_rms_N"]
     begin = (

@@ -19,8 +19,8 @@ def test_every_folder_with_a_subject_file_is_a_person(tmp_path):
     person(tmp_path / "notes", "read me.txt")
     person(tmp_path / ".git", "subject.toml")
     person(tmp_path / "out", "subject.toml")
-    found = people_of(tmp_path, tmp_path / "out")
-    assert found == [Person("Anna", anna / "subject.toml"), Person("Ben", ben / "ben.toml")]
+    people = people_of(tmp_path, tmp_path / "out")
+    assert people == [Person("Anna", anna / "subject.toml"), Person("Ben", ben / "ben.toml")]
 
 
 def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
@@ -52,21 +52,21 @@ def test_rows_name_subject_files_from_where_the_table_is(separator, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "told"),
+    ("text", "line", "words"),
     [
-        ("file,name\na.toml,A\n", 1, "no column 'subject' .*found: file, name"),
-        ("", 1, "no column 'subject'"),
-        ("subject\n", None, "no rows"),
+        ("file,name\na.toml,A\n", 1, "lacks the column subject; found file, name"),
+        ("", None, "the file is empty; expected a row per person"),
+        ("subject\n", 1, "no rows"),
         ("subject,name\na.toml,A\n,B\n", 3, "'subject' is empty"),
         ("subject,name\na.toml,A\nb.toml,B\nc.toml,a\n", 4, "'a' is there and so is 'A'"),
         ("subject\nx/s.toml\ny/s.toml\n", 3, "'s' is there twice"),
         ("subject,name\na.toml,a:b\n", 2, "'a:b' cannot be the name of a folder"),
     ],
 )
-def test_a_table_that_cannot_be_says_where(text, line, told, tmp_path):
+def test_a_table_that_cannot_be_says_where(text, line, words, tmp_path):
     table = tmp_path / "people.csv"
     table.write_text(text, encoding="utf-8")
-    with pytest.raises(FileError, match=told) as caught:
+    with pytest.raises(FileError, match=words) as caught:
         people_of(table, tmp_path / "out")
     assert caught.value.line == line
 

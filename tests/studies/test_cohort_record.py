@@ -18,12 +18,12 @@ def subject(measured_walk, tmp_path):
 
 
 def standing(subject, cohort):
-    (found,) = standings([Person("Anna", subject)], cohort)
-    return found
+    (only,) = standings([Person("Anna", subject)], cohort)
+    return only
 
 
-def record_of(found, **changes):
-    whole = Record("Anna", 0, "", found.inputs, VERSION, found.trials, 1.5)
+def record_of(standing, **changes):
+    whole = Record("Anna", 0, "", standing.inputs, VERSION, standing.trials, 1.5)
     return replace(whole, **changes)
 
 
@@ -59,8 +59,8 @@ def test_only_what_changes_a_fit_is_a_change(subject, tmp_path):
 
 
 def test_results_of_another_version_are_fitted_again(subject, tmp_path):
-    found = standing(subject, tmp_path / "out")
-    put(tmp_path / "out", record_of(found, kinertia="0.0.1"))
+    before = standing(subject, tmp_path / "out")
+    put(tmp_path / "out", record_of(before, kinertia="0.0.1"))
     assert standing(subject, tmp_path / "out").due
 
 
@@ -73,15 +73,15 @@ def test_a_record_that_cannot_be_read_is_none(text, subject, tmp_path):
 
 def test_failures_of_the_input_are_kept_until_it_changes_and_others_are_tried_again(subject, tmp_path):
     prepare_folder(tmp_path)
-    found = standing(subject, tmp_path)
-    keep(tmp_path, record_of(found, status=2, sentence="no plates"))
+    before = standing(subject, tmp_path)
+    keep(tmp_path, record_of(before, status=2, sentence="no plates"))
     again = standing(subject, tmp_path)
     assert not again.due
     assert again.outcome(None, tmp_path).sentence == "no plates"
-    keep(tmp_path, record_of(found, status=70, sentence="killed", inputs=""))
+    keep(tmp_path, record_of(before, status=70, sentence="killed", inputs=""))
     assert standing(subject, tmp_path).due
-    put(tmp_path, record_of(found))
-    keep(tmp_path, record_of(found))
+    put(tmp_path, record_of(before))
+    keep(tmp_path, record_of(before))
     assert not Place(tmp_path, "Anna").failure.exists()
     assert standing(subject, tmp_path).outcome(None, tmp_path).fitted
 
@@ -89,9 +89,9 @@ def test_failures_of_the_input_are_kept_until_it_changes_and_others_are_tried_ag
 def test_results_that_stay_of_other_files_are_told(subject, tmp_path):
     put(tmp_path, record_of(standing(subject, tmp_path)))
     changed(subject, "mass_kg", "mas_kg")
-    found = standing(subject, tmp_path)
-    assert not found.due
-    outcome = found.outcome(None, tmp_path)
+    before = standing(subject, tmp_path)
+    assert not before.due
+    outcome = before.outcome(None, tmp_path)
     assert (outcome.status, outcome.fitted) == (2, False)
     assert "did you mean 'mass_kg'" in outcome.sentence
     assert outcome.sentence.endswith("(results of other files are in people/Anna)")

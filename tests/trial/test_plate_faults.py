@@ -21,26 +21,26 @@ def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0):
 
 
 def test_a_sound_plate():
-    found = plates()
-    assert loads_trouble(found) == ""
-    assert loads_doubts(found) == []
-    assert found.idle[0].peak_n == pytest.approx(700, abs=5)
+    plate = plates()
+    assert loads_trouble(plate) == ""
+    assert loads_doubts(plate) == []
+    assert plate.idle[0].peak_n == pytest.approx(700, abs=5)
 
 
 @pytest.mark.parametrize(
     ("axis", "words"), [(0, "+25 N along X"), (1, "+25 N along Y"), (2, "+25 N along Z")], ids="XYZ"
 )
 def test_zeros(axis, words):
-    (told,) = loads_doubts(plates(offset=25.0 * np.eye(3)[axis]))
-    assert words in told
-    assert ("its vertical force" if axis == 1 else "that axis") in told
+    (sentence,) = loads_doubts(plates(offset=25.0 * np.eye(3)[axis]))
+    assert words in sentence
+    assert ("its vertical force" if axis == 1 else "that axis") in sentence
 
 
 @pytest.mark.parametrize("drift_n", [-40.0, 25.0, 60.0])
 def test_drift(drift_n):
-    (told, *_) = [one for one in loads_doubts(plates(drift_n=drift_n)) if "drifts" in one]
-    found = float(told.partition("changes by ")[2].partition(" N")[0])
-    assert found == pytest.approx(drift_n, rel=0.1)
+    (sentence, *_) = [one for one in loads_doubts(plates(drift_n=drift_n)) if "drifts" in one]
+    drift = float(sentence.partition("changes by ")[2].partition(" N")[0])
+    assert drift == pytest.approx(drift_n, rel=0.1)
 
 
 def test_forces_in_kilonewtons():

@@ -76,32 +76,32 @@ def cohort(
         output.mkdir(parents=True, exist_ok=True)
         with sole_use(output / _LOCK, "the folder of this cohort"):
             prepare_folder(output)
-            found = _standing(people, output)
-            _say_due(found)
-            records = _fitted(found, output.resolve(), scheduler)
-            outcomes = [one.outcome(records.get(one.person.name), output) for one in found]
+            everybody = _standing(people, output)
+            _say_due(everybody)
+            records = _fitted(everybody, output.resolve(), scheduler)
+            outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
             write_tables(output, outcomes, csv)
         _report(outcomes, output)
         raise typer.Exit(int(any(record.status for record in outcomes)))
-    found = _standing(people, output)
-    _report_plan(found, scheduler)
-    raise typer.Exit(int(any(one.problem for one in found)))
+    everybody = _standing(people, output)
+    _report_plan(everybody, scheduler)
+    raise typer.Exit(int(any(one.problem for one in everybody)))
 
 
 def _standing(people: Sequence[Any], output: Path) -> list[Standing]:
-    found = []
+    everybody = []
     with shown_progress() as progress:
         for k, one in enumerate(standings(people, output), start=1):
-            found.append(one)
+            everybody.append(one)
             progress("looking for changes", k / len(people))
-    return found
+    return everybody
 
 
-def _fitted(found: Sequence[Standing], output: Path, scheduler: str | None) -> dict[str, Record]:
+def _fitted(everybody: Sequence[Standing], output: Path, scheduler: str | None) -> dict[str, Record]:
     """Records of all that were due, by name; nothing is started where nobody is."""
     jobs = [
         Job(one.person.name, one.person.subject.resolve(), output, one.inputs, one.trials)
-        for one in found
+        for one in everybody
         if one.due and one.person.subject is not None
     ]
     records: dict[str, Record] = {}
@@ -122,10 +122,10 @@ def _cluster(scheduler: str | None, people: int) -> Iterator[Any]:
         yield client
 
 
-def _say_due(found: Sequence[Standing]) -> None:
-    due, lacking = sum(one.due for one in found), sum(bool(one.problem) for one in found)
-    kept = len(found) - due - lacking
-    out.print(f"{len(found)} people: {due} to fit, {kept} as before, {lacking} without what a fit needs")
+def _say_due(everybody: Sequence[Standing]) -> None:
+    due, lacking = sum(one.due for one in everybody), sum(bool(one.problem) for one in everybody)
+    kept = len(everybody) - due - lacking
+    out.print(f"{len(everybody)} people: {due} to fit, {kept} as before, {lacking} without what a fit needs")
 
 
 def _where(people: int, scheduler: str | None) -> str:
@@ -137,15 +137,15 @@ def _where(people: int, scheduler: str | None) -> str:
     return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
 
 
-def _report_plan(found: Sequence[Standing], scheduler: str | None) -> None:
+def _report_plan(everybody: Sequence[Standing], scheduler: str | None) -> None:
     """Who, how much, what is missing, and roughly how long."""
     table = plain_table("person", "", "trials", "frames")
-    for one in found:
+    for one in everybody:
         state = one.problem or ("to fit" if one.due else "as before")
         table.add_row(one.person.name, state, str(one.trials or "–"), str(one.frames or "–"))
     out.print(table)
-    _say_due(found)
-    due = [one for one in found if one.due]
+    _say_due(everybody)
+    due = [one for one in everybody if one.due]
     if due:
         workers = 1 if scheduler else local_size(len(due)).workers
         minutes = guessed_seconds(due, workers) / 60.0

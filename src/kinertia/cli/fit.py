@@ -97,7 +97,7 @@ def fit(
     for one in runs:
         names = [trial.name for trial in one.wanted.trials]
         results_folder(one.folder, force, names if len(names) > 1 else ())
-    told, status = [], 0
+    summaries, status = [], 0
     for one in runs:
         try:
             result = _fitted(one)
@@ -109,13 +109,13 @@ def fit(
             continue
         judged = verdicts(result)
         status = max(status, int(stands_against(judged)))
-        told.append({"folder": str(one.folder), **summary(result)})
+        summaries.append({"folder": str(one.folder), **summary(result)})
         if not (out.quiet or as_json):
             report_fit(result)
             report_verdicts(judged, result, verbose)
             out.print(f"results in {one.folder}", soft_wrap=True)
     if as_json:
-        typer.echo(json.dumps(told if len(runs) > 1 else told[0], indent=2))
+        typer.echo(json.dumps(summaries if len(runs) > 1 else summaries[0], indent=2))
     raise typer.Exit(status)
 
 

@@ -42,10 +42,10 @@ def sex(text: str) -> str:
     Raises:
         BadParameter: it is neither.
     """
-    found = sex_of(text)
-    if found not in ("male", "female"):
+    known = sex_of(text)
+    if known not in ("male", "female"):
         raise typer.BadParameter(f"'{text}' is neither male (m) nor female (f): the literature has a table for each")
-    return str(found)
+    return str(known)
 
 
 Sex = Annotated[

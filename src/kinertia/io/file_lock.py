@@ -69,7 +69,7 @@ def sole_use(path: Path, what: str) -> Iterator[None]:
 def _by(path: Path) -> str:
     """Who says in the file to be at work."""
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        return f" by process {told['pid']} on {told['host']}"
+        holder = json.loads(path.read_text(encoding="utf-8"))
+        return f" by process {holder['pid']} on {holder['host']}"
     except (OSError, ValueError, KeyError, TypeError):
         return " (or its drive cannot be written to, or knows no locks)"

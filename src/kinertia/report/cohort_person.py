@@ -42,8 +42,8 @@ def fit_person(job: Job) -> Record:
         return job.record(BAD_INPUT, str(error), settled=False)
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
-        told = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
-        return job.record(BAD_INPUT, told, settled=False)
+        sentence = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
+        return job.record(BAD_INPUT, sentence, settled=False)
     except Exception as error:
         return _failed(job, error)
 
@@ -69,7 +69,7 @@ def _unchanged(job: Job) -> bool:
 def _failed(job: Job, error: Exception) -> Record:
     """Kinertia's own failure, with a log beside its record."""
     log = Place(job.cohort, job.person).failure.with_suffix(".log")
-    told = traceback.format_exception_only(error)[-1].strip()
-    sentence = f"Kinertia failed, which it should not on any input ({told}); please send {log} to its developers"
+    last_line = traceback.format_exception_only(error)[-1].strip()
+    sentence = f"Kinertia failed, which it should not on any input ({last_line}); please send {log} to its developers"
     write_then_rename(log, "".join(traceback.format_exception(error)))
     return job.record(FAILED, sentence, settled=not isinstance(error, MemoryError))

@@ -119,37 +119,37 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
     expect_extra()
     from dask import dataframe
 
-    found = {}
+    tables = {}
     for name in _COLUMNS:
         path = Path(folder) / f"{name}.parquet"
         if not path.is_file():
             raise FileError(path, "no such file; give a folder that kinertia cohort has written")
-        found[name] = dataframe.read_parquet(path)
-    return found
+        tables[name] = dataframe.read_parquet(path)
+    return tables
 
 
 def _bsp(fit: Fit) -> dict[str, Any]:
     """Body segment parameters; the trials are all that they were estimated from."""
     columns = fit.bsp_columns()
     rows = len(columns["segment"])
-    told = {name: columns.get(name, [None] * rows) for name in _COLUMNS["cohort"] if name not in ("person", "trial")}
-    return {"trial": [", ".join(trial.name for trial in fit.trials)] * rows, **told}
+    known = {name: columns.get(name, [None] * rows) for name in _COLUMNS["cohort"] if name not in ("person", "trial")}
+    return {"trial": [", ".join(trial.name for trial in fit.trials)] * rows, **known}
 
 
 def _trials(fit: Fit) -> dict[str, Any]:
     """What `fit.json` says of every trial, and the trial's own verdicts."""
     rows = []
-    for told, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
+    for of_trial, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
         row = {
             f"{key}_{stage}": one
-            for key, value in told.items()
+            for key, value in of_trial.items()
             if isinstance(value, dict)
             for stage, one in value.items()
         }
         judged = [*residual_verdicts(trial), verdict_of_markers(fit, trial)]
-        row |= {key: value for key, value in told.items() if not isinstance(value, dict)}
+        row |= {key: value for key, value in of_trial.items() if not isinstance(value, dict)}
         row |= {"trial": trial.name, "seconds": row["seconds_total"], "verdict": worst_level(judged)}
-        row |= dict(zip(("window_start_s", "window_end_s"), told["window_s"], strict=True))
+        row |= dict(zip(("window_start_s", "window_end_s"), of_trial["window_s"], strict=True))
         row["against"] = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
         rows.append(row)
     return {name: [row[name] for row in rows] for name in _COLUMNS["trials"] if name != "person"}

@@ -168,11 +168,11 @@ def _mark(panel: Axes, shape: Mapping[str, Any]) -> None:
 
 def _finish(panel: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
     """Ranges, ticks and the title below."""
-    for axis, told, limits in ((panel.xaxis, x, panel.set_xlim), (panel.yaxis, y, panel.set_ylim)):
-        if "range" in told:
-            limits(*told["range"])
-        if "tickvals" in told:
-            axis.set_ticks(told["tickvals"], labels=[_text(one) for one in told.get("ticktext", told["tickvals"])])
+    for axis, shown, limits in ((panel.xaxis, x, panel.set_xlim), (panel.yaxis, y, panel.set_ylim)):
+        if "range" in shown:
+            limits(*shown["range"])
+        if "tickvals" in shown:
+            axis.set_ticks(shown["tickvals"], labels=[_text(tick) for tick in shown.get("ticktext", shown["tickvals"])])
     if "title" in x:
         panel.set_xlabel(_text(x["title"]["text"]))
     zero = panel.axhline if "ticktext" not in y else panel.axvline
@@ -181,11 +181,11 @@ def _finish(panel: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
 
 def _legend(panels: list[Axes]) -> tuple[list[Any], list[str]]:
     """Each name once."""
-    found: dict[str, Any] = {}
+    by_label: dict[str, Any] = {}
     for panel in panels:
         handles, labels = panel.get_legend_handles_labels()
-        found = {**dict(zip(labels, handles, strict=True)), **found}
-    return list(found.values()), list(found)
+        by_label = {**dict(zip(labels, handles, strict=True)), **by_label}
+    return list(by_label.values()), list(by_label)
 
 
 def _text(marked: object) -> str:

@@ -127,9 +127,9 @@ def running_cluster(address: str) -> Iterator[Any]:
     try:
         client = Client(address, timeout="10s")
     except (OSError, ValueError) as error:
-        told = one_line(str(error))
+        reason = one_line(str(error))
         raise SettingsError(
-            f"--scheduler {address}: no Dask scheduler answers there ({told}); start it, or check the "
+            f"--scheduler {address}: no Dask scheduler answers there ({reason}); start it, or check the "
             "address that it shows, like tcp://node7:8786"
         ) from None
     with client:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.io.csv_file import read_csv
 from kinertia.io.file_names import fits_everywhere, path_from, same_name_key
 from kinertia.io.subject_draft import is_capture
 from kinertia.io.subject_file import subject_file_in
-
-_SEPARATORS = ",;\t"
 
 
 @dataclass(frozen=True)
@@ -42,19 +40,20 @@ def people_of(study: Path, output: Path) -> list[Person]:
         FileError: no such study, nobody in it, columns missing, or names that cannot be folders side by side.
     """
     if study.is_dir():
-        found = list(_of_folders(study, output.resolve()))
-        lack = "none of its folders holds a subject file or recordings; give the folder that holds the people's folders"
-        _check_names(study, [(None, person.name) for person in found])
+        people = list(_of_folders(study, output.resolve()))
+        if not people:
+            raise FileError(
+                study,
+                "none of its folders holds a subject file or recordings; give the folder with the people's folders",
+            )
+        _check_names(study, [(None, person.name) for person in people])
     elif study.is_file():
         rows = list(_of_rows(study))
-        found = [person for _, person in rows]
-        lack = "has a heading and no rows; give one row per person"
+        people = [person for _, person in rows]
         _check_names(study, [(line, person.name) for line, person in rows])
     else:
         raise FileError(study, "no such folder or file; give a folder with a folder per person, or a CSV file")
-    if not found:
-        raise FileError(study, lack)
-    return found
+    return people
 
 
 def _of_folders(study: Path, output: Path) -> Iterator[Person]:
@@ -74,23 +73,12 @@ def _of_folders(study: Path, output: Path) -> Iterator[Person]:
 
 def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
     """Line number and person of every row."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise FileError(path, "is not UTF-8 text; save it as CSV UTF-8 (Excel: 'CSV UTF-8')") from None
-    heading = lines[0] if lines else ""
-    reader = csv.DictReader(lines, delimiter=max(_SEPARATORS, key=heading.count))
-    columns = [column.strip() for column in reader.fieldnames or ()]
-    if "subject" not in columns:
-        listed = ", ".join(columns) or "none"
-        raise FileError(path, f"has no column 'subject' (the path of each person's subject file); found: {listed}", 1)
-    reader.fieldnames = columns
-    for row in reader:
-        written = (row["subject"] or "").strip()
+    for row in read_csv(path, ["subject"], "a row per person, with the path of the person's subject file"):
+        written = row.cells["subject"]
         if not written:
-            raise FileError(path, "the column 'subject' is empty; give the path of a subject file", reader.line_num)
+            raise FileError(path, "the column 'subject' is empty; give the path of a subject file", row.line)
         subject = path_from(path.parent, written)
-        yield reader.line_num, Person((row.get("name") or "").strip() or _name_of(subject), subject)
+        yield row.line, Person(row.cells.get("name") or _name_of(subject), subject)
 
 
 def _name_of(subject: Path) -> str:

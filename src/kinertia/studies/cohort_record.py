@@ -82,8 +82,8 @@ class Place:
         Results of other inputs stay until others take their place: an entry that is changed and changed back costs
         nothing.
         """
-        found = (_read(self.results / RECORD), _read(self.failure))
-        return next((one for one in found if one and (one.inputs, one.kinertia) == (inputs, VERSION)), None)
+        records = (_read(self.results / RECORD), _read(self.failure))
+        return next((one for one in records if one and (one.inputs, one.kinertia) == (inputs, VERSION)), None)
 
 
 @dataclass(frozen=True)

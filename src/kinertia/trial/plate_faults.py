@@ -64,12 +64,12 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
 
 
 def _wrong_zero(name: str, off: Sequence[tuple[str, float]]) -> str:
-    told = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off)
+    offsets = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off)
     vertical = any(axis == "Y" for axis, _ in off)
     which = "the zero of its vertical force" if vertical else "the zero of that axis"
     return (
-        f"{name} reads {told} while nobody stands on it: {which} is wrong, and the loads are off by as much; zero the "
-        f"plates without load, or subtract it before export"
+        f"{name} reads {offsets} while nobody stands on it: {which} is wrong, and the loads are off by as much; zero "
+        f"the plates without load, or subtract it before export"
     )
 
 

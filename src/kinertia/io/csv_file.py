@@ -1,0 +1,95 @@
+"""Tables that people write in a spreadsheet: CSV with a heading, as every country's programs save it.
+
+Cells are separated by commas, semicolons or tabs. Where commas do not separate cells they may be decimal marks.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+
+from kinertia.errors import FileError
+from kinertia.io.number_table import expect_file
+
+_SEPARATORS = ",;\t"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table.
+
+    Attributes:
+        path, line: where it stands, the line one-based.
+        cells: text by column (in lower case), without blanks around it.
+        decimal_commas: commas may stand in numbers.
+    """
+
+    path: Path
+    line: int
+    cells: Mapping[str, str]
+    decimal_commas: bool = False
+
+    def number(self, column: str) -> float:
+        """The number in a column.
+
+        Raises:
+            FileError: it is none, or not finite; with the line.
+
+        Examples:
+            >>> Row(Path("norms.csv"), 2, {"mean": "5,1"}, decimal_commas=True).number("mean")
+            5.1
+        """
+        cell = self.cells[column]
+        try:
+            value = float(cell.replace(",", ".") if self.decimal_commas else cell)
+        except ValueError:
+            raise FileError(self.path, f"{column} is '{cell}'; expected a number", self.line) from None
+        if not math.isfinite(value):
+            raise FileError(
+                self.path, f"{column} is '{cell}'; expected a finite number; leave out rows without a value", self.line
+            )
+        return value
+
+
+def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]:
+    """The rows of a table, blank ones left out; columns in any order, others are kept, missing cells at the end empty.
+
+    Args:
+        path: the file, UTF-8.
+        columns: those that it must have.
+        expected: what the table is, for messages.
+
+    Raises:
+        FileError: no such file, not text, columns or rows missing, or a row with too many cells; with the line.
+    """
+    expect_file(path)
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise FileError(path, "not UTF-8 text; save it as CSV UTF-8 (Excel: 'CSV UTF-8')") from None
+    first = next((number for number, line in enumerate(lines) if line.strip()), None)
+    if first is None:
+        raise FileError(path, f"the file is empty; expected {expected}")
+    separator = max(_SEPARATORS, key=lines[first].count)
+    table = csv.reader(lines[first:], delimiter=separator)
+    heading = [cell.strip().lower() for cell in next(table)]
+    if lacking := [name for name in columns if name not in heading]:
+        found = ", ".join(heading)
+        raise FileError(path, f"lacks the column {', '.join(lacking)}; found {found}; expected {expected}", first + 1)
+    empty = True
+    for cells in table:
+        line = first + table.line_num
+        if not any(cell.strip() for cell in cells):
+            continue
+        if any(cells[len(heading) :]):
+            hint = "; a number has a decimal point where commas separate cells" if separator == "," else ""
+            raise FileError(path, f"{len(cells)} cells in a row; expected {len(heading)} as in the heading{hint}", line)
+        empty = False
+        by_column = dict(zip_longest(heading, (cell.strip() for cell in cells[: len(heading)]), fillvalue=""))
+        yield Row(path, line, by_column, decimal_commas=separator != ",")
+    if empty:
+        raise FileError(path, f"a heading and no rows; expected {expected}", first + 1)
