@@ -18,6 +18,7 @@ from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
@@ -25,6 +26,9 @@ from kinertia.motion.one_thread import one_blas_thread
 
 _STAYING_SD_M = 1e-4
 """At least, of markers that stay where a model has them."""
+TRUNK_PLACE_SD_M = 0.08
+"""Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
+_VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
 _NOTABLE = 2.0
 _DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
@@ -170,11 +174,12 @@ def calibration_prior(
     """How far a calibrated skeleton with these markers, plates and clock may be off.
 
     Markers that stay where a model has them are off by as much as they are found to be (`misplaced_m`): taken as exact,
-    they would hold the motion in poses that the forces contradict.
+    they would hold the motion in poses that the forces contradict. A trunk that no marker shows may lean all the time.
     """
     known = uncertainty.marker_sd_m
     each = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
     places = np.broadcast_to(each, len(skeleton.markers)).copy()
+    places[[label in _VIRTUAL_TRUNK for label in skeleton.labels]] = TRUNK_PLACE_SD_M
     return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments)
 
 

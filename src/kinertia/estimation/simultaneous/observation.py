@@ -192,7 +192,8 @@ def _observed(
     taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
     noise, effective, alike, products = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
     shown = np.isfinite(errors.displaced).all(axis=1)
-    effective = np.sqrt(np.square(effective) + girdle_variance(skeleton, errors.smooth, shown))
+    virtual = np.array([kinematics.trial.virtual_sd_m.get(label, 0.0) for label in skeleton.labels])
+    effective = np.sqrt(np.square(effective) + girdle_variance(skeleton, errors.smooth, shown) + np.square(virtual))
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
