@@ -68,7 +68,7 @@ def _attached_mass(value: object) -> tuple[float, float] | None:
 
 def _three(value: object) -> tuple[float, float, float]:
     match value:
-        case [(int() | float()) as x, (int() | float()) as y, (int() | float()) as z]:
+        case [int() | float() as x, int() | float() as y, int() | float() as z]:
             if all(abs(number) <= _FARTHEST_MM for number in (x, y, z)):
                 return float(x), float(y), float(z)
     raise ValueError(f"must be three numbers, [x, y, z] in mm, none beyond {_FARTHEST_MM:g}")
@@ -122,6 +122,15 @@ class Subject(Table):
     )
     mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
     height_m: float | None = Field(default=None, description="stature, m")
+    age_years: float | None = Field(
+        default=None,
+        gt=0.0,
+        lt=130.0,
+        description="age; the tables are of young adults, below 18 and from 65 others apply",
+    )
+    population: Literal["adult", "child", "elderly", "obese"] | None = Field(
+        default=None, description='"adult", "child", "elderly" or "obese"; left out: by age and body-mass index'
+    )
     knee_width_mm: float | None = Field(
         default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"
     )
@@ -221,6 +230,9 @@ class KnownSegment(Table):
     ixx_kgm2: Stated | None = Field(default=None, description="moment of inertia about the x axis, kg m2")
     iyy_kgm2: Stated | None = Field(default=None, description="about the y axis")
     izz_kgm2: Stated | None = Field(default=None, description="about the z axis")
+    prosthesis: bool = Field(
+        default=False, description="true: not the body's own: neither like the tables nor like the other side"
+    )
     source: str | None = Field(default=None, description="how it was measured; shown in the notes of a fit")
 
     def parameters(self) -> dict[str, tuple[float, float]]:
@@ -228,7 +240,7 @@ class KnownSegment(Table):
         parameters = {}
         for key in type(self).model_fields:
             stated = getattr(self, key)
-            if key != "source" and stated is not None:
+            if key not in ("source", "prosthesis") and stated is not None:
                 parameter, unit = key.rsplit("_", 1)
                 factor = 1e-3 if unit == "mm" else 1.0
                 parameters[parameter] = (factor * stated[0], factor * stated[1])

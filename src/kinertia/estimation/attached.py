@@ -38,17 +38,33 @@ def with_attached(ready: Prepared) -> Prepared:
         (one.segment, one.name) in welded for one in ready.attached
     ):
         return ready
-    _check(ready.skeleton, ready.attached)
     scale_kg = known(ready.subject.mass_kg)
-    joints = tuple(Joint(one.segment, one.name, np.eye(3), np.zeros(3), ()) for one in ready.attached)
-    prior = _extended(ready.prior, ready.attached, scale_kg)
+    skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, scale_kg)
     return replace(
         ready,
-        skeleton=replace(ready.skeleton, joints=(*ready.skeleton.joints, *joints)),
+        skeleton=skeleton,
         prior=prior,
         literature=ready.uncertainty.whole(prior.mean),
         notes=(*ready.notes, *(_note(one, scale_kg) for one in ready.attached)),
     )
+
+
+def with_attached_prior(
+    skeleton: Skeleton, prior: BspPrior, attached: Sequence[Attached], scale_kg: float
+) -> tuple[Skeleton, BspPrior]:
+    """A skeleton with what is attached welded to it, and the prior of the whole.
+
+    Args:
+        skeleton, prior: of the body alone.
+        attached: in the order of the new segments.
+        scale_kg: what the scale said.
+
+    Raises:
+        PriorError: no such segment, or a name that is taken.
+    """
+    _check(skeleton, attached)
+    joints = tuple(Joint(one.segment, one.name, np.eye(3), np.zeros(3), ()) for one in attached)
+    return replace(skeleton, joints=(*skeleton.joints, *joints)), _extended(prior, attached, scale_kg)
 
 
 def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:

@@ -18,6 +18,7 @@ from kinertia.estimation.input_checks import (
     known,
 )
 from kinertia.estimation.joint_widths import with_widths
+from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.unseen_body import unseen_body
@@ -180,6 +181,7 @@ def prepare(
     warnings += unseen_body(skeleton)
     body_kg = CarriedMass.of(known(subject.mass_kg), attached).body_kg
     literature = literature_bsp(body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp)
+    expected = population_prior(literature_prior(literature), subject)
     calibration_s = (time.perf_counter() - started) / len(inputs)
 
     kinematics, seconds = [], []
@@ -195,17 +197,17 @@ def prepare(
         absent = [label for label in skeleton.labels if label not in trial.markers.labels]
         if absent:
             notes.append(f"{trial.name}: markers of the static trial that it does not have: {', '.join(absent)}")
-    notes += [note for k in kinematics for note in k.notes]
+    notes += [*expected.notes, *(note for k in kinematics for note in k.notes)]
     return Prepared(
         subject=subject,
         skeleton=skeleton,
-        literature=literature,
-        prior=literature_prior(literature),
+        literature=expected.prior.mean,
+        prior=expected.prior,
         uncertainty=GAIT27_UNCERTAINTY.with_axes() if settings.joint_axes else GAIT27_UNCERTAINTY,
         file=None,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=tuple(warnings),
+        warnings=(*warnings, *expected.warnings),
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )

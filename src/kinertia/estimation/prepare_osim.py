@@ -18,6 +18,7 @@ from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
@@ -75,6 +76,8 @@ def prepare_osim(
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, carried.body_kg)
     prior, held = parted(skeleton, own)
+    expected = population_prior(prior, subject.model_copy(update={"sex": None}))
+    prior = expected.prior
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     uncertainty = ModelUncertainty(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
 
@@ -87,6 +90,7 @@ def prepare_osim(
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
     notes = [
         f"OpenSim model: {model.path.name}",
+        *expected.notes,
         *_mass_note(model, own, factor),
         *_idle_note(model, idle),
         *_held_note(skeleton, held),
