@@ -94,7 +94,7 @@ def _at(feet: FeetUnderPelvis, values: np.ndarray, time_s: float) -> np.ndarray:
 
 
 def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
-    """(k, 3) m/s, horizontal: how fast each stride's standing foot goes, as a belt's speed may change; zero on a floor."""
+    """(k, 3) m/s, horizontal: how fast each stride's standing foot goes, as a belt may speed up; zero on a floor."""
     velocities = []
     for stride in strides:
         first, last = (stride.start_s + share / 100 * (stride.end_s - stride.start_s) for share in _FOOT_FLAT)
