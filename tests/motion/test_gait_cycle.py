@@ -93,14 +93,11 @@ def test_one_who_squats_takes_no_strides(walked, trial):
 
 
 @pytest.mark.parametrize("turned", [0.0, 30.0])
-@pytest.mark.parametrize(
-    ("belt_m_s", "faster_m_s2", "within"), [(0.0, 0.0, 0.005), (1.2, 0.0, 0.03), (0.9, 0.12, 0.06)]
-)
-def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, belt_m_s, faster_m_s2, within, turned):
+@pytest.mark.parametrize("belt_m_s", [0.0, 1.2])
+def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, belt_m_s, turned):
     turn = Rotation.from_euler("y", turned, degrees=True).as_matrix()
     rotated = trial.rotated(turn)
-    belt_m = belt_m_s * walked.time + faster_m_s2 * walked.time**2 / 2
-    slid = rotated.markers.positions - (turn @ [1.0, 0.0, 0.0]) * belt_m[:, None, None]
+    slid = rotated.markers.positions - (turn @ [belt_m_s, 0.0, 0.0]) * walked.time[:, None, None]
     kinematics = kinematics_of(walked, replace(rotated, markers=replace(rotated.markers, positions=slid)))
     strides = strides_of(walked.skeleton, kinematics)
     measures = spatiotemporal(feet_under_pelvis(walked.skeleton, kinematics), strides)
@@ -110,7 +107,7 @@ def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, bel
         start, end = np.interp([stride.start_s, stride.end_s], walked.time, pelvis)
         speed = (end - start) / (stride.end_s - stride.start_s)
         # this walker's standing heel slides by 0.02 m/s, which on a belt cannot be told from the belt
-        assert one.speed_m_s == pytest.approx(speed, rel=within)
+        assert one.speed_m_s == pytest.approx(speed, rel=0.03 if belt_m_s else 0.005)
         assert one.stride_length_m == pytest.approx(one.speed_m_s * one.stride_time_s)
         assert one.cadence_steps_min == pytest.approx(120 / one.stride_time_s)
         assert 0.4 * one.stride_length_m < one.step_length_m < 0.6 * one.stride_length_m

@@ -53,8 +53,9 @@ def spatiotemporal(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> tuple[Sp
 
 def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
     """(k, 3) m, horizontal: from heel strike to heel strike of each stride, on a treadmill against the belt."""
+    belt = _belt_velocity(feet, strides)
     paths = []
-    for stride, belt in zip(strides, _belt_velocities(feet, strides), strict=True):
+    for stride in strides:
         start, end = (_at(feet, feet.heel[stride.side], time) for time in (stride.start_s, stride.end_s))
         paths.append((end - start - belt * (stride.end_s - stride.start_s)) * [1.0, 0.0, 1.0])
     return np.array(paths).reshape(-1, 3)
@@ -93,13 +94,12 @@ def _at(feet: FeetUnderPelvis, values: np.ndarray, time_s: float) -> np.ndarray:
     return np.array([np.interp(time_s, feet.time, column) for column in values.T])
 
 
-def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
-    """(k, 3) m/s, horizontal: how fast each stride's standing foot goes, as a belt may speed up; zero on a floor."""
+def _belt_velocity(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
+    """(3,) m/s, horizontal: how fast standing feet go; zero on a floor."""
     velocities = []
     for stride in strides:
         first, last = (stride.start_s + share / 100 * (stride.end_s - stride.start_s) for share in _FOOT_FLAT)
         heel = feet.heel[stride.side]
         velocities.append((_at(feet, heel, last) - _at(feet, heel, first)) / (last - first))
-    each = np.reshape(velocities, (-1, 3)) * [1.0, 0.0, 1.0]
-    belt = bool(velocities) and np.linalg.norm(np.median(each, axis=0)) > _BELT_M_S
-    return each if belt else np.zeros_like(each)
+    velocity = np.median(velocities, axis=0) * [1.0, 0.0, 1.0] if velocities else np.zeros(3)
+    return velocity if np.linalg.norm(velocity) > _BELT_M_S else np.zeros(3)
