@@ -10,6 +10,7 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.instrument_warnings import instrument_warnings
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -30,7 +31,6 @@ _STAYING_SD_M = 1e-4
 TRUNK_PLACE_SD_M = 0.08
 """Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
 _VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
-_NOTABLE = 2.0
 _DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
 """A parameter this many prior SDs from the literature contradicts the model."""
@@ -205,16 +205,6 @@ def _calibration(
     return calibration
 
 
-SHOWN_UNIT = {
-    "m": (1e3, "mm"),
-    "s": (1e3, "ms"),
-    "1": (1e2, "%"),
-    "rad": (180.0 / np.pi, "degrees"),
-    "N m/N": (1e3, "N m/kN"),
-}
-"""Factor and unit in which people read a calibrated quantity."""
-
-
 def _warnings(
     prior: BspPrior,
     uncertainty: ModelUncertainty,
@@ -227,7 +217,7 @@ def _warnings(
         warnings.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
-    warnings += _instrument_warnings(posterior.calibration)
+    warnings += instrument_warnings(posterior.calibration)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
@@ -245,19 +235,6 @@ def _warnings(
         )
     whole = unlikeness(prior, result.bsp, result.bsp_covariance)
     return [*warnings, whole.sentence()] if whole.unlike and not far else warnings
-
-
-def _instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) -> list[str]:
-    """One sentence per plate, and one for the clock, with all that is off."""
-    off: dict[str, list[str]] = {}
-    for name, entry in calibration.items():
-        instrument, colon, what = name.partition(":")
-        value, sd = float(entry["value"]), float(entry["prior_sd"])
-        if colon and abs(value) > _NOTABLE * sd:
-            scale, unit = SHOWN_UNIT[str(entry["unit"])]
-            said = f"{what}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit})"
-            off.setdefault(instrument, []).append(said)
-    return [f"{instrument}:{','.join(said)}; check the instruments" for instrument, said in off.items()]
 
 
 def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:
