@@ -26,6 +26,7 @@ from threadpoolctl import threadpool_limits
 from command_speed import command_section
 from core_speed import core_section
 from estimate_speed import speed_section, timed
+from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepare import calibrate
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
@@ -34,12 +35,13 @@ from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from kinertia.model.anthropometry import literature_bsp
+from kinertia.model.gait27 import Gait27, build_gait27
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import Subject
-from kinertia.trial.data import Markers
+from kinertia.trial.data import Markers, Recording
 from kinertia.trial.plate_assignment import build_trial
 from measured_trials import table
 from walks import WALKS, data_folder, fit_arguments
@@ -66,6 +68,10 @@ class Walk:
     static: Path
     mass_kg: float
     subject: Subject
+
+
+def _model(static: Recording, marker_set: MarkerSet, subject: Subject) -> Gait27:
+    return build_gait27(static, marker_set, known(subject.height_m), known(subject.sex))
 
 
 def walk(name: str) -> Walk:
@@ -119,7 +125,7 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     span = (float(recording.markers.time[0]), float(recording.markers.time[-1]))
     trial = build_trial(recording, feet, span)
     seconds["calibration"], (model, skeleton, *_) = best(
-        min(runs, 2), lambda: calibrate(static, [trial], marker_set, one.subject, "bell")
+        min(runs, 2), lambda: calibrate(_model(static, marker_set, one.subject), [trial], one.subject)
     )
     seconds["inverse kinematics"], ik = best(runs, lambda: solve_ik(skeleton, trial.markers))
     seconds["smoothing"], spline = best(runs, lambda: smooth(ik.time, ik.q, "gcv"))
@@ -170,7 +176,7 @@ def both_ik(name: str, runs: int) -> tuple[float, float]:
     recording, static = read_recording(one.markers, one.forces, one.loads), read_recording(one.static)
     marker_set = choose_marker_set(static.markers.labels)
     feet = foot_labels(marker_set, recording.markers)
-    _, skeleton, *_ = calibrate(static, [build_trial(recording, feet)], marker_set, one.subject, "bell")
+    skeleton, _ = calibrate(_model(static, marker_set, one.subject), [build_trial(recording, feet)], one.subject)
     mine, theirs = [], []
     for _ in range(runs):
         theirs.append(opensim_ik(name))

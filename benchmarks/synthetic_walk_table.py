@@ -21,6 +21,7 @@ from scipy.optimize import minimize_scalar
 from kinertia.estimation.prepare import calibrate
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
+from kinertia.model.gait27 import build_gait27
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, residual, root_derivatives
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
@@ -53,7 +54,7 @@ def main(shared: Path) -> None:
     present = {s: [m for m in labels if m in walk.markers.labels] for s, labels in marker_set.foot_labels().items()}
     trial = build_trial(walk, present)
     subject = Subject(name="walker", sex="male", mass_kg=72.6, height_m=1.803)
-    skeleton = calibrate(static, [trial], marker_set, subject, "bell")[1]
+    skeleton = calibrate(build_gait27(static, marker_set, subject.height_m, subject.sex), [trial], subject)[0]
     kinematics = solve_kinematics(skeleton, trial, 0.0, 8.0)
     write_standing(skeleton, static)
     write_walk(kinematics, trial)

@@ -102,3 +102,13 @@ def test_centre_of_pressure_off_the_plate(turned, reverse, height):
     (plate,) = check_plates(Recording("one", markers, plates), None)
     assert plate.outside_share == pytest.approx(3 / 9)
     assert plate.outside_m == pytest.approx(np.percentile([0.04, 0.14, 0.24], 95))
+
+
+def test_who_jumps_is_not_weighed():
+    """From the landing on the mean force is more than body weight: it stops the fall."""
+    loads = gait_loads(4.0)
+    force = np.where((loads.time < 0.5) | (loads.time > 0.9), 0.5 * MASS_KG * GRAVITY_M_S2, 0.0)
+    both = np.zeros_like(loads.force)
+    both[:, :, 1] = force[:, None]
+    assert mass_by_strides(trial_of(replace(loads, force=both), 0.0, 3.9)) is None
+    assert mass_by_strides(trial_of(replace(loads, force=both), 1.0, 3.9)).mass_kg == pytest.approx(MASS_KG)

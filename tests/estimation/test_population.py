@@ -21,6 +21,13 @@ def subject(**values):
     return Subject(name="A", sex="male", **{"mass_kg": 70.0, "height_m": 1.8, **values})
 
 
+def test_a_person_of_unknown_height_is_an_adult():
+    """A scaled model wants no height."""
+    result = population_prior(PRIOR, subject(height_m=None))
+    assert not result.warnings
+    assert result.prior is PRIOR
+
+
 @pytest.mark.parametrize(
     ("values", "word"),
     [

@@ -41,7 +41,7 @@ VARIETY = {
     "motion_analysis_walk.c3d": (151, 37, 2),
     "plates_kistler_type3.c3d": "has no points",
     "plates_type1.c3d": (634, 22, 1),
-    "rotations_only.c3d": "has no points",
+    "rotations_only.c3d": (340, 36, 0),
     "subject_prefixed_labels.c3d": (333, 86, 2),
 }
 

@@ -40,14 +40,22 @@ def test_presets_refuse_each_others_labels(name):
     preset = read_marker_set(name)
     for other in preset_names():
         labels = read_marker_set(other).labels
-        if {other, name} == {"cgm2", "plug-in-gait"}:
-            continue  # the former has the latter's markers, and more
+        if other != name and {other, name} <= {"cgm2", "plug-in-gait", "plug-in-gait-lower-body"}:
+            continue  # each of the former has most of the latter's markers, and more
         if other == name:
             check_marker_set(preset, labels)
             assert choose_marker_set(labels) == preset
         else:
             with pytest.raises(MarkerSetError, match=f"does not carry the marker set '{preset.name}'"):
                 check_marker_set(preset, labels)
+
+
+@pytest.mark.parametrize("lost", ["LASI", "T10", "RTOE", "RPSI"])
+def test_a_whole_set_that_lacks_a_label_is_not_taken_for_its_lower_half(lost):
+    labels = [label for label in read_marker_set("plug-in-gait").labels if label != lost]
+    assert choose_marker_set(labels).name == "Plug-in Gait"
+    legs = [label for label in read_marker_set("plug-in-gait-lower-body").labels if label not in (lost, "SACR")]
+    assert choose_marker_set(legs).name == "Plug-in Gait, lower body"
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -117,6 +125,6 @@ def test_the_same_key_in_two_tables_is_told_apart(tmp_path):
 def test_an_unknown_preset_lists_those_that_exist():
     with pytest.raises(
         FileError,
-        match=r"no such marker set.*cgm2, cleveland-clinic, opencap, opencap-mocap, plug-in-gait, rajagopal, r",
+        match=r"no such marker set.*cgm2, cleveland-clinic, ior-lower-body, opencap, opencap-mocap, plug-in-gait, plug",
     ):
         read_marker_set("helen-hayes")

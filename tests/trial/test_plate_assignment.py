@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.trial.data import FootLoads, Markers, PlateLoads, runs
+from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording, runs
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
 from walk_on_plates import ALL_STEPS, FEET, walk
@@ -84,6 +84,43 @@ def test_treadmill(belt_m_s):
     assert trial.measured.all()
     trial = build_trial(walk([("r", 0), ("l", 0), ("r", 1)], belt_m_s=belt_m_s), FEET)
     expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.7 - CONTACT_MARGIN_S)
+
+
+@pytest.mark.parametrize("step_m", [0.1, 0.17, 0.25])
+def test_stairs(step_m):
+    """A foot that stands on a step without a plate is on the ground, however high; all steps on plates are measured."""
+    trial = build_trial(walk(ALL_STEPS, step_m=step_m), FEET)
+    assert trial.measured.all()
+    trial = build_trial(walk([step for step in ALL_STEPS if step != ("l", 0)], step_m=step_m), FEET)
+    first, second = sorted(trial.windows())
+    assert first == pytest.approx((0.0, 0.7 - CONTACT_MARGIN_S), abs=0.021)
+    assert second == pytest.approx((1.3 + CONTACT_MARGIN_S, 2.99), abs=0.021)
+    trial = build_trial(walk([("r", 0), ("l", 0)], step_m=step_m), FEET)
+    expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.2 - CONTACT_MARGIN_S)
+
+
+def standing(raised_m, weight_n=700.0, share=1.0, sway_m=0.0):
+    """The right foot on a plate with this share of the weight from 1 s on, the left one beside it raised this much."""
+    time, load_time = np.arange(0, 3, 0.01), np.arange(0, 3, 0.001)
+    up = raised_m * np.clip((time - 0.5) / 0.5, 0, 1) + sway_m * np.sin(7 * time)
+    places = [np.column_stack([0 * time + x, height, 0 * time + z])
+              for z, height in ((0.1, 0 * time), (-0.1, up)) for x in (-0.1, 0.1)]  # fmt: skip
+    right = np.where(load_time < 0.5, 0.5, np.where(load_time < 1.0, 1.0, share))
+    force = np.zeros((len(load_time), 2, 3))
+    force[:, 0, 1], force[:, 1, 1] = weight_n * right, weight_n * np.where(load_time < 0.5, 0.5, 0.0)
+    moment = np.cross(np.array([[0.0, 0.0, 0.1], [0.0, 0.0, -0.1]]), force)
+    markers = Markers(time, ("R.Heel", "R.Toe", "L.Heel", "L.Toe"), np.stack(places, axis=1))
+    return Recording("standing", markers, PlateLoads(load_time, ("a", "b"), force, moment, (None, None)))
+
+
+def test_a_foot_on_a_box_is_not_measured():
+    trial = build_trial(standing(0.3, share=0.6), FEET)
+    expect_window(trial, 0.0, 1.0 - CONTACT_MARGIN_S)
+
+
+@pytest.mark.parametrize("sway_m", [0.0, 0.02])
+def test_a_foot_held_still_in_the_air_is(sway_m):
+    assert build_trial(standing(0.3, share=1.0, sway_m=sway_m), FEET).measured.all()
 
 
 def test_flight_between_measured_contacts_is_measured():

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from kinertia.trial.data import FootLoads
 from kinertia.trial.strides import periods
@@ -29,6 +30,17 @@ def test_a_limp_has_them_too():
 
 def test_jumps_on_both_feet_have_none():
     assert periods(loads([(0.1, 0.5), (1.1, 1.5)], [(0.12, 0.49), (1.05, 1.52)])) == ([], [])
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.02, 0.08, 0.15])
+def test_one_landing_and_one_leaving_of_both_feet_are_no_steps(late_s):
+    """A drop jump whose second landing is not in the file, and standing up from a chair with the feet off the floor."""
+    assert periods(loads([(1.0, 1.8)], [(1.0 + late_s, 1.8 - late_s)])) == ([], [])
+    assert periods(loads([(1.0, 3.0)], [(1.0 + late_s, 3.0)])) == ([], [])
+
+
+def test_two_steps_of_a_run():
+    assert periods(loads([(1.0, 1.2)], [(1.3, 1.5)])) == ([], pytest.approx([0.3, 0.3]))
 
 
 def test_one_foot_on_plates_is_enough_for_strides():

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
-from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording, Trial, runs
+from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Recording, Trial, runs
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates
 from kinertia.trial.strides import periods
@@ -135,7 +135,8 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
 
     Landings and leavings of one foot are a stride apart (or several, where steps missed the plates), those of opposite
     feet a step. Gait repeats itself, so that the strides may begin anywhere. One who stands, or takes no step in
-    `_LONG_WINDOW_S` or longer, is weighed over the whole window. None where the window holds nothing of these.
+    `_LONG_WINDOW_S` or longer, is weighed over the whole window. None where the window holds nothing of these: one who
+    jumps is faster at one end of it than at the other.
     """
     if not trial.measured.any():
         return None
@@ -145,7 +146,7 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     stepping = [period for period in steps if period <= end - start]
     if standing:
         span, over = end - start, "the whole time"
-    elif not strides and not steps and end - start >= _LONG_WINDOW_S:
+    elif not strides and not steps and end - start >= _LONG_WINDOW_S and not _in_the_air(trial.loads, start, end):
         span, over = end - start, "the whole window, without a step"
     elif fitting:
         span, over = max(fitting), "whole strides"
@@ -158,3 +159,9 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     inside = (trial.loads.time >= first - 1e-9) & (trial.loads.time <= last + 1e-9)
     mean = float(trial.loads.force[inside, :, 1].sum(axis=1).mean())
     return ForceMass(mean / GRAVITY_M_S2, first, last, over)
+
+
+def _in_the_air(loads: FootLoads, start_s: float, end_s: float) -> bool:
+    """Whether no plate is loaded at some time."""
+    inside = (loads.time >= start_s) & (loads.time <= end_s)
+    return not bridged(loads.time, loads.force[:, :, 1].sum(axis=1) > 0)[inside].all()

@@ -12,7 +12,7 @@ from kinertia.cli.terminal import out, plain_table, show_warning, shown_progress
 from kinertia.errors import FileError, SessionError
 from kinertia.estimation.from_files import check_plates, fit_subject
 from kinertia.estimation.session import SessionInstruments, person_instruments, session_instruments
-from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
 from kinertia.io.session_file import read_session, session_text

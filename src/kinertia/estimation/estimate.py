@@ -19,6 +19,7 @@ from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_l
 from kinertia.estimation.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
@@ -261,7 +262,10 @@ def _trial_fit(
             "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
         joint_load_sd=after.moment_sd,
-        marker_errors_m={"ik": k.ik.errors_m[k.frames], "final": _marker_errors(after.skeleton, k, after.motion)},
+        marker_errors_m={
+            "ik": _of_worn(k, k.ik.errors_m[k.frames]),
+            "final": _marker_errors(after.skeleton, k, after.motion),
+        },
         seconds=seconds,
     )
 
@@ -276,4 +280,10 @@ def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -
     modelled = used.marker_positions(used.pose(motion.q))
     measured = kinematics.trial.markers.select(used.labels).positions[kinematics.frames]
     result: np.ndarray = np.linalg.norm(measured - modelled, axis=-1)
-    return result
+    return _of_worn(kinematics, result)
+
+
+def _of_worn(k: Kinematics, errors_m: np.ndarray) -> np.ndarray:
+    """Marker errors (w, m) without those of a trunk that no marker shows."""
+    virtual = np.array([label in {marker.label for marker in VIRTUAL_TRUNK} for label in k.ik.labels])
+    return np.where(virtual, np.nan, errors_m)

@@ -33,7 +33,7 @@ def read_inputs(
     Raises:
         KinertiaError: a file is missing or broken.
     """
-    static = read_recording(_static(wanted), length_unit=wanted.model.length_unit)
+    static = read_recording(_static(wanted), length_unit=wanted.model.length_unit, standing=True)
     marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
     return static, read_trials(wanted, progress), marker_set
 

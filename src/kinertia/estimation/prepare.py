@@ -21,16 +21,25 @@ from kinertia.estimation.joint_widths import with_widths
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
+from kinertia.estimation.unseen_body import unseen_body
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS, Gait27, build_gait27
+from kinertia.model.gait27 import (
+    ARM_COORDINATES,
+    ARM_ROTATIONS,
+    SHOULDER_OFFSETS,
+    VIRTUAL_TRUNK,
+    Gait27,
+    build_gait27,
+)
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet, check_marker_set
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.swapped_markers import check_labels
+from kinertia.motion.upright_trunk import with_upright_trunk
 from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
@@ -101,25 +110,19 @@ class Prepared:
 
 @one_blas_thread
 def calibrate(
-    static: Recording,
-    trials: Sequence[Trial],
-    marker_set: MarkerSet,
-    subject: Subject,
-    hip_centre: str,
-    attached: Sequence[Attached] = (),
-) -> tuple[Gait27, Skeleton, list[str]]:
-    """The 27-DOF model of the static trial, adapted to the trials.
+    model: Gait27, trials: Sequence[Trial], subject: Subject, attached: Sequence[Attached] = ()
+) -> tuple[Skeleton, list[str]]:
+    """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials, and notes.
 
-    Returns the model as the static trial gives it, the adapted skeleton, and notes. Markers of pelvis, legs and feet
-    are held to the static trial by a deviation of 10 mm, those of torso and arms and the shoulder centres by 40 mm.
+    Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
+    the shoulder centres by 40 mm.
     """
-    model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
     check_force_masses(model.skeleton, CarriedMass.of(known(subject.mass_kg), attached), trials)
     check_same_person(model.skeleton, trials)
     poses = first_poses(model.skeleton, trials)
-    skeleton, held = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
+    skeleton, _ = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     for trial in trials:
         check_labels(skeleton.free(ARM_ROTATIONS), trial.name, sampled(trial.markers))
     upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
@@ -130,12 +133,10 @@ def calibrate(
     adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
     far = {label: moved for label, moved in adapted.moved_m.items() if moved > 0.03}
     notes = []
-    if held:
-        notes.append(f"no marker shows {', '.join(held)}: held at 0 (the arm hangs along the torso)")
     if far:
         listed = ", ".join(f"{label} {moved * 1e3:.0f} mm" for label, moved in sorted(far.items(), key=lambda i: -i[1]))
         notes.append(f"markers that sit elsewhere in the trials than in the static trial (adapted): {listed}")
-    return model, adapted.skeleton, notes
+    return adapted.skeleton, notes
 
 
 @one_blas_thread
@@ -172,8 +173,12 @@ def prepare(
         trial, doubts = _looked_at(item, static, marker_set)
         warnings += doubts
         turned.append(_turned(trial, marker_set))
+    model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), settings.hip_centre)
+    if VIRTUAL_TRUNK[0] in model.skeleton.markers:
+        turned = [(with_upright_trunk(model.skeleton, trial), angle) for trial, angle in turned]
     trials = [trial for trial, _ in turned]
-    model, skeleton, notes = calibrate(static, trials, marker_set, subject, settings.hip_centre, attached)
+    skeleton, notes = calibrate(model, trials, subject, attached)
+    warnings += unseen_body(skeleton)
     body_kg = CarriedMass.of(known(subject.mass_kg), attached).body_kg
     literature = literature_bsp(body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp)
     expected = population_prior(literature_prior(literature), subject)

@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.errors import SessionError
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.fit import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior

@@ -21,6 +21,7 @@ from kinertia.io.c3d_structure import doubts_about
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
+from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import FloatArray, Markers, Recording
 
@@ -31,7 +32,7 @@ _PERSON_M = (0.3, 2.8)
 _LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
 
 
-def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
+def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = False) -> Recording:
     """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
 
     Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
@@ -43,10 +44,13 @@ def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
     `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so
     `plates` is None when none is left.
 
+    Poses of segments (Theia), in a file without points: virtual markers at the landmarks of the marker set "theia".
+
     Args:
         path: the file.
         length_unit: of its lengths, "mm", "cm" or "m", whatever the file says; by the file, or by the size of a person
             where it says nothing, if None.
+        standing: of poses, one frame of the same person standing upright, as a static trial.
 
     Raises:
         FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit;
@@ -55,11 +59,23 @@ def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
     path = Path(path)
     file, notes = _open(path)
     parameters = file["parameters"]
-    labels, positions, label_notes = _markers(path, file)
+    poses = _poses(file)
+    if poses is None:
+        labels, positions, label_notes = _markers(path, file)
+    else:
+        labels, positions, label_notes = (), np.stack(list(poses.translation.values()), axis=1), []
     unit_name, unit_notes = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
     notes += unit_notes
-    time = _times(file, "points")
+    if poses is not None:
+        poses = poses.scaled(unit)
+        places = virtual_places(poses)
+        labels, positions = tuple(places), virtual_markers(poses.standing() if standing else poses, places) / unit
+        label_notes = [
+            f"{path.name}: no markers, but poses of segments; {len(labels)} virtual markers were made of them, with a "
+            f"deviation of {POSE_SD_M * 1e3:.0f} mm each" + (", of the person standing upright" if standing else "")
+        ]
+    time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
     plates, plate_notes = lab_plates(path, file, unit)
     stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
     rotation, up, axis_notes = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
@@ -67,7 +83,10 @@ def read_c3d(path: str | Path, length_unit: str | None = None) -> Recording:
     ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
     mass, height, measurements, subject_notes = _subject(path, parameters)
     notes += [*label_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
-    return Recording(path.stem, markers, ground_plates, mass, height, measurements, tuple(notes), unit_name, up)
+    virtual = {} if poses is None else dict.fromkeys(labels, POSE_SD_M)
+    return Recording(
+        path.stem, markers, ground_plates, mass, height, measurements, tuple(notes), unit_name, up, virtual
+    )
 
 
 def _open(path: Path) -> tuple[C3dContent, list[str]]:
@@ -85,12 +104,23 @@ def _open(path: Path) -> tuple[C3dContent, list[str]]:
     if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
         types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))
         notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
-    if not file["data"]["points"].shape[1]:
+    if not file["data"]["points"].shape[1] and _poses(file) is None:
         raise FileError(
             path,
-            "has no points; expected marker trajectories (a file of rotations or forces alone is not enough)",
+            "has no points; expected marker trajectories, or poses of pelvis, thighs, shanks, feet and toes as Theia "
+            "has them (forces alone are not enough)",
         )
     return file, notes
+
+
+def _poses(file: C3dContent) -> Poses | None:
+    """The poses of a file that has no points."""
+    if file["data"]["points"].shape[1] or not np.size(file["data"]["rotations"]):
+        return None
+    labels = [str(label) for label in _values(file["parameters"], "ROTATION", "LABELS", [])]
+    heels = {side: _values(file["parameters"], "THEIA3D", f"{side}_heel", None) for side in "rl"}
+    known = {side: np.ravel(heel).astype(float) for side, heel in heels.items() if np.size(heel) == 3}
+    return Poses.of(labels, file["data"]["rotations"], known)
 
 
 def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
@@ -131,9 +161,10 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
 
 
 def _times(file: Any, kind: str) -> FloatArray:
-    """Times (s) of the marker frames ("points") or of the analog samples ("analogs")."""
-    header, count = file["header"], file["data"][kind].shape[2]
-    start: float = header["points"]["first_frame"] / header["points"]["frame_rate"]
+    """Times (s) of the marker frames ("points"), of the poses ("rotations") or of the analog samples ("analogs")."""
+    header, count = file["header"], file["data"][kind].shape[-1]
+    first = "rotations" if kind == "rotations" else "points"
+    start: float = header[first]["first_frame"] / header[first]["frame_rate"]
     return start + np.arange(count) / (header[kind]["frame_rate"] or 1.0)
 
 

@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -30,8 +31,10 @@ except ImportError:
 ONLY_ASCII_PATHS = sys.platform == "win32"
 _COPY = "copy.c3d"
 _SECONDS, _SECONDS_PER_BYTE = 6.0, 1e-5
+_WAITING = 20.0
 _BYTES, _BYTES_PER_BYTE = 800_000_000, 20
-"""How long another process may read a file of so many bytes, and how much memory it may take for that."""
+"""How long another process may compute over a file of so many bytes, by how much longer it may take for that where the
+machine has other things to do, and how much memory."""
 
 C3dContent = dict[str, Any]
 """What is used of a file, nested as ezc3d has it: `header`, `parameters`, `data` (without analog values), and
@@ -69,11 +72,12 @@ def read_content(path: Path) -> C3dContent:
             raise C3dTrouble(str(worse)) from None
     data, header = file["data"], file["header"]
     return {
-        "header": {kind: dict(header[kind]) for kind in ("points", "analogs")},
+        "header": {kind: dict(header[kind]) for kind in ("points", "analogs", "rotations") if kind in header},
         "parameters": {group: dict(entries) for group, entries in dict(file["parameters"]).items()},
         "data": {
             "points": data["points"],
             "analogs": data["analogs"][:, :0],
+            "rotations": data.get("rotations", []),
             "platform": [dict(plate) for plate in data["platform"]] if "platform" in data else [],
         },
         "trouble": trouble,
@@ -92,9 +96,9 @@ def read_apart(path: Path) -> C3dContent:
         places = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
         seconds = _SECONDS + _SECONDS_PER_BYTE * path.stat().st_size
         try:
-            done = subprocess.run(command, capture_output=True, timeout=seconds, check=False, env=places)
+            done = subprocess.run(command, capture_output=True, timeout=_WAITING * seconds, check=False, env=places)
         except subprocess.TimeoutExpired:
-            raise C3dTrouble(f"reading it took more than {seconds:.0f} s") from None
+            raise C3dTrouble(f"reading it took more than {_WAITING * seconds:.0f} s") from None
         if not result.is_file():
             raise C3dTrouble(f"the library that reads it broke down, exit status {done.returncode}")
         content = pickle.loads(result.read_bytes())
@@ -108,7 +112,10 @@ def _read_for_another(path: str, result: str) -> None:
     if sys.platform != "win32":  # there time has to be limit enough
         import resource
 
-        limit = _BYTES + _BYTES_PER_BYTE * Path(path).stat().st_size + _virtual_size()
+        size = Path(path).stat().st_size
+        seconds = int(_SECONDS + _SECONDS_PER_BYTE * size) + 1 + int(time.process_time())
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        limit = _BYTES + _BYTES_PER_BYTE * size + _virtual_size()
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:

@@ -50,14 +50,16 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
 
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
-    """The preset that shares most of its labels with these, be it many or few; if several share as many, the one that
-    does so but for capitals and punctuation; of such that are part of one another, the larger.
+    """Of the presets that these labels hardly lack anything of, the one that has most of them; else the one that shares
+    most of its labels, be it many or few; if several share as many, the one that does so but for capitals and
+    punctuation; of such that are part of one another, the larger.
     """
     letters = {_letters(label) for label in labels}
 
-    def nearness(preset: MarkerSet) -> tuple[float, float, int]:
-        own = {_letters(label) for label in preset.labels}
-        return share_worn(preset, labels), len(own & letters) / len(own), len(preset.labels)
+    def nearness(preset: MarkerSet) -> tuple[float, float, float, int]:
+        own, share = {_letters(label) for label in preset.labels}, share_worn(preset, labels)
+        worn = share * len(preset.labels) if share >= ENOUGH_WORN else 0.0
+        return worn, share, len(own & letters) / len(own), len(preset.labels)
 
     return max(map(read_marker_set, preset_names()), key=nearness)
 

@@ -25,6 +25,7 @@ def read_recording(
     forces_path: str | Path | None = None,
     loads_path: str | Path | None = None,
     length_unit: str | None = None,
+    standing: bool = False,
 ) -> Recording:
     """Read one trial: markers, and forces where there are any.
 
@@ -35,6 +36,7 @@ def read_recording(
         loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without
             `forces_path` its own datafile is read.
         length_unit: of a .c3d file's lengths, "mm", "cm" or "m", whatever it says itself.
+        standing: of a .c3d file of poses (Theia), the same person standing upright, as a static trial.
 
     Returns:
         the recording; its `plates` is None where no file holds usable force plates.
@@ -46,7 +48,7 @@ def read_recording(
     markers_path = Path(markers_path)
     _expect_kind(markers_path, MARKER_FILES, "markers")
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
-    recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit)
+    recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit, standing)
     if tsv:
         forces_path = None
     if forces_path is not None:
@@ -63,7 +65,7 @@ def read_recording(
     return recording
 
 
-def _read_markers(path: Path, plate: Path | None, length_unit: str | None) -> Recording:
+def _read_markers(path: Path, plate: Path | None, length_unit: str | None, standing: bool) -> Recording:
     """What a file of markers holds; readers are loaded by those who have such files."""
     kind = path.suffix.lower()
     if length_unit is not None and kind != ".c3d":
@@ -75,7 +77,7 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None) -> Re
     if kind == ".c3d":
         from kinertia.io.c3d import read_c3d
 
-        return read_c3d(path, length_unit)
+        return read_c3d(path, length_unit, standing)
     if kind == ".tsv":
         from kinertia.io.qualisys import plates_beside, read_qualisys
 

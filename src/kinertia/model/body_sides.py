@@ -40,7 +40,9 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
     turned = _odd_one_out(fronts)
     if turned:
         return _front_trouble(turned, marker_set)
-    forward = _level(np.nanmean([_unit(front) for front in fronts.values()], axis=0))
+    facing = np.array([_unit(front) for front in fronts.values()])
+    known = np.isfinite(facing)
+    forward = _level(np.where(known, facing, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan))
     right = np.cross(forward, _UP)
     across = {pair: _cosine(places[f"{pair}_r"] - places[f"{pair}_l"], right) for pair in _both(places)}
     wrong = [pair for pair, cosine in across.items() if cosine < -_CLEAR]

@@ -35,6 +35,13 @@ ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
 """Held still where no marker shows them, as with a lower-body marker set; all others a trial must show."""
 
+VIRTUAL_TRUNK = (
+    Marker("(trunk, right)", "torso", np.array([0.0, 0.45, 0.3])),
+    Marker("(trunk, left)", "torso", np.array([0.0, 0.45, -0.3])),
+    Marker("(trunk, front)", "torso", np.array([0.3, 0.45, 0.0])),
+)
+"""Of a person who wears no marker on the torso; at the height of the shoulders."""
+
 _USUAL_DEG = {
     "hip_flexion": (-40.0, 130.0),
     "hip_adduction": (-60.0, 45.0),
@@ -118,7 +125,10 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
                 f"the static trial gives no frame for the {joint.child}: landmarks of it or of the {joint.parent} "
                 f"coincide or lie in line; check the static trial and the marker set '{marks.marker_set.name}'"
             )
-    skeleton = Skeleton("gait27", tuple(joints), _markers(marks, frames), locked, ranges=_usual_ranges(joints))
+    worn = _markers(marks, frames)
+    if not any(marker.segment == "torso" for marker in worn):
+        worn = (*worn, *VIRTUAL_TRUNK)
+    skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_usual_ranges(joints))
     return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
 
 

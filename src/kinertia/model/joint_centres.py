@@ -21,6 +21,8 @@ from kinertia.trial.data import Recording
 
 _MARKER_RADIUS_M = 0.007
 _SHOULDER_DROP = 0.17
+_BIACROMIAL_OF_STATURE = 0.2
+"""Between the skin over the acromia, which lie 4 cm inside the shoulders' width of Drillis and Contini (1966)."""
 _ELBOW_WIDTH_OF_STATURE = 0.04
 _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
@@ -217,20 +219,37 @@ def torso_frame(
 
     With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the
     acromia and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
+    A marker set without acromia leaves the shoulders to the stature, a static trial without any marker of the
+    torso its axis to the vertical.
     """
-    marks.require("torso and shoulders", "acromion_r", "acromion_l")
-    across = marks["acromion_r"] - marks["acromion_l"]
+    acromia = ("acromion_r", "acromion_l")
+    torso = any(label in marks.markers for label in marks.marker_set.segments.get("torso", ()))
+    worn = any(name in marks for name in acromia) or (
+        torso and any(name in marks.marker_set.landmarks for name in acromia)
+    )
+    if worn:
+        marks.require("torso and shoulders", *acromia)
+    across = marks["acromion_r"] - marks["acromion_l"] if worn else marks["asis_r"] - marks["asis_l"]
     if "c7" in marks and "sternal_notch" in marks:
         depth = marks["sternal_notch"] - marks["c7"]
         upward = Rotation.from_rotvec(_CERVICAL_RAISED[sex] * across / np.linalg.norm(across))
         top = marks["c7"] + _CERVICAL[sex] * upward.apply(depth)
         length = float(np.linalg.norm(top - lumbar))
-    else:
+    elif worn:
         top = (marks["acromion_r"] + marks["acromion_l"]) / 2
         length = reference_lengths(height_m, sex)["torso"]
+    else:
+        top = lumbar + np.array([0.0, 1.0, 0.0])
+        length = reference_lengths(height_m, sex)["torso"]
     rotation = frame(top - lumbar, across)
-    drop = _SHOULDER_DROP * np.linalg.norm(across) * rotation[:, 1]
-    return rotation, length, {side: marks[f"acromion_{side}"] - drop for side in "rl"}
+    width = float(np.linalg.norm(across)) if worn else _BIACROMIAL_OF_STATURE * height_m
+    if worn:
+        places = {side: marks[f"acromion_{side}"] for side in "rl"}
+    else:
+        neck = lumbar + length * rotation[:, 1]
+        places = {side: neck + sign * width / 2 * rotation[:, 2] for side, sign in (("r", 1.0), ("l", -1.0))}
+    drop = _SHOULDER_DROP * width * rotation[:, 1]
+    return rotation, length, {side: place - drop for side, place in places.items()}
 
 
 def arm(

@@ -10,7 +10,7 @@ Everything is in SI units and in the ground frame: X forward, Y up, Z right.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from typing import NamedTuple
@@ -181,6 +181,7 @@ class Recording:
         notes: one sentence for each assumption made while reading.
         length_unit: of the marker file ("mm"); everything here is in m.
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
+        virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -197,6 +198,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     length_unit: str = "m"
     vertical: str = "+Y"
+    virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
 
     def without_empty_markers(self) -> Recording:
         """The same without markers that no frame shows, and a note that names them."""
@@ -277,6 +279,7 @@ class Trial:
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
+        virtual_sd_m: as the recording's.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -292,6 +295,7 @@ class Trial:
     loads: FootLoads
     measured: BoolArray
     notes: tuple[str, ...] = ()
+    virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from kinertia.errors import MarkerSetError
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Markers, nearest_samples, runs
+from kinertia.trial.foot_motion import FootMotion, foot_motions
 
 BRIDGED_GAP_S = 0.02
 """A load that vanishes for less than this is one contact."""
@@ -29,10 +30,11 @@ LONGEST_FLIGHT_S = 1.0
 # Below these, markers of a foot that stands still differ by noise only.
 _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
-_SPEED_SPAN_S = 0.01
-_FILLED_GAP_S = 0.2
 _FEWEST_TO_JUDGE, _FAR_BEYOND = 3, 3.0
 """Of so many landings, one that is so many times as fast as usual is none."""
+
+_ALL_CARRIED = 0.85
+"""While plates carry this share of what they usually do, a foot that is held still is held in the air."""
 
 FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
@@ -46,6 +48,9 @@ def measured_frames(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Bo
     that speed falls to the speed seen where a plate starts to be loaded, and leaves when it rises to the
     speed seen where a plate ceases to be. Up to `CONTACT_SLACK_S` of such ground contact right before or
     after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
+
+    A foot without load that stands still, high above the ground or not, is on a step, a box or the frame of a
+    treadmill, if the plates carry less than usual meanwhile; from landing to leaving, as above.
 
     Frames outside the forces' time are not measured. Frames in the air (no foot on the ground, no load) are
     measured only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have seen both the
@@ -92,93 +97,22 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Gro
         axis=1,
     )
     ground = loaded.copy()
-    moves = [_foot_motion(markers.select(feet[foot])) for foot in FEET]
+    moves = foot_motions([markers.select(feet[foot]) for foot in FEET], loaded)
     if loaded.any():
-        moves = _against_ground(moves, loaded)
         clearance, landing, leaving = _learned(moves, loaded)
+        resting = np.stack([move.still for move in moves], axis=1) & ~loaded
+        carried = _carried(loads, nearest, loaded, resting.any(axis=1))
         for foot, move in enumerate(moves):
-            planted = _planted(move, clearance, landing, leaving)
+            planted = move.planted(clearance, landing, leaving)
+            for first, last in runs(resting[:, foot]):
+                if carried[first : last + 1].mean() < _ALL_CARRIED:
+                    planted |= _stand(move.over(first, last).planted(clearance, landing, leaving), first, last)
             ground[:, foot] |= _off_plates(planted, loaded[:, foot], markers.time)
     together = np.zeros(len(inside), dtype=bool) if loads.together is None else loads.together[nearest] & inside
     return GroundContact(loaded, ground, inside, together)
 
 
-@dataclass(frozen=True, eq=False)
-class _FootMotion:
-    """Height (n, m) m and velocity (n, m, 3) m/s of the markers of a foot; NaN where not seen."""
-
-    height: FloatArray
-    velocity: FloatArray
-
-    def slowest(self, clearance: float) -> FloatArray:
-        """(n,) m/s speed of the slowest marker not higher than this clearance; infinite where none is."""
-        speed = np.linalg.norm(self.velocity, axis=2)
-        result: FloatArray = np.where(self.height <= clearance, speed, np.inf).min(axis=1)
-        return result
-
-
-def _foot_motion(markers: Markers) -> _FootMotion:
-    positions = _short_gaps_filled(markers)
-    span = max(1, round(_SPEED_SPAN_S * markers.rate_hz))
-    frames = np.arange(len(positions))
-    after, before = np.minimum(frames + span, len(frames) - 1), np.maximum(frames - span, 0)
-    elapsed = (markers.time[after] - markers.time[before])[:, None, None]
-    return _FootMotion(positions[:, :, 1], (positions[after] - positions[before]) / elapsed)
-
-
-def _against_ground(moves: Sequence[_FootMotion], loaded: BoolArray) -> list[_FootMotion]:
-    """Heights above each marker's own lowest, and velocities against the ground under the loaded feet.
-
-    The ground's velocity is the median of the lowest marker's: zero on a floor, the belt's on a treadmill. A
-    foot that is never loaded takes the other's.
-    """
-    against, ground = [], []
-    for foot, move in enumerate(moves):
-        stance = move.height[loaded[:, foot]]
-        if not np.isfinite(stance).any() or not np.isfinite(stance).any(axis=0).all():
-            stance = move.height
-        height = move.height - np.nanpercentile(stance, 2, axis=0)
-        frames = np.flatnonzero(loaded[:, foot] & np.isfinite(height).any(axis=1))
-        against.append(height)
-        if frames.size:
-            velocity = move.velocity[frames, np.nanargmin(height[frames], axis=1)]
-            velocity = velocity[np.isfinite(velocity).all(axis=1)]
-            ground += [np.median(velocity, axis=0) * [1, 0, 1]] if len(velocity) else []
-    velocities = ground if len(ground) == 2 else (ground or [np.zeros(3)]) * 2
-    return [
-        _FootMotion(height, move.velocity - velocity)
-        for height, move, velocity in zip(against, moves, velocities, strict=True)
-    ]
-
-
-def _short_gaps_filled(markers: Markers) -> FloatArray:
-    """Positions of the markers seen in at least half the frames, short gaps bridged by a line.
-
-    Only for telling whether a foot is on the ground.
-    """
-    seen = markers.seen
-    kept = np.flatnonzero(seen.mean(axis=0) >= 0.5)
-    if not kept.size:
-        raise MarkerSetError(
-            f"the foot markers {', '.join(markers.labels)} are each seen in less than half of the frames; "
-            "use a trial that shows the feet or give other markers",
-            markers.labels,
-        )
-    positions = markers.positions[:, kept].copy()
-    for column, marker in enumerate(kept):
-        for first, last in runs(~seen[:, marker]):
-            if markers.time[last] - markers.time[first] > _FILLED_GAP_S:
-                continue
-            for axis in range(3):
-                positions[first : last + 1, column, axis] = np.interp(
-                    markers.time[first : last + 1],
-                    markers.time[seen[:, marker]],
-                    markers.positions[seen[:, marker], marker, axis],
-                )
-    return positions
-
-
-def _learned(moves: Sequence[_FootMotion], loaded: BoolArray) -> tuple[float, float, float]:
+def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, float, float]:
     """Clearance (m), landing and leaving speed (m/s) of this trial's loaded feet.
 
     Where no contact begins (or ends) within the trial, the largest speed of a loaded foot stands in.
@@ -218,15 +152,21 @@ def _usual(speeds: Sequence[float]) -> float:
     return _largest(finite)
 
 
-def _planted(move: _FootMotion, clearance: float, landing: float, leaving: float) -> BoolArray:
-    """(n,) True from landing to leaving, and where a marker is missing."""
-    slowest = move.slowest(clearance)
-    planted = np.zeros(len(slowest), dtype=bool)
-    for first, last in runs(slowest <= leaving):
-        below = np.flatnonzero(slowest[first : last + 1] <= landing)
-        if below.size:
-            planted[first + below[0] : last + 1] = True
-    return planted | np.isnan(move.height).any(axis=1)
+def _carried(loads: FootLoads, nearest: npt.NDArray[np.int_], loaded: BoolArray, resting: BoolArray) -> FloatArray:
+    """(n,) vertical force of all plates over what it usually is while nothing can rest (n,) beside them."""
+    force = loads.force[:, :, 1].sum(axis=1)[nearest]
+    whole = loaded.any(axis=1) & ~resting
+    result: FloatArray = force / np.median(force[whole if whole.any() else loaded.any(axis=1)])
+    return result
+
+
+def _stand(planted: BoolArray, first: int, last: int) -> BoolArray:
+    """Of where a foot is planted, the stretches that reach into these frames."""
+    stands = np.zeros_like(planted)
+    for start, end in runs(planted):
+        if start <= last and end >= first:
+            stands[start : end + 1] = True
+    return stands
 
 
 def _off_plates(planted: BoolArray, loaded: BoolArray, time: FloatArray) -> BoolArray:

@@ -81,7 +81,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         )
     if not measured.any():
         raise TrialError(recording.name, _nothing_measured(recording.markers.time, contact, window_s))
-    return Trial(recording.name, recording.markers, loads, measured, (*recording.notes, *notes))
+    return Trial(recording.name, recording.markers, loads, measured, (*recording.notes, *notes), recording.virtual_sd_m)
 
 
 def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[str, ...]]:

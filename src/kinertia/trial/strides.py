@@ -10,12 +10,14 @@ from kinertia.trial.ground_contact import bridged
 
 _TOGETHER = 0.2
 """Share of the time between two landings of a foot within which the other foot lands with it."""
+_SHORTEST_STEP_S = 0.2
+"""Feet that land or leave within less do so together: a sprinter's steps last longer."""
 
 
 def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
     """Times (s) between landings, and between leavings, of one foot; and from each to the other foot's next.
 
-    Both are empty where the feet do not alternate, as in jumps and squats: there are no strides.
+    Both are empty where the feet do not alternate, as in jumps, squats and when sitting down: there are no strides.
     """
     strides, steps = [], []
     contacts = [runs(bridged(loads.time, loads.force[:, foot, 1] > 0)) for foot in range(len(FEET))]
@@ -23,9 +25,12 @@ def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
         events = [[float(loads.time[run[edge]]) for run in spans if run[edge] != unseen] for spans in contacts]
         if not _alternating(*events):
             continue
-        strides += [b - a for times in events for a, b in combinations(times, 2)]
         both = sorted((time, foot) for foot, times in enumerate(events) for time in times)
-        steps += [b - a for (a, one), (b, other) in pairwise(both) if one != other]
+        between = [b - a for (a, one), (b, other) in pairwise(both) if one != other]
+        if 2 * sum(step < _SHORTEST_STEP_S for step in between) > len(between):
+            continue
+        strides += [b - a for times in events for a, b in combinations(times, 2)]
+        steps += between
     return strides, steps
 
 

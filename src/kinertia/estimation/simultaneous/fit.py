@@ -10,6 +10,7 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.instrument_warnings import instrument_warnings
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -19,6 +20,7 @@ from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.estimation.simultaneous.unlike import unlikeness
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
@@ -26,7 +28,9 @@ from kinertia.motion.one_thread import one_blas_thread
 
 _STAYING_SD_M = 1e-4
 """At least, of markers that stay where a model has them."""
-_NOTABLE = 2.0
+TRUNK_PLACE_SD_M = 0.08
+"""Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
+_VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
 _DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
 """A parameter this many prior SDs from the literature contradicts the model."""
@@ -171,11 +175,12 @@ def calibration_prior(
     """How far a calibrated skeleton with these markers, plates and clock may be off.
 
     Markers that stay where a model has them are off by as much as they are found to be (`misplaced_m`): taken as exact,
-    they would hold the motion in poses that the forces contradict.
+    they would hold the motion in poses that the forces contradict. A trunk that no marker shows may lean all the time.
     """
     known = uncertainty.marker_sd_m
     each = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
     places = np.broadcast_to(each, len(skeleton.markers)).copy()
+    places[[label in _VIRTUAL_TRUNK for label in skeleton.labels]] = TRUNK_PLACE_SD_M
     return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments)
 
 
@@ -200,16 +205,6 @@ def _calibration(
     return calibration
 
 
-SHOWN_UNIT = {
-    "m": (1e3, "mm"),
-    "s": (1e3, "ms"),
-    "1": (1e2, "%"),
-    "rad": (180.0 / np.pi, "degrees"),
-    "N m/N": (1e3, "N m/kN"),
-}
-"""Factor and unit in which people read a calibrated quantity."""
-
-
 def _warnings(
     prior: BspPrior,
     uncertainty: ModelUncertainty,
@@ -222,7 +217,7 @@ def _warnings(
         warnings.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
-    warnings += _instrument_warnings(posterior.calibration)
+    warnings += instrument_warnings(posterior.calibration)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
@@ -240,19 +235,6 @@ def _warnings(
         )
     whole = unlikeness(prior, result.bsp, result.bsp_covariance)
     return [*warnings, whole.sentence()] if whole.unlike and not far else warnings
-
-
-def _instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) -> list[str]:
-    """One sentence per plate, and one for the clock, with all that is off."""
-    off: dict[str, list[str]] = {}
-    for name, entry in calibration.items():
-        instrument, colon, what = name.partition(":")
-        value, sd = float(entry["value"]), float(entry["prior_sd"])
-        if colon and abs(value) > _NOTABLE * sd:
-            scale, unit = SHOWN_UNIT[str(entry["unit"])]
-            said = f"{what}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit})"
-            off.setdefault(instrument, []).append(said)
-    return [f"{instrument}:{','.join(said)}; check the instruments" for instrument, said in off.items()]
 
 
 def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:

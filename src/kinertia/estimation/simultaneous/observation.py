@@ -24,6 +24,7 @@ from kinertia.estimation.simultaneous.marker_noise import (
 from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.repetition import repeats
+from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frames_at_once import pieces
@@ -190,6 +191,9 @@ def _observed(
     (start, end), time = kinematics.window_s, errors.time
     taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
     noise, effective, alike, products = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
+    shown = np.isfinite(errors.displaced).all(axis=1)
+    virtual = np.array([kinematics.trial.virtual_sd_m.get(label, 0.0) for label in skeleton.labels])
+    effective = np.sqrt(np.square(effective) + girdle_variance(skeleton, errors.smooth, shown) + np.square(virtual))
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2

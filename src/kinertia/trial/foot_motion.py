@@ -1,0 +1,157 @@
+"""How the markers of a foot move against the ground: how high they are over what it stands on, and how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.errors import MarkerSetError
+from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
+
+_SPEED_SPAN_S = 0.01
+_FILLED_GAP_S = 0.2
+_STEP_M = 0.03
+"""Contacts whose heights differ by more stand on steps, boxes or a ramp; less is how a foot lands and rolls."""
+_STILL_M_S, _STILL_SPAN_S, _STILL_S = 0.05, 0.1, 0.2
+"""A foot stands still whose markers are all so slow, as told over this span, for so long."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootMotion:
+    """Height (n, m) m, velocity (n, m, 3) m/s of the markers of a foot, NaN where not seen, and where it stands still.
+
+    Attributes:
+        still: (n,) True where no marker moves, against the ground or, as beside a treadmill's belt, in the laboratory.
+    """
+
+    height: FloatArray
+    velocity: FloatArray
+    still: BoolArray
+
+    def slowest(self, clearance: float) -> FloatArray:
+        """(n,) m/s speed of the slowest marker not higher than this clearance; infinite where none is."""
+        speed = np.linalg.norm(self.velocity, axis=2)
+        result: FloatArray = np.where(self.height <= clearance, speed, np.inf).min(axis=1)
+        return result
+
+    def planted(self, clearance: float, landing: float, leaving: float) -> BoolArray:
+        """(n,) True from landing to leaving, and where a marker is missing."""
+        slowest = self.slowest(clearance)
+        planted = np.zeros(len(slowest), dtype=bool)
+        for first, last in runs(slowest <= leaving):
+            below = np.flatnonzero(slowest[first : last + 1] <= landing)
+            if below.size:
+                planted[first + below[0] : last + 1] = True
+        return planted | np.isnan(self.height).any(axis=1)
+
+    def over(self, first: int, last: int) -> FootMotion:
+        """The same with heights over where the markers are in these frames."""
+        level = np.nanmedian(self.height[first : last + 1], axis=0)
+        return FootMotion(self.height - level, self.velocity, self.still)
+
+
+def foot_motions(feet: Sequence[Markers], loaded: BoolArray) -> list[FootMotion]:
+    """Of the markers of both feet, which stand on loaded plates in these frames (n, 2).
+
+    Heights are above what a foot may stand on: each marker's own lowest place under load, or, where plates stand at
+    several heights, that of the highest of them which it is not below. Velocities are against the ground under the
+    loaded feet: the median of the lowest marker's, zero on a floor, the belt's on a treadmill. A foot that is never
+    loaded takes the other's.
+    """
+    places = [_short_gaps_filled(markers) for markers in feet]
+    moves = [_velocity(markers, place, _SPEED_SPAN_S) for markers, place in zip(feet, places, strict=True)]
+    heights = [_above_lowest(place[..., 1], loaded[:, foot]) for foot, place in enumerate(places)]
+    ground = []
+    for foot, (height, velocity) in enumerate(zip(heights, moves, strict=True)):
+        frames = np.flatnonzero(loaded[:, foot] & np.isfinite(height).any(axis=1))
+        if frames.size:
+            lowest = velocity[frames, np.nanargmin(height[frames], axis=1)]
+            lowest = lowest[np.isfinite(lowest).all(axis=1)]
+            ground += [np.median(lowest, axis=0) * [1, 0, 1]] if len(lowest) else []
+    velocities = ground if len(ground) == 2 else (ground or [np.zeros(3)]) * 2
+    steps = _steps(heights, loaded)
+    result = []
+    for markers, place, height, velocity, of_ground in zip(feet, places, heights, moves, velocities, strict=True):
+        slow = _velocity(markers, place, _STILL_SPAN_S)
+        still = _still(markers.time, slow - of_ground) | _still(markers.time, slow)
+        result.append(FootMotion(_over(steps, height), velocity - of_ground, still))
+    return result
+
+
+def _velocity(markers: Markers, place: FloatArray, span_s: float) -> FloatArray:
+    """(n, m, 3) m/s over this time before and after each frame."""
+    span = max(1, round(span_s * markers.rate_hz))
+    frames = np.arange(len(place))
+    after, before = np.minimum(frames + span, len(frames) - 1), np.maximum(frames - span, 0)
+    elapsed = (markers.time[after] - markers.time[before])[:, None, None]
+    return np.asarray((place[after] - place[before]) / elapsed)
+
+
+def _above_lowest(height: FloatArray, loaded: BoolArray) -> FloatArray:
+    """(n, m) m above each marker's lowest under load; above its lowest of all where it is never seen under load."""
+    stance = height[loaded]
+    if not np.isfinite(stance).any() or not np.isfinite(stance).any(axis=0).all():
+        stance = height
+    result: FloatArray = height - np.nanpercentile(stance, 2, axis=0)
+    return result
+
+
+def _steps(heights: Sequence[FloatArray], loaded: BoolArray) -> list[float]:
+    """Heights (m) of what the loads stand on over the lowest of it, ascending."""
+    lowest = []
+    for foot, height in enumerate(heights):
+        for first, last in runs(loaded[:, foot]):
+            shown = height[first : last + 1][:, np.isfinite(height[first : last + 1]).any(axis=0)]
+            if shown.size:
+                lowest.append(float(np.nanmin(np.nanpercentile(shown, 10, axis=0))))
+    steps = [0.0]
+    for level in sorted(lowest):
+        if level > steps[-1] + _STEP_M:
+            steps.append(level)
+    return steps
+
+
+def _over(steps: Sequence[float], height: FloatArray) -> FloatArray:
+    """Heights over the highest step that they are not below."""
+    below = np.searchsorted(np.array(steps[1:]) - _STEP_M / 2, height, side="right")
+    result: FloatArray = height - np.array(steps)[np.where(np.isnan(height), 0, below)]
+    return result
+
+
+def _still(time: FloatArray, velocity: FloatArray) -> BoolArray:
+    """(n,) True in stretches in which no marker moves."""
+    speed = np.linalg.norm(velocity, axis=2)
+    slow = np.isfinite(speed).any(axis=1) & (np.where(np.isnan(speed), 0.0, speed) <= _STILL_M_S).all(axis=1)
+    still = np.zeros(len(time), dtype=bool)
+    for first, last in runs(slow):
+        still[first : last + 1] = time[last] - time[first] >= _STILL_S
+    return still
+
+
+def _short_gaps_filled(markers: Markers) -> FloatArray:
+    """Positions of the markers seen in at least half the frames, short gaps bridged by a line.
+
+    Only for telling whether a foot is on the ground.
+    """
+    seen = markers.seen
+    kept = np.flatnonzero(seen.mean(axis=0) >= 0.5)
+    if not kept.size:
+        raise MarkerSetError(
+            f"the foot markers {', '.join(markers.labels)} are each seen in less than half of the frames; "
+            "use a trial that shows the feet or give other markers",
+            markers.labels,
+        )
+    positions = markers.positions[:, kept].copy()
+    for column, marker in enumerate(kept):
+        for first, last in runs(~seen[:, marker]):
+            if markers.time[last] - markers.time[first] > _FILLED_GAP_S:
+                continue
+            for axis in range(3):
+                positions[first : last + 1, column, axis] = np.interp(
+                    markers.time[first : last + 1],
+                    markers.time[seen[:, marker]],
+                    markers.positions[seen[:, marker], marker, axis],
+                )
+    return positions

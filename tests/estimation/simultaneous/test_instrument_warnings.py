@@ -1,0 +1,35 @@
+import pytest
+
+from kinertia.estimation.simultaneous.instrument_warnings import instrument_warnings
+
+
+def calibration(*free_nm_kn, gain=0.0):
+    entries = {
+        f"plate {k}: free moment": {"value": value / 1e3, "prior_sd": 0.0007, "sd": 0.002, "unit": "N m/N"}
+        for k, value in enumerate(free_nm_kn, start=1)
+    }
+    return {**entries, "plate 1: gain": {"value": gain, "prior_sd": 0.007, "sd": 0.003, "unit": "1"}}
+
+
+@pytest.mark.parametrize("values", [(5.0, -5.8), (-3.5, 2.9), (4.0, -4.0, 4.0)])
+def test_mirror_images_are_the_body_s(values):
+    (sentence,) = instrument_warnings(calibration(*values))
+    assert "mirror images" in sentence
+    assert "check the instruments" not in sentence
+
+
+@pytest.mark.parametrize("values", [(-2.2, -4.9), (-0.9, -8.0), (6.0, -1.6), (8.0, 0.0, 0.0, 0.0)])
+def test_one_plate_or_one_side_is_the_plates(values):
+    sentences = instrument_warnings(calibration(*values))
+    assert sentences
+    assert all("check the instruments" in sentence for sentence in sentences)
+
+
+def test_all_else_that_is_off_is_still_said():
+    plate, body = instrument_warnings(calibration(5.0, -5.0, gain=0.05))
+    assert plate == "plate 1: gain: +5.0 % (expected within 0.7 %); check the instruments"
+    assert "mirror images" in body
+
+
+def test_nothing_is_said_of_sound_plates():
+    assert instrument_warnings(calibration(1.0, -1.0)) == []
