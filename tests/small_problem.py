@@ -148,7 +148,8 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     errors = whitened(trial.markers - positions, *trial.marker_process)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
     *floor, angle = static[layout.plates][-3:]
-    values = dict(zip(problem.plates, static[layout.plates][:-3].reshape(-1, 4) + [*floor, 0.0, 0.0], strict=True))
+    of_plates = np.add(static[layout.plates][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
+    values = dict(zip(problem.plates, of_plates, strict=True))
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
     x, z, gain, free_moment = np.moveaxis(here, -1, 0)
     middle = trial.ground.middles[trial.ground.carrier]

@@ -48,7 +48,9 @@ def trial(person):
 def calibration(trial):
     plates, clock = {name: SoundOrFaulty.certain(sd) for name, sd in PLATES.items()}, SoundOrFaulty.certain(0.005)
     return CalibrationPrior(
-        {}, np.full(len(trial.skeleton.markers), 0.005), InstrumentPrior(plates, dict.fromkeys(FLOOR_UNKNOWNS, EXACT), clock)
+        {},
+        np.full(len(trial.skeleton.markers), 0.005),
+        InstrumentPrior(plates, dict.fromkeys(FLOOR_UNKNOWNS, EXACT), clock),
     )
 
 
