@@ -35,8 +35,9 @@ def trouble_of(walk):
     """What is said of the forces of a walk."""
     if trouble := loads_trouble(walk.plates):
         return trouble
-    trial, pelvis = sorted_by_foot(walk), choose_marker_set(walk.markers.labels).segments["pelvis"]
-    return direction_trouble(trial, pelvis) or offset_trouble(trial, pelvis)
+    trial, segments = sorted_by_foot(walk), choose_marker_set(walk.markers.labels).segments
+    owners = {label: name for name, labels in segments.items() for label in labels}
+    return direction_trouble(trial, owners) or offset_trouble(trial, owners)
 
 
 def sorted_by_foot(walk):

@@ -103,11 +103,10 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
         trial: what became of it, in the laboratory's axes.
         marker_set: which marker is on which segment.
     """
-    pelvis = marker_set.segments.get("pelvis", ())
-    if trouble := direction_trouble(trial, pelvis):
-        return _refused(trouble)
-    offset = offset_trouble(trial, pelvis)
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    if trouble := direction_trouble(trial, owners):
+        return _refused(trouble)
+    offset = offset_trouble(trial, owners)
     return _told([*([offset] if offset else []), *gain_doubts(recording, trial, owners)])
 
 
