@@ -99,6 +99,9 @@ def test_judgement():
     known = [Finding("caution", "2.0 % off")]
     assert judged(mistake, known, [Finding("caution", "3.5 % off")]) is None
     assert judged(mistake, known, [Finding("fail", "3.5 % off")]) == ("warned", "3.5 % off")
+    two, one = (Finding("caution", f"plate 1: {rest}; check it") for rest in ("x: 9 mm, gain: 4 %", "gain: 5 %"))
+    assert judged(mistake, [two], [one]) is None
+    assert judged(mistake, [one], [two]) == ("warned", two.sentence)
     cautioned, failed = Finding("caution", "the zero is wrong"), Finding("fail", "no frame")
     assert judged(mistake, known, [cautioned]) == ("named", cautioned.sentence)
     assert judged(mistake, known, [cautioned, failed]) == ("warned", failed.sentence)
@@ -139,9 +142,9 @@ def test_page(outcomes, tmp_path):
     assert "| b | **silent** | – |" in page
     assert "Of 5 mistakes made, 2 are named (40 %), 1 warned of with another cause, 1 harmless, and 1 do silent" in page
     assert "| **named / possible** | **1 / 3** | **1 / 2** |" in page
-    assert "| nothing: the walk as it is | nothing said | 1 by check; 1 by fit |" in page
-    assert "Of 2 sound walks 2 are refused, and of 1 synthetic people in sound laboratories 0" in page
-    assert "- one: nothing\n- other: mass (check); plate (fit)\n- synthetic laboratory 1: nothing" in page
+    assert "| none: the walk as it is | nothing said | 1 by check; 1 by fit |" in page
+    assert "Of 2 sound walks 2 are refused. Of 1 other synthetic people in sound laboratories 0 are refused" in page
+    assert "- one: nothing\n- other: mass (check); plate (fit)\n- laboratory 1: nothing" in page
     assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
     content = json.loads((save_faults(*outcomes, tmp_path / "out") / "faults.json").read_text())
     assert content["outcomes"][0]["change_nm"] is None

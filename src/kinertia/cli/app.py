@@ -79,6 +79,7 @@ _MODULES = {
     "plan": "plan",
     "instruments": "instruments",
     "cohort": "cohort",
+    "population": "population",
     "study": "study",
     "warm-up": "warm_up",
 }

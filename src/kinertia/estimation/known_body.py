@@ -14,20 +14,27 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.errors import PriorError
+from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared
-from kinertia.estimation.prior import BspPrior, with_symmetry
+from kinertia.estimation.prior import BspPrior, literature_prior, with_symmetry
 from kinertia.io.bsp_file import BspTable
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.settings import KnownSegment, PriorSettings
 
 _UNLIKE_SD = 3.0
 """Deviations from the tables beyond which the user is asked to look again."""
+_PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
+"""Relative deviation of a prosthesis' mass, and the factor on the tables' other deviations."""
 _KEPT_SHARE = 1e-3
 """Deviation of a mass that is kept, over its prior's."""
 
 
 def with_known_body(
-    ready: Prepared, settings: PriorSettings, earlier: BspTable | None, segments: Mapping[str, KnownSegment]
+    ready: Prepared,
+    settings: PriorSettings,
+    earlier: BspTable | None,
+    segments: Mapping[str, KnownSegment],
+    group: LearntPrior | None = None,
 ) -> Prepared:
     """A prepared person of whom more is known than mass, height and sex.
 
@@ -36,17 +43,26 @@ def with_known_body(
         settings: of the prior.
         earlier: an estimate with deviations, in place of the literature's.
         segments: measured parameters by segment.
+        group: what was learnt of the person's group, in place of the literature's.
 
     Raises:
-        PriorError: a segment that the model has not, or an earlier estimate of another model.
+        PriorError: both an earlier estimate and a group, a segment that the model has not, or either of another model.
     """
     prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
+    if group is not None:
+        if earlier is not None:
+            raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
+        prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
+        notes.append(f"prior: learnt from {group.people} people in place of the literature's")
     if earlier is not None:
         prior = _from_earlier(prior, earlier)
         notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")
     if settings.sides_correlation is not None:
         covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
         prior = replace(prior, covariance=covariance)
+    for name in (name for name, known in segments.items() if known.prosthesis):
+        prior = with_prosthesis(prior, name)
+        notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
     measured = _measured(prior, segments)
     for (row, column), (value, sd) in measured.items():
         k = 10 * row + column
@@ -86,16 +102,37 @@ def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
     )
 
 
+def with_prosthesis(prior: BspPrior, segment: str) -> BspPrior:
+    """The prior of a segment that is none of the body's: wide, and independent of all others.
+
+    The side of a below-knee prosthesis is often some 2 kg lighter than the other (Smith & Martin 2011, J Prosthet
+    Orthot 23:114), which is 40 % of shank and foot; its centre of mass is further up by an amount for which there are
+    no numbers.
+    """
+    row = _row(prior, segment)
+    rows = slice(10 * row, 10 * row + 10)
+    factor = np.full(10, _PROSTHESIS_SPREAD)
+    factor[0] = max(_PROSTHESIS_MASS_SD * prior.mean.mass_kg[row] / prior.sd[row, 0], 1.0)
+    covariance = prior.covariance.copy()
+    own = covariance[rows, rows] * np.outer(factor, factor)
+    covariance[rows, :] = covariance[:, rows] = 0.0
+    covariance[rows, rows] = own
+    return replace(prior, covariance=covariance)
+
+
+def _row(prior: BspPrior, segment: str) -> int:
+    if segment not in prior.mean.segments:
+        raise PriorError(f"[segment.{segment}]: the model has no such segment; it has {', '.join(prior.mean.segments)}")
+    return prior.mean.segments.index(segment)
+
+
 def _measured(prior: BspPrior, segments: Mapping[str, KnownSegment]) -> dict[tuple[int, int], tuple[float, float]]:
     """Value and deviation, SI, by row and column of the table."""
     result = {}
     for name, known in segments.items():
-        if name not in prior.mean.segments:
-            raise PriorError(
-                f"[segment.{name}]: the model has no such segment; it has {', '.join(prior.mean.segments)}"
-            )
+        row = _row(prior, name)
         for parameter, (value, sd) in known.parameters().items():
-            result[prior.mean.segments.index(name), PARAMETERS.index(parameter)] = value, sd
+            result[row, PARAMETERS.index(parameter)] = value, sd
     return result
 
 

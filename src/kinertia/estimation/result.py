@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Skeleton
@@ -252,6 +254,13 @@ class Fit:
         """Body mass as stated."""
         return known(self.subject.mass_kg)
 
+    @property
+    def attached_kg(self) -> float:
+        """Mass, as estimated, of what the person wore or carried: of segments that are none of the model's."""
+        own = SEGMENTS if self.file is None else self.file.bsp.segments
+        rows = zip(self.estimate.segments, self.estimate.mass_kg.tolist(), strict=True)
+        return float(sum(mass for segment, mass in rows if segment not in own))
+
     def save(self, folder: str | Path) -> Path:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
         return display.save(self, folder)
@@ -279,6 +288,19 @@ class Fit:
 
         names = (self.bsp["segment"] + "." + self.bsp["parameter"]).tolist()
         return pd.DataFrame(self.posterior.covariance, index=names, columns=names)
+
+    @property
+    def asymmetry(self) -> pd.DataFrame | None:
+        """Right minus left of every pair of segments, with its deviation and whether it differs; None after two-level.
+
+        Centres of mass and products of inertia are compared with the mirror image. `differs` allows for the ten
+        parameters of a pair: by chance in 5 % of pairs at most.
+        """
+        if self.posterior is None:
+            return None
+        import pandas as pd
+
+        return pd.DataFrame(asymmetry_columns(asymmetries(self.estimate, self.posterior.covariance)))
 
     @property
     def calibration(self) -> pd.DataFrame | None:

@@ -61,7 +61,9 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     angle, strength = _turn(both)
     agreements = _agreement(both)
     against = {axis: one.correlation for axis, one in agreements.items() if one.correlation < _OPPOSED}
-    fitting = any(one.correlation > _CLEAR for one in agreements.values())
+    # beside an axis that is opposed, one that goes with the markers says that they are not turned
+    enough = -_OPPOSED if against else _CLEAR
+    fitting = any(one.correlation > enough for one in agreements.values())
     evidence = ", ".join(f"correlation {value:.2f} along {axis}" for axis, value in against.items())
     if len(against) == len(_HORIZONTAL):
         cause = "the forces are turned by 180 degrees about the vertical"

@@ -227,11 +227,11 @@ def judged(
 ) -> tuple[Literal["named", "warned"], str] | None:
     """Whether the first and worst of what is new names the mistake; None where nothing is new.
 
-    New is what is not said of the sound files in the same words, whatever the numbers. Where nothing is, other numbers
-    in words that name the mistake do.
+    New is what is not said of the sound files in the same words, clause by clause, whatever the numbers. Where nothing
+    is, other numbers in words that name the mistake do.
     """
-    before = {(one.level, _words(one.sentence)) for one in sound}
-    new = [one for one in findings if (one.level, _words(one.sentence)) not in before]
+    before = {(one.level, clause) for one in sound for clause in _clauses(one.sentence)}
+    new = [one for one in findings if any((one.level, clause) not in before for clause in _clauses(one.sentence))]
     worst = [one for one in new if one.level == "fail"] or new
     if worst:
         named = re.search(mistake.named, worst[0].sentence) is not None
@@ -240,8 +240,9 @@ def judged(
     return ("named", again[0].sentence) if again else None
 
 
-def _words(sentence: str) -> str:
-    return re.sub(r"[-+]?\d[\d.]*", "#", sentence)
+def _clauses(sentence: str) -> list[str]:
+    words = re.sub(r"[-+]?\d[\d.]*", "#", sentence)
+    return re.split(r"[,;:] ", words)
 
 
 def moments_of(fit: Fit) -> JointMoments:
