@@ -37,8 +37,8 @@ Sentences and changes of the joint moments are in `faults.json`.
 
 ## What cannot be named
 
-- The other sex: it changes the literature's values by less than people of one sex differ. Joint moments change by 0.3 to
-  0.7 of their deviations, in one of seven walks by 1.4.
+- The other sex: it changes the literature's values by less than people of one sex differ. Joint moments change by 0.3
+  to 0.7 of their deviations, in one of seven walks by 1.4.
 - Turned plates, where markers are noisy: they show in the direction in which they push the body, to a third of a degree
   in most walks, but to 1.6 degrees in the Gait 2354 walk (60 frames a second), where 3 degrees may be chance and change
   moments by twice their deviations. The path of the centre of pressure under the feet tells less: on sound walks, right
