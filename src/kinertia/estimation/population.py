@@ -68,8 +68,8 @@ def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
     notes, warnings = (sentences, []) if stated is not None else ([], sentences)
     short = subject.age_years is None and stated is None and (subject.height_m or _SHORT_M) < _SHORT_M
     warning = (
-        f"height {subject.height_m:g} m: the tables are of adults; give age_years (or population) under [subject] if "
-        "this is a child"
+        f"height {subject.height_m or _SHORT_M:g} m: the tables are of adults; give age_years (or population) under "
+        "[subject] if this is a child"
     )
     return PopulationPrior(prior, tuple(notes), (*warnings, *((warning,) if short else ())))
 
