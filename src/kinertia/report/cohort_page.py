@@ -162,7 +162,7 @@ def _mean_curves(folder: Path) -> Iterator[Part]:
         for quantity, part in frame.groupby("quantity"):
             at, value = part["percent"].to_numpy(), part["value"].to_numpy()
             np.add.at(sums[quantity], at, np.column_stack([np.ones_like(value), value, value**2]))
-    shown = {quantity: total for quantity, total in sums.items() if total[:, 0].all()}
+    shown = {quantity: total for quantity, total in sums.items() if total[:, 0].any()}
     if shown:
         yield Part(
             "Mean curves",
@@ -172,9 +172,10 @@ def _mean_curves(folder: Path) -> Iterator[Part]:
 
 
 def _curves(sums: Mapping[str, np.ndarray]) -> Figure:
-    percent = list(range(101))
     panels = []
-    for quantity, total in sums.items():
+    for quantity, every in sums.items():
+        measured = np.flatnonzero(every[:, 0])
+        percent, total = measured.tolist(), every[measured]
         mean = total[:, 1] / total[:, 0]
         sd = np.sqrt(np.maximum(total[:, 2] / total[:, 0] - mean**2, 0.0))
         band = {
