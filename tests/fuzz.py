@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 import traceback
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,8 @@ from kinertia.io.sto import TimeTable, read_table, write_table
 from kinertia.io.subject_file import read_subject
 from kinertia.io.trc import write_trc
 from kinertia.synthetic.walk import walking_subject
-from kinertia.trial.data import Markers
+from kinertia.trial.data import Markers, Recording
+from lab_files import lab_walk, write_nexus, write_qtm
 
 SECONDS, BYTES = 10, 1_000_000_000
 TOKENS = [
@@ -129,7 +131,20 @@ def write_files(folder: Path) -> None:
     corners = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)
     analogs = np.tile([-30.0, 20.0, -600.0, 100.0, 200.0, 5.0], (48, 1))
     screen = {"POINT": {"Y_SCREEN": ["+Z"]}, "FORCE_PLATFORM": plate_parameters(corners)}
+    lab = few_frames(lab_walk())
+    write_qtm(folder / "walk.tsv", lab)
+    write_nexus(folder / "walk.csv", lab)
     write_c3d(folder / "walk.c3d", 1000 * places[..., [0, 2, 1]], list(labels), analogs, screen)
+
+
+def few_frames(recording: Recording) -> Recording:
+    """Twelve frames out of the middle, with their samples of the plates."""
+    markers, plates = recording.markers, recording.plates
+    ratio = (len(plates.time) - 1) // (len(markers.time) - 1)
+    frames, samples = slice(60, 72), slice(60 * ratio, 71 * ratio + 1)
+    loads = replace(plates, time=plates.time[samples], force=plates.force[samples], moment=plates.moment[samples])
+    seen = Markers(markers.time[frames], markers.labels, markers.positions[frames])
+    return replace(recording, markers=seen, plates=replace(loads, idle=None))
 
 
 READERS = {
@@ -141,6 +156,9 @@ READERS = {
     "markers.toml": read_marker_set,
     "model.osim": read_osim,
     "walk.c3d": read_recording,
+    "walk.tsv": read_recording,
+    "walk_f_1.tsv": lambda path: read_recording(path.with_name("walk.tsv")),
+    "walk.csv": read_recording,
 }
 
 
@@ -211,7 +229,7 @@ def by_command(name: str) -> list[str]:
         return ["check", "walk.trc", "--markers", name]
     if name in ("walk.mot", "loads.xml"):
         return ["check", "walk.trc", "walk.mot", "--loads", "loads.xml", "--mass", "70"]
-    return ["check", name, "-o", "out"]
+    return ["check", name.replace("_f_1", ""), "-o", "out"]
 
 
 def run_command(name: str) -> None:

@@ -29,7 +29,7 @@ from pinocchio_model import axis_forces, pin, pinocchio_model
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
 PLATES = {name: SoundOrFaulty.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
-FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3)}
+FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3), "turn": SoundOrFaulty.certain(0.03)}
 CLOCK = SoundOrFaulty.certain(0.01)
 INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK)
 SWITCH_S = 0.1
@@ -82,7 +82,8 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
     impact = rng.normal(0.0, 5.0, wrench.shape)
     turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
     reactions = GroundReactions(fine, wrench, at_samples, impact, None)
-    return FootPlates(loads, reactions, ("first", "second", "third"), at_frames, turn)
+    middles = np.array([[0.2, 0.0, 0.1], [0.9, 0.0, -0.2], [1.5, 0.0, 0.3]])
+    return FootPlates(loads, reactions, ("first", "second", "third"), at_frames, turn, middles)
 
 
 def small_problem(n_trials: int = 1) -> MapProblem:
@@ -146,10 +147,16 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
             positions[:, m] += skin.values[:, pattern, None] * (pose.rotation[:, segment] @ along)
     errors = whitened(trial.markers - positions, *trial.marker_process)
     loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
-    floor = [*static[layout.plates][-2:], 0.0, 0.0]
-    values = dict(zip(problem.plates, static[layout.plates][:-2].reshape(-1, 4) + floor, strict=True))
+    *floor, angle = static[layout.plates][-3:]
+    of_plates = np.add(static[layout.plates][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
+    values = dict(zip(problem.plates, of_plates, strict=True))
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
     x, z, gain, free_moment = np.moveaxis(here, -1, 0)
+    middle = trial.ground.middles[trial.ground.carrier]
+    back = Rotation.from_rotvec([0.0, -angle, 0.0]).as_matrix()
+    about = (loads[..., 3:] - np.cross(middle, loads[..., :3])) @ back.T
+    loads[..., :3] = loads[..., :3] @ back.T
+    loads[..., 3:] = about + np.cross(middle, loads[..., :3])
     offset = np.stack([x, np.zeros_like(x), z], axis=-1) @ trial.ground.turn.T
     loads[..., 3:] += np.cross(offset, loads[..., :3])
     loads[..., 4] += free_moment * loads[..., 1]

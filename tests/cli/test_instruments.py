@@ -72,8 +72,8 @@ def test_what_the_laboratory_states_is_used_and_checked(measured_walk, tmp_path)
 
 def test_people_who_contradict_each_other_are_named():
     def person(name, late_s):
-        information = np.diag([1e4] * 6 + [1e8])
-        right = tuple((information @ [*[0.0] * 6, late_s]).tolist())
+        information = np.diag([1e4] * 7 + [1e8])
+        right = tuple((information @ [*[0.0] * 7, late_s]).tolist())
         rows = tuple(map(tuple, information.tolist()))
         return PersonInstruments(name=name, files=(name,), plates=("plate 1",), information=rows, right=right)
 

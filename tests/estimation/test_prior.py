@@ -12,7 +12,7 @@ from kinertia.estimation.prior import (
     SECOND_MOMENT_SD,
     SIDES_CORRELATION,
     BspPrior,
-    _inertia_covariance,
+    inertia_covariance,
     literature_prior,
     with_symmetry,
 )
@@ -127,9 +127,9 @@ def test_inertia_varies_alike_in_all_axes(prior):
         for i, j in places
     ]
     moved = np.array([[(turn @ unit @ turn.T)[place] for unit in units] for place in places])
-    expected = moved @ _inertia_covariance(bsp) @ moved.T
+    expected = moved @ inertia_covariance(bsp) @ moved.T
     scale = np.sqrt(np.einsum("sii->si", expected))
-    gap = (_inertia_covariance(turned) - expected) / (scale[:, :, None] * scale[:, None])
+    gap = (inertia_covariance(turned) - expected) / (scale[:, :, None] * scale[:, None])
     assert np.abs(gap).max() < 1e-9
 
 

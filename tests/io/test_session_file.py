@@ -3,9 +3,9 @@ import pytest
 from kinertia.errors import FileError
 from kinertia.io.session_file import PersonInstruments, read_session, session_text
 
-ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 1.0 / 3.0)
+ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 7.0, 1.0 / 3.0)
 PERSON = PersonInstruments(
-    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 7, right=ROW
+    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 8, right=ROW
 )
 FOUND = {
     "plate 1": {"x": (0.0182, 0.0011, "m"), "free moment": (0.001, 0.0002, "N m/N")},
@@ -33,7 +33,7 @@ def test_people_read_millimetres_and_milliseconds(written):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 11 rows"),
+        ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 12 rows"),
         ("right = [0.1", 'right = ["0.1"', "not what kinertia instruments wrote"),
         ("[[person]]", "[[people]]", "not what kinertia instruments wrote"),
         ("kinertia = ", "x = ", "not what kinertia instruments wrote"),

@@ -1,9 +1,12 @@
 """A measured walk, written in the text formats of Qualisys and Vicon, is the walk of its C3D file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import lab_files
+from kinertia.errors import FileError
 from kinertia.io.recording import read_recording
 
 
@@ -27,3 +30,28 @@ def test_a_measured_walk_comes_back(shared_data, tmp_path, monkeypatch, kind):
     np.testing.assert_allclose(recording.markers.positions, walk.markers.positions, atol=1e-6)
     np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-5)
     np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new", "words"),
+    [
+        ("tsv", "MARKER_NAMES\tHead", "MARKER_NAMES\tL.Toe", "L.Toe more than once"),
+        ("tsv", "FREQUENCY\t100", "FREQUENCY\t0", "FREQUENCY is 0"),
+        ("tsv", "NO_OF_FRAMES\t1", "NO_OF_FRAMES\tnan", "NO_OF_FRAMES is 'nan"),
+        ("csv", "\n100\n", "\n1..0\n", "the rate of the section is '1..0'"),
+        ("csv", "\n1,0,", "\n1,-.-,", "'-.-' is not a number"),
+    ],
+)
+def test_broken_exports_are_refused(tmp_path, kind, old, new, words):
+    recording = lab_files.lab_walk()
+    markers = recording.markers
+    order = [len(markers.labels) - 1, *range(len(markers.labels) - 1)]
+    labels = tuple(markers.labels[k] for k in order)
+    recording = replace(recording, markers=replace(markers, labels=labels, positions=markers.positions[:, order]))
+    path = tmp_path / f"walk.{kind}"
+    (lab_files.write_qtm if kind == "tsv" else lab_files.write_nexus)(path, recording)
+    text = path.read_text(encoding="utf-8")
+    assert old in text, text[:500]
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(FileError, match=words):
+        read_recording(path)

@@ -16,6 +16,7 @@ SOUND = [
     "pig_c3d/subject_a_walk.c3d",
     "pig_c3d/subject_b_static.c3d",
     "pig_c3d/subject_b_walk.c3d",
+    "field/rajagopal_run/motion_capture_run.trc",
 ]
 
 

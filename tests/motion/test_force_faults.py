@@ -1,11 +1,12 @@
 """Forces in wrong axes, with wrong signs, units and zeros are named; sound ones never are."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
@@ -31,17 +32,19 @@ def with_force(walk, change, torque=1.0):
     return replace(walk, plates=replace(plates, force=force, moment=np.cross(point, force) + free))
 
 
-def trouble_of(walk):
+def trouble_of(walk, marker_set=None):
     """What is said of the forces of a walk."""
     if trouble := loads_trouble(walk.plates):
         return trouble
-    trial, pelvis = sorted_by_foot(walk), choose_marker_set(walk.markers.labels).segments["pelvis"]
-    return direction_trouble(trial, pelvis) or offset_trouble(trial, pelvis)
+    marker_set = marker_set or choose_marker_set(walk.markers.labels)
+    trial = sorted_by_foot(walk, marker_set)
+    owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    return direction_trouble(trial, owners) or offset_trouble(trial, owners)
 
 
-def sorted_by_foot(walk):
+def sorted_by_foot(walk, marker_set=None):
     present = set(walk.markers.labels)
-    feet = choose_marker_set(walk.markers.labels).foot_labels()
+    feet = (marker_set or choose_marker_set(walk.markers.labels)).foot_labels()
     return build_trial(walk, {side: [one for one in labels if one in present] for side, labels in feet.items()})
 
 
@@ -111,3 +114,26 @@ def test_a_file_at_another_rate(walk, factor, words):
         pytest.skip("too short at twice the rate")
     assert words in trouble
     assert float(trouble.partition("a factor of about ")[2].split(";")[0]) == pytest.approx(2.0, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("signs", "words"),
+    [
+        ([1, 1, 1], ""),
+        ([-1, 1, 1], "the horizontal force along X has the wrong sign"),
+        ([1, 1, -1], "the horizontal force along Z has the wrong sign"),
+        ([-1, 1, -1], "the forces are turned by 180 degrees about the vertical"),
+    ],
+)
+def test_signs_in_a_run(measured_recording, signs, words):
+    """Limbs swing so much that the pelvis does not go as the centre of mass."""
+    run = measured_recording("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
+    trouble = trouble_of(with_force(run, lambda force: force * signs))
+    assert trouble.startswith(words)
+    assert bool(trouble) == bool(words)
+
+
+def test_squats_are_not_doubted(measured_recording):
+    """The markers' centre goes back where the centre of mass does not: the trunk bends."""
+    squats = measured_recording("subject4/squats1.trc", "subject4/squats1_grf.mot")
+    assert trouble_of(squats, read_marker_set(Path(__file__).parents[1] / "subject4.toml")) == ""

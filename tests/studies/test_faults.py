@@ -21,6 +21,8 @@ from kinertia.studies.faults import (
     judged,
     outcome_of,
     run_faults,
+    run_sound,
+    sound_laboratories,
     synthetic_walk,
 )
 from kinertia.synthetic.measured_person import read_person, write_person
@@ -35,8 +37,6 @@ NOT_POSSIBLE = {
 }
 """Plug-in Gait has no inner markers, and the first foot has left when the second has landed on its plate."""
 LEFT_TO_THE_FIT = {
-    "computed joint centres listed as markers",
-    "floor of the cameras 30 mm too low",
     "centres of pressure 50 mm off along X, both plates",
     "plates turned by 3 degrees about the vertical",
     "the other sex",
@@ -99,6 +99,9 @@ def test_judgement():
     known = [Finding("caution", "2.0 % off")]
     assert judged(mistake, known, [Finding("caution", "3.5 % off")]) is None
     assert judged(mistake, known, [Finding("fail", "3.5 % off")]) == ("warned", "3.5 % off")
+    two, one = (Finding("caution", f"plate 1: {rest}; check it") for rest in ("x: 9 mm, gain: 4 %", "gain: 5 %"))
+    assert judged(mistake, [two], [one]) is None
+    assert judged(mistake, [one], [two]) == ("warned", two.sentence)
     cautioned, failed = Finding("caution", "the zero is wrong"), Finding("fail", "no frame")
     assert judged(mistake, known, [cautioned]) == ("named", cautioned.sentence)
     assert judged(mistake, known, [cautioned, failed]) == ("warned", failed.sentence)
@@ -129,7 +132,8 @@ def outcomes():
         FaultOutcome("one", "c", "harmless", "", "", 0.5, 1.0),
         FaultOutcome("other", "c", "warned", "other", "check"),
     ]
-    return walks, of_mistakes
+    laboratories = [SoundWalk("laboratory 1", None, (), JointMoments(None, (), None, None))]
+    return walks, of_mistakes, laboratories
 
 
 def test_page(outcomes, tmp_path):
@@ -138,7 +142,9 @@ def test_page(outcomes, tmp_path):
     assert "| b | **silent** | – |" in page
     assert "Of 5 mistakes made, 2 are named (40 %), 1 warned of with another cause, 1 harmless, and 1 do silent" in page
     assert "| **named / possible** | **1 / 3** | **1 / 2** |" in page
-    assert "- one: nothing\n- other: mass" in page
+    assert "| none: the walk as it is | nothing said | 1 by check; 1 by fit |" in page
+    assert "Of 2 sound walks 2 are refused. Of 1 other synthetic people in sound laboratories 0 are refused" in page
+    assert "- one: nothing\n- other: mass (check); plate (fit)\n- laboratory 1: nothing" in page
     assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
     content = json.loads((save_faults(*outcomes, tmp_path / "out") / "faults.json").read_text())
     assert content["outcomes"][0]["change_nm"] is None
@@ -147,13 +153,25 @@ def test_page(outcomes, tmp_path):
 
 def test_command(outcomes, tmp_path, monkeypatch):
     asked = {}
-    monkeypatch.setattr("kinertia.cli.study.run_faults", lambda walks, **_: asked.update(walks) or outcomes)
+    monkeypatch.setattr("kinertia.cli.study.run_faults", lambda walks, **_: asked.update(walks) or outcomes[:2])
+    monkeypatch.setattr("kinertia.cli.study.sound_laboratories", lambda folder, count: {})
+    monkeypatch.setattr("kinertia.cli.study.run_sound", lambda people, *_: outcomes[2])
     outcome = run("study", "faults", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     assert list(asked) == ["synthetic walk", "Plug-in Gait, subject A"]
     assert "silent: one: b" in outcome.out
     assert re.search(r"named\s+1\s+1", outcome.out)
     assert (tmp_path / "out" / "faults.md").is_file()
+
+
+@pytest.mark.slow
+@in_one_process()
+def test_sound_laboratories_are_not_doubted(tmp_path):
+    """Two people whose bodies, markers and plates differ as those of sound laboratories do."""
+    people = run_sound(sound_laboratories(tmp_path, 2))
+    assert [one.findings for one in people] == [(), ()]
+    moments = [one.moments.moment_nm for one in people]
+    assert moments[0].shape != moments[1].shape or np.abs(moments[0] - moments[1]).max() > 1.0
 
 
 @pytest.mark.slow

@@ -38,13 +38,14 @@ from kinertia.report.table1 import save_table1, table1_rows, table1_summary
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.table1_variants import save_variants, variants_frame, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
-from kinertia.studies.faults import run_faults, synthetic_walk
+from kinertia.studies.faults import run_faults, run_sound, sound_laboratories, synthetic_walk
 from kinertia.studies.populations import run_populations
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.studies.table1_variants import run_variants
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
+SOUND_LABORATORIES = 10
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
 
@@ -244,7 +245,8 @@ def faults(
     Swapped labels, wrong axes, units, clocks and zeros, another person's static
     trial and the like are made in the files of sound walks: a measured and a
     synthetic one that come with Kinertia, and yours. Each goes to kinertia
-    check, and to kinertia fit where that has no doubts.
+    check, and to kinertia fit where that has no doubts. What is said of sound
+    walks, and of ten synthetic people in sound laboratories, is counted, too.
 
     [bold]Examples[/]
 
@@ -260,9 +262,11 @@ def faults(
             name = wanted.subject.name
             sources[name if name not in sources else f"{name} ({len(sources)})"] = wanted
         sound, outcomes = run_faults(sources, workers=workers, progress=lambda share: progress("mistakes", share))
-    save_faults(sound, outcomes, output)
+        people = sound_laboratories(Path(folder), SOUND_LABORATORIES)
+        laboratories = run_sound(people, workers, lambda share: progress("sound laboratories", share))
+    save_faults(sound, outcomes, laboratories, output)
     if as_json:
-        print_json(faults_summary(sound, outcomes))
+        print_json(faults_summary(sound, outcomes, laboratories))
         return
     shown = plain_table("", *(one.name for one in sound))
     for kind in counts(()):
@@ -271,6 +275,9 @@ def faults(
     for one in outcomes:
         if one.outcome in ("silent", "warned"):
             out.print(f"{one.outcome}: {one.walk}: {one.mistake}" + (f": {one.said}" if one.said else ""))
+    for walk in laboratories:
+        for finding in walk.findings:
+            out.print(f"sound {walk.name}: {finding.by}: {finding.sentence}")
     out.print(f"results in {output}: faults.html, faults.md, faults.json", soft_wrap=True)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from kinertia.errors import TrialError
 from kinertia.model.body_sides import sides_trouble
+from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
@@ -86,7 +87,8 @@ def trial_doubts(
         return _refused(trouble)
     # a stretch that was written by a computer often ends with a jump
     straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
-    sentences = [*straight, *jump_doubts(own), *session]
+    computed = [] if marker_set is None else computed_doubts(own, marker_set)
+    sentences = [*straight, *jump_doubts(own), *computed, *session]
     if recording.plates is not None:
         sentences += loads_doubts(recording.plates)
         sentences += [] if feet is None else load_places_doubts(recording, feet)
@@ -101,11 +103,10 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
         trial: what became of it, in the laboratory's axes.
         marker_set: which marker is on which segment.
     """
-    pelvis = marker_set.segments.get("pelvis", ())
-    if trouble := direction_trouble(trial, pelvis):
-        return _refused(trouble)
-    offset = offset_trouble(trial, pelvis)
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    if trouble := direction_trouble(trial, owners):
+        return _refused(trouble)
+    offset = offset_trouble(trial, owners)
     return _told([*([offset] if offset else []), *gain_doubts(recording, trial, owners)])
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from kinertia.errors import TrialError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
-from kinertia.motion.markers_centre import centre_height, owners_of
+from kinertia.motion.markers_centre import markers_centre, owners_of
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
 from kinertia.trial.data import FloatArray, Trial, runs
 
@@ -123,9 +123,10 @@ def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
     """
     start, end = trial.windows()[0]
     around, time = trial.markers.cut(start - _AROUND_S, end + _AROUND_S), trial.markers.cut(start, end).time
-    height = centre_height(owners_of(skeleton), around) if len(time) >= _FEWEST_FRAMES else None
-    if height is None:
+    place = markers_centre(owners_of(skeleton), around) if len(time) >= _FEWEST_FRAMES else None
+    if place is None:
         return None
+    height = place[:, 1]
     loads = trial.loads
     inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
     force = loads.force[:, :, 1].sum(axis=1)

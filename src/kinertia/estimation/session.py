@@ -13,7 +13,7 @@ from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.io.session_file import PersonInstruments
 from kinertia.settings import Instruments
@@ -88,7 +88,7 @@ def _values(people: Sequence[PersonInstruments], stated: Instruments) -> Instrum
     covariance = np.linalg.inv(shown.information + after.precision)
     mean = covariance @ (shown.right + after.pull)
     # plate and floor together are what a foot stands on
-    to_plates, each = plates_with_floor(len(plates)), len(PLATE_UNKNOWNS)
+    to_plates, each = plates_with_floor(len(plates)), len(PLATE_ERRORS)
     values = to_plates @ mean[:-1]
     sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
     units = list(PLATE_UNKNOWNS.items())
@@ -96,6 +96,7 @@ def _values(people: Sequence[PersonInstruments], stated: Instruments) -> Instrum
         name: {unknown: (float(values[i + j]), float(sd[i + j]), unit) for j, (unknown, unit) in enumerate(units)}
         for i, name in zip(range(0, len(values), each), plates, strict=True)
     }
+    by_instrument["plates"] = {"turned about the vertical": (float(values[-1]), float(sd[-1]), "rad")}
     by_instrument["clock"] = {"late": (float(mean[-1]), float(np.sqrt(covariance[-1, -1])), "s")}
     return by_instrument
 

@@ -41,7 +41,9 @@ class PlateMoments(NamedTuple):
     def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> PlateMoments:
         """From force (k, 3) N, moment (k, 3) N m about an unknown point, and centre of pressure (k, 3) m."""
         at = np.cross(np.nan_to_num(point), force)
-        loaded = (np.abs(force[:, 2]) > LOAD_THRESHOLD_N) & np.isfinite(point).all(axis=1)
+        with np.errstate(over="ignore"):
+            known = np.isfinite(np.square(np.hstack([point, force, moment, at]))).all(axis=1)
+        loaded = known & (np.abs(force[:, 2]) > LOAD_THRESHOLD_N)
         if loaded.sum() < _FEWEST:
             return cls(at, float("inf"))
         rest, f = moment[loaded] - at[loaded], force[loaded]

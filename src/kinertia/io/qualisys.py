@@ -25,6 +25,7 @@ from kinertia.trial.data import FloatArray, Markers, Recording
 
 _MM = 1e-3
 _CORNERS = ("POSX_POSY", "NEGX_POSY", "NEGX_NEGY", "POSX_NEGY")
+_FASTEST_HZ = 1e6
 _PLATE = re.compile(r"_f(_\d+)?$", re.IGNORECASE)
 _COLUMNS = [f"{what}_{axis}" for what in ("Force", "Moment", "COP") for axis in "XYZ"]
 
@@ -103,7 +104,16 @@ def _number(path: Path, header: dict[str, list[str]], name: str) -> float:
     if not _is_number(value):
         problem = f"{name} is '{value}'" if name in header else f"its header has no {name}"
         raise FileError(path, f"{problem}; expected a number, as Qualisys Track Manager writes it with a TSV header")
+    if not np.isfinite(float(value)):
+        raise FileError(path, f"{name} is '{value}'; expected a finite number")
     return float(value)
+
+
+def _rate(path: Path, header: dict[str, list[str]]) -> float:
+    rate_hz = _number(path, header, "FREQUENCY")
+    if not 0.0 < rate_hz < _FASTEST_HZ:
+        raise FileError(path, f"FREQUENCY is {rate_hz:g}; expected frames or samples per second, export it again")
+    return rate_hz
 
 
 def _markers(path: Path) -> tuple[Markers, list[str]]:
@@ -113,7 +123,9 @@ def _markers(path: Path) -> tuple[Markers, list[str]]:
     labels = tuple(label for label in header.get("MARKER_NAMES", ()) if label)
     if not labels:
         raise FileError(path, "its header has no MARKER_NAMES; export 3D data with the TSV header included")
-    rate = _number(path, header, "FREQUENCY")
+    if repeated := [label for label in dict.fromkeys(labels) if labels.count(label) > 1]:
+        raise FileError(path, f"MARKER_NAMES has {', '.join(repeated)} more than once; give every marker its own label")
+    rate = _rate(path, header)
     stated = int(_number(path, header, "NO_OF_FRAMES"))
     counted = {"Frame", "Time"} <= {name for cells in ([k, *v] for k, v in header.items()) for name in cells}
     wide = 3 * len(labels) + 2 * counted
@@ -164,7 +176,7 @@ def _plate(path: Path) -> _Plate:
             f"{path.name}: moments and centre of pressure contradict each other (by {100 * moments.misses:.0f} %); the "
             f"centre of pressure was taken, without a free moment"
         )
-    return _Plate(name, _number(path, header, "FREQUENCY"), force, moments.about_origin, corners, notes)
+    return _Plate(name, _rate(path, header), force, moments.about_origin, corners, notes)
 
 
 def _axes(corners: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ information (inverse covariance) and right-hand side, so that a fit can add what
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +18,13 @@ from kinertia.errors import FileError
 from kinertia.io.toml_lines import read_toml
 from kinertia.settings import Table
 
-_UNITS = {"m": ("mm", 1e3), "1": ("percent", 1e2), "N m/N": ("Nm_per_kN", 1e3), "s": ("ms", 1e3)}
+_UNITS = {
+    "m": ("mm", 1e3),
+    "1": ("percent", 1e2),
+    "N m/N": ("Nm_per_kN", 1e3),
+    "rad": ("degrees", 180.0 / math.pi),
+    "s": ("ms", 1e3),
+}
 """Name and factor of the unit in which people read a value."""
 
 
@@ -33,8 +40,8 @@ class PersonInstruments(Table):
 
     Examples:
         >>> from kinertia.io.session_file import PersonInstruments
-        >>> zeros = (0.0,) * 7
-        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 7, right=zeros).name
+        >>> zeros = (0.0,) * 8
+        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 8, right=zeros).name
         'A'
     """
 
@@ -46,7 +53,7 @@ class PersonInstruments(Table):
 
     @model_validator(mode="after")
     def _square(self) -> PersonInstruments:
-        size = 4 * len(self.plates) + 3
+        size = 4 * len(self.plates) + 4
         if {len(self.information), len(self.right), *map(len, self.information)} != {size}:
             raise ValueError(f"information and right must have {size} rows and columns for {len(self.plates)} plates")
         return self
@@ -84,7 +91,7 @@ def session_text(
 
     Args:
         version: of Kinertia.
-        values: per instrument, per unknown its value, deviation and unit (m, 1, N m/N or s).
+        values: per instrument, per unknown its value, deviation and unit (m, 1, N m/N, rad or s).
         people: what each says.
     """
     lines = [

@@ -26,6 +26,7 @@ from kinertia.io.trc import METRES_PER_UNIT, seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _HEADER_LINES = 5
+_FASTEST_HZ = 1e6
 _NEWTON_METRES = {"N.m": 1.0, "Nm": 1.0, "N.mm": 1e-3, "Nmm": 1e-3, "mm.N": 1e-3, "m.N": 1.0}
 _MUCH_BETTER = 0.2
 """Forces are in other axes than they seem to be if there they miss the centre of pressure by so much less."""
@@ -95,8 +96,18 @@ def _sections(path: Path) -> Iterator[tuple[str, _Section]]:
         owners = _carried(cells[begin + 2], width)
         units = (cells[begin + 4] + [""] * width)[:width]
         table = np.array(rows).reshape(len(rows), width)
-        rate = float(cells[begin + 1][0])
-        yield cells[begin][0], _Section(rate, owners, tuple(names), tuple(units), table, begin + _HEADER_LINES + 1)
+        rate_hz = _rate(path, begin + 2, cells[begin + 1][0])
+        yield cells[begin][0], _Section(rate_hz, owners, tuple(names), tuple(units), table, begin + _HEADER_LINES + 1)
+
+
+def _rate(path: Path, line: int, cell: str) -> float:
+    try:
+        rate_hz = float(cell)
+    except ValueError:
+        rate_hz = 0.0
+    if not 0.0 < rate_hz < _FASTEST_HZ:
+        raise FileError(path, f"the rate of the section is '{cell}'; expected frames per second, export it again", line)
+    return rate_hz
 
 
 def _header_at(cells: Sequence[Sequence[str]], k: int) -> bool:
@@ -120,11 +131,13 @@ def _numbers(path: Path, line: int, row: Sequence[str], width: int) -> list[floa
         raise FileError(
             path, f"the row has {len(row)} values, expected {width} as the header says; export it again", line
         )
-    try:
-        return [float(cell) if cell else np.nan for cell in (list(row) + [""] * width)[:width]]
-    except ValueError:
-        bad = next(cell for cell in row if cell and not re.fullmatch(r"[-+.\deE]+", cell))
-        raise FileError(path, f"'{bad}' is not a number; repair or export it again", line) from None
+    values = []
+    for cell in (list(row) + [""] * width)[:width]:
+        try:
+            values.append(float(cell) if cell else np.nan)
+        except ValueError:
+            raise FileError(path, f"'{cell}' is not a number; repair or export it again", line) from None
+    return values
 
 
 def _markers(path: Path, section: _Section) -> tuple[Markers, list[str]]:

@@ -16,6 +16,8 @@ from kinertia.trial.data import FloatArray, Markers
 _UP = np.array([0.0, 1.0, 0.0])
 _CLEAR = 0.5
 """Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
+_FLAT = 0.8
+"""Cosine of 37 degrees."""
 _BELOW_M = 0.05
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
@@ -75,12 +77,16 @@ def _landmarks(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]
 
 
 def _fronts(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """(n, 3): where the right foot, the left foot and the pelvis point, each from its own back to its front."""
+    """(n, 3): where the right foot, the left foot and the pelvis point, each from its own back to its front; NaN while
+    a foot is steep: behind a runner it points down and backwards.
+    """
     fronts = {}
     for side in "rl":
         toe = next((f"{name}_{side}" for name in ("metatarsal", "toe") if f"{name}_{side}" in places), "")
         if toe and f"heel_{side}" in places:
-            fronts[f"foot_{side}"] = _level(places[toe] - places[f"heel_{side}"])
+            along = places[toe] - places[f"heel_{side}"]
+            flat = np.linalg.norm(_level(along), axis=1) > _FLAT * np.linalg.norm(along, axis=1)
+            fronts[f"foot_{side}"] = np.where(flat[:, None], _level(along), np.nan)
     back = [places[name] for name in ("psis_r", "psis_l", "sacrum") if name in places]
     if back and {"asis_r", "asis_l"} <= set(places):
         fronts["pelvis"] = _level((places["asis_r"] + places["asis_l"]) / 2 - np.mean(back, axis=0))
@@ -91,13 +97,26 @@ def _odd_one_out(fronts: Mapping[str, FloatArray]) -> str:
     """The part that points backwards by the other two; of two parts nobody knows which is wrong."""
     if len(fronts) < 3:
         return ""
-    agreed = {(one, other): _cosine(fronts[one], fronts[other]) for one in fronts for other in fronts if one < other}
+    agreed = {(foot, "pelvis"): _cosine(fronts[foot], fronts["pelvis"]) for foot in ("foot_l", "foot_r")}
+    # a runner's feet are hardly ever flat at the same time: each against the pelvis says where they point by each other
+    left, right = (_turn_from(fronts["pelvis"], fronts[foot]) for foot in ("foot_l", "foot_r"))
+    agreed["foot_l", "foot_r"] = float((left * right.conjugate()).real)
     for part in fronts:
         with_it = [cosine for pair, cosine in agreed.items() if part in pair]
         without = [cosine for pair, cosine in agreed.items() if part not in pair]
         if max(with_it) < -_CLEAR and min(without) > _CLEAR:
             return part
     return ""
+
+
+def _turn_from(vectors: FloatArray, others: FloatArray) -> complex:
+    """Mean turn about the vertical from one direction to another, over the frames that show both: a unit number."""
+    one, other = (each[:, 0] + 1j * each[:, 2] for each in (vectors, others))
+    turn = other * one.conjugate()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        turn /= np.abs(turn)
+    mean = complex(turn[np.isfinite(turn)].sum())
+    return mean / max(abs(mean), 1e-12)
 
 
 def _front_trouble(part: str, marker_set: MarkerSet) -> str:

@@ -15,8 +15,8 @@ from kinertia.trial.data import Markers, Recording
 
 _PARTS = (("ankle_lateral", "knee_lateral"), ("knee_lateral", "asis"), ("asis", "acromion"))
 _USUAL, _OFF = 0.815, 0.055
-_LOWEST_M = (0.008, 0.055)
-"""A marker's own radius is 5 mm and more."""
+_LOWEST_M = (0.008, 0.050)
+"""A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low."""
 
 
 def stature_doubts(static: Recording, marker_set: MarkerSet, height_m: float) -> list[str]:
@@ -49,8 +49,8 @@ def stature_doubts(static: Recording, marker_set: MarkerSet, height_m: float) ->
 def floor_doubts(static: Markers, marker_set: MarkerSet) -> list[str]:
     """Feet that stand above the floor or below it.
 
-    Of six people at hand, with bare feet and in running shoes, the lowest marker of toes, metatarsals and heels is 23
-    to 44 mm above the floor.
+    Of fourteen people at hand, of eight laboratories, with bare feet and in running shoes, the lowest marker of toes,
+    metatarsals and heels is 23 to 44 mm above the floor.
     """
     named = [marker_set.landmarks.get(f"{name}_{side}", ()) for name in ("heel", "metatarsal", "toe") for side in "rl"]
     labels = [label for own in named for label in own if label in static.labels]

@@ -1,18 +1,20 @@
 """Do the forces belong to the motion? Wrong directions, signs and zeros of force plates, before any model.
 
 The ground accelerates the body as the markers show it: forces integrated over time are the changes of the velocity of
-the centre of mass, and the pelvis moves nearly as that does. On sound walks the two correlate by 0.7 and more along
-each horizontal axis, and their trends agree within 8 N.
+the centre of mass. The pelvis moves nearly as that does when walking, the markers' centre when limbs swing (running),
+but not when the trunk bends (squats). Along each horizontal axis the mean of both correlations with what the forces
+cause is 0.5 and more on sound walks and runs, 0.2 in squats, and trends of pelvis and forces agree within 8 N.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, Trial
 
@@ -34,7 +36,8 @@ class Agreement:
     """How forces and markers agree along one horizontal axis, over a window.
 
     Attributes:
-        correlation: of the velocity changes of the pelvis with those that the forces cause; NaN where one hardly moves.
+        correlation: of the velocity changes that the forces cause with those of the pelvis and of the markers' centre,
+            mean of the two; NaN where nothing hardly moves.
         offset_n: trend of the difference as a force.
     """
 
@@ -42,11 +45,15 @@ class Agreement:
     offset_n: float
 
 
-def direction_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
-    """Which horizontal forces point against the motion of the pelvis' markers, and times that are not its; empty where
+def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
+    """Which horizontal forces point against the motion of the markers, and times that are not theirs; empty where
     neither.
+
+    Args:
+        trial: in ground axes.
+        owners: the segment that each marker is on.
     """
-    both = _velocities(trial, pelvis)
+    both = _velocities(trial, owners)
     if both is None:
         return ""
     if trouble := _time_scale_trouble(both):
@@ -54,7 +61,9 @@ def direction_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
     angle, strength = _turn(both)
     agreements = _agreement(both)
     against = {axis: one.correlation for axis, one in agreements.items() if one.correlation < _OPPOSED}
-    fitting = any(one.correlation > -_OPPOSED for one in agreements.values())
+    # beside an axis that is opposed, one that goes with the markers says that they are not turned
+    enough = -_OPPOSED if against else _CLEAR
+    fitting = any(one.correlation > enough for one in agreements.values())
     evidence = ", ".join(f"correlation {value:.2f} along {axis}" for axis, value in against.items())
     if len(against) == len(_HORIZONTAL):
         cause = "the forces are turned by 180 degrees about the vertical"
@@ -90,23 +99,22 @@ def _time_scale_trouble(both: _Velocities) -> str:
 
 
 def _turn(both: _Velocities) -> tuple[float, float]:
-    """The angle (deg) about the vertical by which the forces' velocities are turned from the pelvis', and how well both
-    correlate once it is taken back.
+    """The angle (deg) about the vertical by which the forces' velocities are turned from the markers', and how well
+    both correlate once it is taken back: of the mean over pelvis and markers' centre.
     """
-    shown, caused = (
-        np.column_stack([_without_trend(both.time, values[:, k]) for k in _HORIZONTAL.values()])
-        for values in (both.pelvis, both.caused)
-    )
-    along = float((shown * caused).sum())
     # from Z to X is a positive turn about Y
-    across = float((shown[:, 1] * caused[:, 0] - shown[:, 0] * caused[:, 1]).sum())
-    size = float(np.sqrt(np.square(shown).sum() * np.square(caused).sum()))
-    return float(np.degrees(np.arctan2(across, along))), float(np.hypot(across, along)) / max(size, 1e-12)
+    caused, *shown = (
+        _without_trend(both.time, part[:, 2]) + 1j * _without_trend(both.time, part[:, 0])
+        for part in (both.caused, both.pelvis, both.centre)
+    )
+    sizes = [max(float(np.linalg.norm(caused) * np.linalg.norm(part)), 1e-12) for part in shown]
+    turn = sum(complex(np.vdot(part, caused)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
+    return float(np.degrees(np.angle(turn))), abs(turn)
 
 
-def offset_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
+def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     """A horizontal force that no motion of the pelvis' markers accounts for; empty where there is none."""
-    agreements = agreement(trial, pelvis)
+    agreements = agreement(trial, owners)
     off = {axis: one.offset_n for axis, one in agreements.items() if abs(one.offset_n) > OFFSET_LIMIT_N}
     if not off:
         return ""
@@ -117,23 +125,23 @@ def offset_trouble(trial: Trial, pelvis: Sequence[str]) -> str:
     )
 
 
-def agreement(trial: Trial, pelvis: Sequence[str]) -> dict[str, Agreement]:
+def agreement(trial: Trial, owners: Mapping[str, str]) -> dict[str, Agreement]:
     """Forces against markers along X and Z over the longest measured window; empty where that is too short.
 
     Args:
         trial: in ground axes.
-        pelvis: labels of markers on the pelvis; those that the trial lacks are left out.
+        owners: the segment that each marker is on.
     """
-    both = _velocities(trial, pelvis)
+    both = _velocities(trial, owners)
     return {} if both is None else _agreement(both)
 
 
 def _agreement(both: _Velocities) -> dict[str, Agreement]:
     agreements = {}
     for axis, k in _HORIZONTAL.items():
-        one, other = (_without_trend(both.time, values[:, k]) for values in (both.pelvis, both.caused))
-        still = min(one.std(), other.std()) < _LEAST_CHANGE_M_S
-        correlation = np.nan if still else float(np.corrcoef(one, other)[0, 1])
+        caused, *shown = (_without_trend(both.time, part[:, k]) for part in (both.caused, both.pelvis, both.centre))
+        still = min(part.std() for part in (caused, *shown)) < _LEAST_CHANGE_M_S
+        correlation = np.nan if still else float(np.mean([np.corrcoef(caused, part)[0, 1] for part in shown]))
         time = both.time - both.time.mean()
         trend = float(np.polyfit(time, both.caused[:, k] - both.pelvis[:, k], 1)[0])
         agreements[axis] = Agreement(correlation, both.mass_kg * trend)
@@ -142,17 +150,21 @@ def _agreement(both: _Velocities) -> dict[str, Agreement]:
 
 @dataclass(frozen=True, eq=False)
 class _Velocities:
-    """Of the pelvis, and of a body of this mass as the forces cause them, (n, 3) m/s over (n,) s."""
+    """(n, 3) m/s over (n,) s: of the pelvis, of the markers' centre, and of a body of this mass as the forces cause
+    them.
+    """
 
     time: FloatArray
     pelvis: FloatArray
+    centre: FloatArray
     caused: FloatArray
     mass_kg: float
 
 
-def _velocities(trial: Trial, pelvis: Sequence[str]) -> _Velocities | None:
-    worn = [label for label in pelvis if label in trial.markers.labels]
-    if not worn or not trial.measured.any():
+def _velocities(trial: Trial, owners: Mapping[str, str]) -> _Velocities | None:
+    worn = [label for label in trial.markers.labels if owners.get(label) == "pelvis"]
+    whole = markers_centre(owners, trial.markers)
+    if not worn or whole is None or not trial.measured.any():
         return None
     start, end = trial.windows()[0]
     place = trial.markers.select(worn).positions.mean(axis=1)
@@ -162,7 +174,7 @@ def _velocities(trial: Trial, pelvis: Sequence[str]) -> _Velocities | None:
     if end - start < _LEAST_WINDOW_S or not seen.any() or len(time) < 10:
         return None
     try:
-        pelvis_m = smooth(trial.markers.time[seen], place[seen], _PELVIS_HZ)
+        pelvis_m, centre_m = (smooth(trial.markers.time[seen], part[seen], _PELVIS_HZ) for part in (place, whole))
     except SmoothingError:
         return None
     shown = (time >= trial.markers.time[seen][0]) & (time <= trial.markers.time[seen][-1])
@@ -172,7 +184,8 @@ def _velocities(trial: Trial, pelvis: Sequence[str]) -> _Velocities | None:
         return None
     mass_kg = weight / GRAVITY_M_S2
     impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
-    return _Velocities(time, pelvis_m(time, 1), np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg, mass_kg)
+    caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
+    return _Velocities(time, pelvis_m(time, 1), centre_m(time, 1), caused, mass_kg)
 
 
 def _without_trend(time: FloatArray, values: FloatArray) -> FloatArray:

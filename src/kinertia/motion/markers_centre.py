@@ -1,4 +1,4 @@
-"""How high the body is, by its markers alone: no model is fitted, so that nothing of ours can be wrong."""
+"""Where the body is, by its markers alone: no model is fitted, so that nothing of ours can be wrong."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ def owners_of(skeleton: Skeleton) -> dict[str, str]:
     return {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
 
 
-def centre_height(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
-    """(n,) m, height of the markers' centre, each segment at its share of the body's mass; None without a pelvis.
+def markers_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
+    """(n, 3) m, the markers' centre, each segment at its share of the body's mass; None without a pelvis.
 
     Args:
         owners: the segment that each marker is on.
         markers: Y up.
     """
     seen = markers.seen
-    heights: dict[str, list[FloatArray]] = {}
+    places: dict[str, list[FloatArray]] = {}
     for column, label in enumerate(markers.labels):
         if owners.get(label) and seen[:, column].mean() >= _SEEN:
             known = seen[:, column]
-            own = np.interp(markers.time, markers.time[known], markers.positions[known, column, 1])
-            heights.setdefault(owners[label], []).append(own)
-    if not heights.keys() & {"pelvis", "torso"}:
+            own = [np.interp(markers.time, markers.time[known], way[known]) for way in markers.positions[:, column].T]
+            places.setdefault(owners[label], []).append(np.stack(own, axis=1))
+    if not places.keys() & {"pelvis", "torso"}:
         return None
-    shares = _shares(heights)
-    total: FloatArray = sum((shares[name] * np.mean(own, axis=0) for name, own in heights.items()), np.zeros(len(seen)))
+    shares = _shares(places)
+    middles = (shares[name] * np.mean(own, axis=0) for name, own in places.items())
+    total: FloatArray = sum(middles, np.zeros((len(seen), 3)))
     return total / sum(shares.values())
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.motion.markers_centre import centre_height
+from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, Recording, Trial, nearest_samples, runs
 
@@ -46,11 +46,11 @@ def gain_doubts(recording: Recording, trial: Trial, owners: Mapping[str, str]) -
 def _masses(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> dict[str, float]:
     """kg, by plate, of a body that moves like the markers' centre."""
     plates, markers = recording.plates, recording.markers
-    height = None if plates is None else centre_height(owners, markers)
-    if plates is None or height is None or len(plates.names) < 2:
+    place = None if plates is None else markers_centre(owners, markers)
+    if plates is None or place is None or len(plates.names) < 2:
         return {}
     try:
-        centre = smooth(markers.time, height, _CENTRE_HZ)
+        centre = smooth(markers.time, place[:, 1], _CENTRE_HZ)
     except SmoothingError:
         return {}
     measured = trial.measured[nearest_samples(markers.time, plates.time)]

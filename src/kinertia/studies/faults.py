@@ -1,14 +1,15 @@
 """Is a wrong measurement named? Known mistakes are made in the files of real walks, one at a time.
 
 `kinertia check` looks at the files first; what it does not doubt is fitted, and its joint moments are compared with
-those of the sound files.
+those of the sound files. What is said of sound files is counted, too: of the walks as they are, and of other people in
+laboratories without mistakes.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal, NamedTuple
@@ -19,9 +20,12 @@ from kinertia.checks.files import check_files, files_of_subject
 from kinertia.checks.verdict import verdicts
 from kinertia.errors import KinertiaError
 from kinertia.estimation.from_files import fit_subject
+from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic import load_mistakes as plates
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.measured_person import MeasuredPerson, read_person, write_person
 from kinertia.synthetic.mistakes import MISTAKES, Mistake
@@ -99,9 +103,47 @@ def run_faults(
         workers: processes; as many as there are cores if None.
         progress: called with the share that is done.
     """
-    sound = in_parallel(_sound, list(walks.items()), workers, lambda share: progress(0.1 * share))
+    sound = run_sound(walks, workers, lambda share: progress(0.1 * share))
     cases = [(one, mistake.name) for one in sound for mistake in mistakes]
     return sound, in_parallel(_spoilt, cases, workers, lambda share: progress(0.1 + 0.9 * share))
+
+
+def run_sound(
+    walks: Mapping[str, SubjectFile],
+    workers: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> list[SoundWalk]:
+    """What is said of walks as they are; arguments as of `run_faults`."""
+    return in_parallel(_sound, list(walks.items()), workers, progress)
+
+
+def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
+    """Files of people drawn from the literature's prior, each in a laboratory whose plates and floor are off by no more
+    than sound ones are; written into this folder.
+    """
+    laboratories = {}
+    for number in range(1, count + 1):
+        rng = np.random.default_rng([19, number])
+        subject = walking_subject()
+        person = replace(subject, bsp=literature_prior(subject.literature).draw(rng))
+        trial = walk(person, _WALK_S, _PLATE_RATE_HZ, _START)
+        noise = LabNoise(camera_sd_m=rng.uniform(0.0002, 0.001), force_sd_n=rng.uniform(0.5, 3.0))
+        recorded = write_lab(folder / f"{number} lab", record(person, trial, noise, rng, _SAMPLES_PER_FRAME))
+        measured = read_person(read_subject(recorded), rng)
+        x, z, gain, turn = (
+            float(rng.normal(0.0, prior.sound_sd))
+            for prior in (FLOOR_PRIOR["x"], FLOOR_PRIOR["z"], PLATE_PRIOR["gain"], FLOOR_PRIOR["turn"])
+        )
+        for change in (
+            plates.moved(x, z),
+            plates.scaled(force=1.0 + gain),
+            plates.turned_about_vertical(float(np.degrees(turn))),
+        ):
+            measured = change(measured, rng) or measured
+        own = folder / f"{number}"
+        own.mkdir()
+        laboratories[f"laboratory {number}"] = read_subject(write_person(own, measured))
+    return laboratories
 
 
 def synthetic_walk(folder: Path) -> SubjectFile:
@@ -185,11 +227,11 @@ def judged(
 ) -> tuple[Literal["named", "warned"], str] | None:
     """Whether the first and worst of what is new names the mistake; None where nothing is new.
 
-    New is what is not said of the sound files in the same words, whatever the numbers. Where nothing is, other numbers
-    in words that name the mistake do.
+    New is what is not said of the sound files in the same words, clause by clause, whatever the numbers. Where nothing
+    is, other numbers in words that name the mistake do.
     """
-    before = {(one.level, _words(one.sentence)) for one in sound}
-    new = [one for one in findings if (one.level, _words(one.sentence)) not in before]
+    before = {(one.level, clause) for one in sound for clause in _clauses(one.sentence)}
+    new = [one for one in findings if any((one.level, clause) not in before for clause in _clauses(one.sentence))]
     worst = [one for one in new if one.level == "fail"] or new
     if worst:
         named = re.search(mistake.named, worst[0].sentence) is not None
@@ -198,8 +240,9 @@ def judged(
     return ("named", again[0].sentence) if again else None
 
 
-def _words(sentence: str) -> str:
-    return re.sub(r"[-+]?\d[\d.]*", "#", sentence)
+def _clauses(sentence: str) -> list[str]:
+    words = re.sub(r"[-+]?\d[\d.]*", "#", sentence)
+    return re.split(r"[,;:] ", words)
 
 
 def moments_of(fit: Fit) -> JointMoments:

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M
+from kinertia.estimation.simultaneous.plates import plate_middles, turned_loads
 from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
@@ -127,21 +128,23 @@ def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
 @dataclass(frozen=True, eq=False)
 class _Instruments:
     """Plates and clock of a laboratory: how late forces are, and per foot's plate its offset (2, 3) m, gain (2, 1), and
-    crosstalk (2,) to the free moment.
+    crosstalk (2,) to the free moment; both are turned about the vertical.
     """
 
     late_s: float
     offset_m: np.ndarray
     gain: np.ndarray
     free_moment: np.ndarray
+    turn_rad: float = 0.0
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> _Instruments:
         """From the prior of `fit_simultaneous`."""
         plates = np.array([[prior.draw(rng) for prior in PLATE_PRIOR.values()] for _ in range(2)])
-        x, z = (prior.draw(rng) for prior in FLOOR_PRIOR.values())
+        x, z = (FLOOR_PRIOR[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
-        return cls(CLOCK_PRIOR_S.draw(rng), offset, 1.0 + plates[:, 2:3], plates[:, 3])
+        late_s = CLOCK_PRIOR_S.draw(rng)
+        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], FLOOR_PRIOR["turn"].draw(rng))
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:
@@ -153,7 +156,8 @@ class _Instruments:
 
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """What they make of true loads (n, 2, 6)."""
-        wrong = np.asarray(CubicSpline(time, loads)(time - self.late_s))
+        middles = plate_middles(FootLoads(time, loads[..., :3], loads[..., 3:]), np.arange(2))
+        wrong = turned_loads(np.asarray(CubicSpline(time, loads)(time - self.late_s)), middles, self.turn_rad)
         wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
         wrong *= self.gain
         wrong[..., 4] += self.free_moment * wrong[..., 1]

@@ -164,7 +164,7 @@ MISTAKES = (
     Mistake("50 N on the vertical axis", forces.with_offset(y_n=50.0), "zero of its vertical force"),
     Mistake("zero of the vertical force drifts by 60 N", forces.with_drift(60.0), "drift"),
     Mistake("one plate reads 10 % too much", forces.scaled(force=1.1, plates=slice(1, 2)), "^(trial .*: )?the gain of"),
-    Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), "turned by"),
+    Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), "turned about"),
     # who
     Mistake("height 20 cm too much", _more(height_m=0.2), "height|stature"),
     Mistake("height 20 cm too little", _more(height_m=-0.2), "height|stature"),

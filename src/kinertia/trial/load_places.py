@@ -300,7 +300,9 @@ def _offset_doubt(contacts: Sequence[_Contact]) -> str:
 
 def _ends_doubt(contacts: Sequence[_Contact]) -> str:
     """Loads that begin behind the heel or end in front of the toes: what an offset along the foot does first."""
-    behind, before = (float(np.median([one.ends_m[k] for one in contacts])) for k in range(2))
+    # of two contacts both, lest a second foot on one plate counts
+    ends = np.sort([one.ends_m for one in contacts], axis=0)
+    behind, before = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])
     if behind >= _BEGIN_M and before <= _END_M:
         return ""
     where = (

@@ -91,8 +91,8 @@ def _never_unloaded(plates: PlateLoads) -> str:
         if vertical.max() > _STEP_N and low > LOAD_THRESHOLD_N and high < _MOST_IDLE_N and steady:
             return (
                 f"{name} never shows less than {vertical.min():.0f} N, and a steady {(low + high) / 2:.0f} N while "
-                f"nobody stands on it: the zero of its vertical force is wrong; zero the plates without load, or "
-                f"subtract it before export"
+                "nobody stands on it: the zero of its vertical force is wrong, or drifts; zero the plates without "
+                "load, or subtract it before export"
             )
     return ""
 

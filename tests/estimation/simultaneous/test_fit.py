@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.estimate import estimate_bsp
@@ -208,6 +209,29 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
     entry = outcome.posterior.calibration["plate left foot: free moment"]
     assert entry["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
     assert any(w.startswith("plate left foot: free moment: -") and "N m/kN" in w for w in outcome.warnings)
+
+
+def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain):
+    """Both, about the places where they are loaded: their offsets are not to blame."""
+
+    def turn(positions, loads):
+        back = Rotation.from_euler("y", 3.0, degrees=True).as_matrix()
+        for foot in range(2):
+            weight = loads[:, foot, 1]
+            point = np.stack([loads[:, foot, 5], np.zeros_like(weight), -loads[:, foot, 3]], axis=1)
+            middle = point.sum(axis=0) / weight.sum()
+            about = loads[:, foot, 3:] - np.cross(middle, loads[:, foot, :3])
+            loads[:, foot, :3] = loads[:, foot, :3] @ back.T
+            loads[:, foot, 3:] = about @ back.T + np.cross(middle, loads[:, foot, :3])
+
+    outcome = fitted(trial, disturb=turn)
+    entry = outcome.posterior.calibration["plates: turned about the vertical by"]
+    assert np.degrees(entry["value"]) == pytest.approx(3.0, abs=0.8)
+    assert abs(entry["value"] - np.radians(3.0)) < 3.0 * entry["sd"]
+    assert outcome.warnings[0].startswith("plates: turned about the vertical by: +")
+    assert len(outcome.warnings) == 1
+    sound = plain.posterior.calibration["plates: turned about the vertical by"]
+    assert abs(sound["value"]) < sound["prior_sd"]
 
 
 def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):

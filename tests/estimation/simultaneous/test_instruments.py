@@ -12,14 +12,14 @@ PRIOR = InstrumentPrior()
 
 def shown(plates, seed=0):
     rng = np.random.default_rng(seed)
-    size = 4 * len(plates) + 3
+    size = 4 * len(plates) + 4
     root = rng.normal(size=(size, size)) * 1e3
     return InstrumentInformation(plates, root @ root.T, rng.normal(size=size) * 1e3)
 
 
 def test_what_a_posterior_adds_is_what_was_put_in():
     session, rng = shown(("a", "b")), np.random.default_rng(1)
-    before = [(np.diag(rng.uniform(1e4, 1e6, 11)), rng.normal(size=11)) for _ in range(2)]
+    before = [(np.diag(rng.uniform(1e4, 1e6, 12)), rng.normal(size=12)) for _ in range(2)]
     covariance = np.linalg.inv(session.information + sum(each for each, _ in before))
     mean = covariance @ (session.right + sum(each for _, each in before))
     added = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
@@ -28,10 +28,10 @@ def test_what_a_posterior_adds_is_what_was_put_in():
 
 
 def test_a_posterior_that_knows_less_than_before_adds_nothing_negative():
-    before = [(np.diag([1e6] * 7), np.zeros(7))]
-    covariance = np.linalg.inv(np.diag([4e6, 0.9e6, *[2e6] * 5]))
-    added = InstrumentInformation.of_posterior(("a",), np.full(7, 1e-3), covariance, before)
-    np.testing.assert_allclose(np.linalg.eigvalsh(added.information), [0.0, *[1e6] * 5, 3e6], atol=1.0)
+    before = [(np.diag([1e6] * 8), np.zeros(8))]
+    covariance = np.linalg.inv(np.diag([4e6, 0.9e6, *[2e6] * 6]))
+    added = InstrumentInformation.of_posterior(("a",), np.full(8, 1e-3), covariance, before)
+    np.testing.assert_allclose(np.linalg.eigvalsh(added.information), [0.0, *[1e6] * 6, 3e6], atol=1.0)
 
 
 @pytest.mark.parametrize("plates", [("a", "b"), ("b", "a"), ("b",), ("c", "b"), ("c",)])
@@ -40,10 +40,10 @@ def test_plates_that_are_not_there_are_marginalised(plates):
     session = shown(("a", "b"))
     every = tuple(dict.fromkeys([*plates, "a", "b"]))
     wide = session.among(every, PRIOR)
-    sd = np.array([*[PRIOR.plate[name].sd for _ in every for name in ("x", "z", "gain", "free moment")], *[1e-3] * 3])
+    sd = np.array([*[PRIOR.plate[name].sd for _ in every for name in ("x", "z", "gain", "free moment")], *[1e-3] * 4])
     precision = np.diag(1.0 / np.square(sd))
     covariance = np.linalg.inv(wide.information + precision)
-    kept = [*range(4 * len(plates)), *range(len(sd) - 3, len(sd))]
+    kept = [*range(4 * len(plates)), *range(len(sd) - 4, len(sd))]
     narrow = session.among(plates, PRIOR)
     own = np.linalg.inv(narrow.information + precision[np.ix_(kept, kept)])
     np.testing.assert_allclose(own, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)

@@ -193,9 +193,13 @@ def _calibration(
         change = value - skeleton.locked[name]
         entry = {"value": change, "prior_sd": uncertainty.coordinates[name], "sd": sd}
         calibration[name] = {**entry, "unit": "rad" if name in uncertainty.axes else "m"}
+    # whoever is turned is displaced a little, too: the cause first
+    for values, sds in list(result.plates.values())[:1]:
+        entry = {"value": float(values[-1]), "prior_sd": known.floor["turn"].sd, "sd": float(sds[-1])}
+        calibration["plates: turned about the vertical by"] = {**entry, "unit": "rad"}
     for plate, (values, sds) in result.plates.items():
         name = f"plate {plate.removeprefix('plate ')}"
-        for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=True):
+        for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=False):
             floor = known.floor[unknown].sd if unknown in known.floor else 0.0
             expected = float(np.hypot(known.plate[unknown].sd, floor))
             entry = {"value": float(value), "prior_sd": expected, "sd": float(deviation)}

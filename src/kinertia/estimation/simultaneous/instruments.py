@@ -28,27 +28,32 @@ and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a 
 scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
 the vertical force at 0.3 m, and ten times that (no source)."""
 FLOOR_PRIOR = MappingProxyType(
-    {"x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE), "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE)}
+    {
+        "x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
+        "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
+        "turn": SoundOrFaulty(float(np.radians(0.1)), float(np.radians(2.0)), FAULTY_SHARE),
+    }
 )
-"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes."""
+"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Turn: corners of a plate of
+half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
 """Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""
 
 
 @dataclass(frozen=True, eq=False)
 class InstrumentInformation:
-    """What the trials of one person say of the k = 4 p + 3 unknowns of p plates, the floor and the clock.
+    """What the trials of one person say of the k = 4 p + 4 unknowns of p plates, the floor and the clock.
 
     They stand in this order, each plate's and the floor's as PLATE_UNKNOWNS and FLOOR_UNKNOWNS. No prior is in it.
 
     Attributes:
         plates: names.
-        information: (k, k) of normal equations in m, 1, N m/N and s.
+        information: (k, k) of normal equations in m, 1, N m/N, rad and s.
         right: (k,) their right-hand side: information times the values that these trials show.
 
-    >>> shown = InstrumentInformation(("left",), np.diag([1e6, 1e6, 1e4, 1e6, 1e6, 1e6, 1e8]), np.zeros(7))
+    >>> shown = InstrumentInformation(("left",), np.diag([1e6, 1e6, 1e4, 1e6, 1e6, 1e6, 1e4, 1e8]), np.zeros(8))
     >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
-    (11, 11)
+    (12, 12)
     """
 
     plates: tuple[str, ...]
@@ -127,8 +132,8 @@ class InstrumentPrior:
             place, none = (SoundOrFaulty.certain(mm / 1e3) for mm in (instruments.plate_sd_mm, _NO_FLOOR_MM))
             result = replace(
                 result,
-                plate={**result.plate, **dict.fromkeys(FLOOR_UNKNOWNS, place)},
-                floor=dict.fromkeys(FLOOR_UNKNOWNS, none),
+                plate={**result.plate, **dict.fromkeys(_PLACE, place)},
+                floor={**result.floor, **dict.fromkeys(_PLACE, none)},
             )
         if instruments.clock_sd_ms is not None:
             result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
@@ -150,5 +155,6 @@ class InstrumentPrior:
         return InstrumentInformation(tuple(plates), information, right)
 
 
+_PLACE = ("x", "z")
 _NO_FLOOR_MM = 0.1
 """Deviation of the floor's place where that of the plates has been checked against the cameras."""

@@ -124,7 +124,8 @@ def moment_derivatives(
         moves = skeleton.support[skeleton.segments.index(name)]
         jacobian = pose.axes * moves[:, None]
         only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
-        by_plate = trial.ground.by_plate(only, problem.carriers[k][frames], problem.plate_values(static))
+        ground = problem.grounds[k]
+        by_plate = ground.by_plate(only, ground.carrier[frames], problem.plate_values(static))
         by_plate = by_plate @ problem.to_plates
         by_static[:, :, layout.plates] -= jacobian @ by_plate
         by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]

@@ -21,7 +21,7 @@ from kinertia.estimation.simultaneous.marker_noise import (
     taken_by_chance,
     weighed,
 )
-from kinertia.estimation.simultaneous.plates import FootPlates
+from kinertia.estimation.simultaneous.plates import FootPlates, plate_middles
 from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.repetition import repeats
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
@@ -228,4 +228,5 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cu
         tuple(loads.plates[i] for i in used),
         places[: len(time)],
         turn,
+        plate_middles(loads, used),
     )

@@ -1,8 +1,9 @@
 """What force plates and clock may have wrong, and the ground reactions once that is put right.
 
 Each plate may stand off its recorded place in the floor's plane, have a wrong gain, and read a vertical moment that is
-not there, in proportion to the vertical force (crosstalk of its channels); forces may be recorded late. The plates are
-the laboratory's: their offsets are in its axes and are shared by all trials, as is the clock.
+not there, in proportion to the vertical force (crosstalk of its channels); all plates may be turned about the vertical
+against the cameras; forces may be recorded late. The plates are the laboratory's: their offsets are in its axes and are
+shared by all trials, as is the clock.
 """
 
 from __future__ import annotations
@@ -14,18 +15,56 @@ import numpy as np
 
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import SmoothedSpline
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
 
 PLATE_UNKNOWNS = {"x": "m", "z": "m", "gain": "1", "free moment": "N m/N"}
 """Of each plate, and its unit: offsets in the floor's plane, relative error of the gain, and what the vertical moment
 lacks per vertical force."""
-FLOOR_UNKNOWNS = {"x": "m", "z": "m"}
-"""Of all plates together: where the floor is that the cameras were calibrated to."""
+FLOOR_UNKNOWNS = {"x": "m", "z": "m", "turn": "rad"}
+"""Of all plates together: where the floor is that the cameras were calibrated to, and by how much the plates are turned
+against its axes about the vertical, each through its middle. Single plates are mounted square; the cameras' axes are
+laid out by hand."""
+PLATE_ERRORS = {**PLATE_UNKNOWNS, **FLOOR_UNKNOWNS}
+"""All that is wrong with a plate: its own and the floor's."""
+_UP = np.array([0.0, 1.0, 0.0])
+_FIRM_N = 5 * LOAD_THRESHOLD_N
 
 
 def plates_with_floor(count: int) -> np.ndarray:
-    """(4 p, 4 p + 2) matrix that adds the floor's offsets to those of each of p plates."""
-    floor = np.array([[name == unknown for name in FLOOR_UNKNOWNS] for unknown in PLATE_UNKNOWNS], dtype=float)
-    return np.hstack([np.eye(len(PLATE_UNKNOWNS) * count), np.tile(floor, (count, 1))])
+    """(5 p, 4 p + 3) matrix that makes PLATE_ERRORS of p plates from their own unknowns and the floor's."""
+    own, floor = (
+        np.array([[name == unknown for name in names] for unknown in PLATE_ERRORS], dtype=float)
+        for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS)
+    )
+    return np.hstack([np.kron(np.eye(count), own), np.tile(floor, (count, 1))])
+
+
+def plate_middles(loads: FootLoads, used: np.ndarray) -> np.ndarray:
+    """(p, 3) m: for each of these plates of a trial, where it is loaded on average."""
+    point, vertical = centre_of_pressure(loads.wrench), loads.force[..., 1]
+    firm = np.where(vertical > _FIRM_N, vertical, 0.0)
+    result = np.zeros((len(used), 3))
+    for k, plate in enumerate(used):
+        weight = np.where(loads.carrier == plate, firm, 0.0)
+        if weight.any():
+            result[k] = np.average(point[weight > 0.0], axis=0, weights=weight[weight > 0.0])
+    return result
+
+
+def turned_loads(loads: np.ndarray, middle: np.ndarray, angle_rad: np.ndarray | float) -> np.ndarray:
+    """Loads (..., 6) turned about the vertical through places (..., 3) m by angles (...)."""
+    cosine, sine = (np.asarray(each)[..., None] for each in (np.cos(angle_rad), np.sin(angle_rad)))
+    force, moment = loads[..., :3], loads[..., 3:] - np.cross(middle, loads[..., :3])
+    force, moment = (_UP * each + cosine * (each - _UP * each) + sine * np.cross(_UP, each) for each in (force, moment))
+    return np.concatenate([force, moment + np.cross(middle, force)], axis=-1)
+
+
+def turning_loads(loads: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Derivative of `turned_loads` with respect to the angle, from what has been turned."""
+    force, moment = loads[..., :3], loads[..., 3:] - np.cross(middle, loads[..., :3])
+    force, moment = np.cross(_UP, force), np.cross(_UP, moment)
+    return np.concatenate([force, moment + np.cross(middle, force)], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -40,6 +79,7 @@ class FootPlates:
         plates: names.
         carrier: (n, 2) index into `plates` of the plate that each foot stands on, at the frames of the trial.
         turn: (3, 3) from the laboratory's axes to the trial's.
+        middles: (p, 3) m, places of the plates about which they are turned.
     """
 
     loads: SmoothedSpline
@@ -47,6 +87,7 @@ class FootPlates:
     plates: tuple[str, ...]
     carrier: np.ndarray
     turn: np.ndarray
+    middles: np.ndarray
 
     @classmethod
     def one_per_foot(cls, loads: SmoothedSpline, n_frames: int) -> FootPlates:
@@ -55,44 +96,53 @@ class FootPlates:
         wrench = loads(loads.time).reshape(-1, 2, 6)
         on = [np.tile([0, 1], (count, 1)) for count in (len(wrench), n_frames)]
         reactions = GroundReactions(loads.time, wrench, on[0], np.zeros_like(wrench), None)
-        return cls(loads, reactions, ("right foot", "left foot"), on[1], np.eye(3))
+        middles = plate_middles(FootLoads(loads.time, wrench[..., :3], wrench[..., 3:]), np.arange(2))
+        return cls(loads, reactions, ("right foot", "left foot"), on[1], np.eye(3), middles)
 
-    def among(self, plates: Sequence[str]) -> np.ndarray:
-        """Place in `plates` (a session's) of each of these plates."""
-        return np.array([plates.index(name) for name in self.plates])
+    def among(self, plates: Sequence[str]) -> FootPlates:
+        """The same with these plates (a session's), of which its own are some."""
+        own = np.array([plates.index(name) for name in self.plates])
+        middles = np.zeros((len(plates), 3))
+        middles[own] = self.middles
+        reactions = replace(self.reactions, carrier=own[self.reactions.carrier])
+        return replace(self, plates=tuple(plates), carrier=own[self.carrier], reactions=reactions, middles=middles)
 
     def corrected(self, time: np.ndarray, carrier: np.ndarray, plates: np.ndarray, derivative: int = 0) -> np.ndarray:
         """(n, 2, 6) loads on the feet at these times, of plates put right, or their time derivatives.
 
         Args:
             time: (n,) by the plates' clock.
-            carrier: (n, 2) row of `plates` under each foot.
-            plates: (p, 4) what is wrong with the plates.
+            carrier: (n, 2) index of the plate under each foot.
+            plates: (p, 5) what is wrong with the plates (PLATE_ERRORS).
         """
-        return self._put_right(self.loads(time, derivative).reshape(len(time), 2, 6), plates[carrier])
+        return self._put_right(self.loads(time, derivative).reshape(len(time), 2, 6), carrier, plates)
 
     def corrected_reactions(self, plates: np.ndarray, late_s: float) -> GroundReactions:
-        """The loads for the joint moments, of plates (p, 4) put right, by the clock of the markers.
+        """The loads for the joint moments, of plates (p, 5) put right, by the clock of the markers.
 
         Args:
             plates: what is wrong with each of `self.plates`.
             late_s: by how much forces are recorded late.
         """
         raw = self.reactions
-        wrench, impact = (self._put_right(part, plates[raw.carrier]) for part in (raw.wrench, raw.impact))
+        wrench, impact = (self._put_right(part, raw.carrier, plates) for part in (raw.wrench, raw.impact))
         return replace(raw, time=raw.time - late_s, wrench=wrench, impact=impact)
 
-    def _put_right(self, loads: np.ndarray, here: np.ndarray) -> np.ndarray:
-        """Loads (k, 2, 6) of plates with these errors (k, 2, 4)."""
+    def _put_right(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """Loads (k, 2, 6) of plates (k, 2) with errors (p, 5)."""
+        here = plates[carrier]
+        loads = turned_loads(loads, self.middles[carrier], -here[..., 4])
         moment = loads[..., 3:] + np.cross(self._ground_offset(here), loads[..., :3])
         moment[..., 1] += here[..., 3] * loads[..., 1]
         result: np.ndarray = (1.0 + here[..., 2:3]) * np.concatenate([loads[..., :3], moment], axis=-1)
         return result
 
     def by_plate(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """(n, 6, 4 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 4)."""
+        """(n, 6, 5 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 5)."""
         result = np.zeros((len(loads), 6, *plates.shape))
-        raw = loads / (1.0 + plates[carrier][..., 2:3])
+        here = plates[carrier]
+        raw = loads / (1.0 + here[..., 2:3])
+        turning = turning_loads(loads, self.middles[carrier] + self._ground_offset(here))
         for foot in range(2):
             under = carrier[:, foot, None] == np.arange(len(plates))
             for j, axis in enumerate((0, 2)):
@@ -100,9 +150,10 @@ class FootPlates:
                 result[:, 3:, :, j] += moment[:, :, None] * under[:, None, :]
             result[..., 2] += raw[:, foot, :, None] * under[:, None, :]
             result[:, 4, :, 3] += loads[:, foot, 1, None] * under
+            result[..., 4] -= turning[:, foot, :, None] * under[:, None, :]
         return result.reshape(len(loads), 6, plates.size)
 
     def _ground_offset(self, plates: np.ndarray) -> np.ndarray:
-        """(..., 3) m: offsets of plates (..., 4) in the trial's axes."""
+        """(..., 3) m: offsets of plates (..., 5) in the trial's axes."""
         result: np.ndarray = plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]
         return result

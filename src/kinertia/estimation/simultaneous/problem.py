@@ -21,7 +21,7 @@ from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.range_terms import add_ranges
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -174,7 +174,7 @@ class MapProblem:
         self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
         self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
         self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
-        self.carriers = [trial.ground.among(self.plates)[trial.ground.carrier] for trial in trials]
+        self.grounds = [trial.ground.among(self.plates) for trial in trials]
         self.to_plates = plates_with_floor(len(self.plates))
         count = len(skeleton.markers)
         self.skin = [trial.skin or SkinPatterns.none(len(trial.time), count) for trial in trials]
@@ -290,28 +290,25 @@ class MapProblem:
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
     def plate_values(self, static: np.ndarray) -> np.ndarray:
-        """(p, 4) what is wrong with every plate, in the order of PLATE_UNKNOWNS: its own and the floor's."""
-        result: np.ndarray = (self.to_plates @ static[self.layout.plates]).reshape(-1, len(PLATE_UNKNOWNS))
+        """(p, 5) what is wrong with every plate, in the order of PLATE_ERRORS."""
+        result: np.ndarray = (self.to_plates @ static[self.layout.plates]).reshape(-1, len(PLATE_ERRORS))
         return result
 
     def plate_sd(self, covariance: np.ndarray) -> np.ndarray:
-        """(p, 4) deviations of `plate_values` for this covariance (S, S) of the static unknowns."""
+        """(p, 5) deviations of `plate_values` for this covariance (S, S) of the static unknowns."""
         own = covariance[self.layout.plates, self.layout.plates]
-        return np.sqrt(np.diag(self.to_plates @ own @ self.to_plates.T)).reshape(-1, len(PLATE_UNKNOWNS))
+        return np.sqrt(np.diag(self.to_plates @ own @ self.to_plates.T)).reshape(-1, len(PLATE_ERRORS))
 
     def foot_loads(
         self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
     ) -> np.ndarray:
         """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
-        trial = self.trials[k]
-        at = trial.time[frames] + static[self.layout.clock]
-        return trial.ground.corrected(at, self.carriers[k][frames], self.plate_values(static), derivative)
+        ground, at = self.grounds[k], self.trials[k].time[frames] + static[self.layout.clock]
+        return ground.corrected(at, ground.carrier[frames], self.plate_values(static), derivative)
 
     def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
         """The loads for the joint moments of trial k, of instruments put right."""
-        ground = self.trials[k].ground
-        plates = self.plate_values(static)[ground.among(self.plates)]
-        return ground.corrected_reactions(plates, float(static[self.layout.clock]))
+        return self.grounds[k].corrected_reactions(self.plate_values(static), float(static[self.layout.clock]))
 
     def trial_normal(self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0) -> TrialNormal:
         """Normal equations of trial k, to be solved with this damping."""
@@ -366,7 +363,8 @@ class MapProblem:
         shown = root_regressor(skeleton, self.segments, motion)
         by_static[:, :, layout.theta] = by_body(shown, dynamic_jacobian(static[layout.theta]))
         by_static[:, :, layout.coordinates] = by.q[:, :, self.still]
-        by_plate = trial.ground.by_plate(loads, self.carriers[k][frames], self.plate_values(static)) @ self.to_plates
+        ground = self.grounds[k]
+        by_plate = ground.by_plate(loads, ground.carrier[frames], self.plate_values(static)) @ self.to_plates
         rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
         by_instrument = np.concatenate([by_plate, rates[:, :, None]], axis=2)
         by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)

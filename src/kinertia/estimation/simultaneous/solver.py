@@ -3,7 +3,7 @@
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
 how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate
-(`plates.PLATE_UNKNOWNS`), and the time offset of the forces. Minimised is the sum of squares, each over its
+(`plates.PLATE_ERRORS`), and the time offset of the forces. Minimised is the sum of squares, each over its
 deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are Gaussians
 that change with what the data say of them (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives
 analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its
@@ -43,7 +43,7 @@ class SimultaneousResult:
         bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
         skeleton: with the estimated marker positions and static coordinates.
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        plates: per plate what is wrong with it (4,), in the order of PLATE_UNKNOWNS, and the posterior deviations (4,).
+        plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
         clock_s: the time offset and its posterior deviation, s.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
         reactions: per trial the loads for the joint moments, of instruments put right.

@@ -1,0 +1,115 @@
+"""Are there computed points among the measured markers? Programs write joint centres beside the markers that they made
+them of.
+
+A marker on the skin keeps no place to a tenth of a millimetre: a point that does, in axes through markers of another
+segment or on the line between two, was computed from them. It says nothing new, and counts as if it were measured.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, permutations
+
+import numpy as np
+
+from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import FloatArray, Markers
+
+_EXACT_M, _SKIN_M = 1e-4, 3e-4
+"""Skin moves by more than the latter; where pelvis markers do not, they are computed themselves, or on one plate."""
+_NEAR_M = 0.02
+"""What is fixed in the pelvis is as far from its middle all the time; thighs swing by more."""
+_MOST_CORNERS = 5
+_FRAMES, _FEWEST = 25, 10
+_FLAT = 0.1
+"""Sine of the angle of three markers that are nearly in line."""
+_JOINTS = ("knee", "ankle", "elbow")
+
+
+def computed_doubts(markers: Markers, marker_set: MarkerSet) -> list[str]:
+    """Points that were computed from other markers; of a motion."""
+    few = markers.positions[:: -(-len(markers.time) // _FRAMES)]
+    place = {label: few[:, k] for k, label in enumerate(markers.labels)}
+    found = {**_in_pelvis(place, marker_set), **_between(place, marker_set)}
+    if not found:
+        return []
+    listed = ", ".join(f"{label} (from {of})" for label, of in found.items())
+    return [
+        f"computed, not measured: {listed}; it keeps its place among these to a tenth of a millimetre, which skin does "
+        "not: leave computed joint centres out of the marker set"
+    ]
+
+
+def _in_pelvis(place: dict[str, FloatArray], marker_set: MarkerSet) -> dict[str, str]:
+    """Markers of other segments that are fixed in the pelvis: in axes through three of its places (markers, or the
+    middle of two), or in the rigid body that fits all its markers best.
+    """
+    corners = [label for label in marker_set.segments.get("pelvis", ()) if label in place][:_MOST_CORNERS]
+    if len(corners) < 3:
+        return {}
+    pelvis = np.stack([place[label] for label in corners], axis=1)
+    shown = np.isfinite(pelvis).all(axis=(1, 2))
+    pelvis = pelvis[shown]
+    pairs = list(combinations(range(len(corners)), 2))
+    apart = np.stack([np.linalg.norm(pelvis[:, a] - pelvis[:, b], axis=1) for a, b in pairs])
+    if len(pelvis) < _FEWEST or apart.std(axis=1).max() < _SKIN_M:
+        return {}
+    points = np.concatenate([pelvis, np.stack([pelvis[:, [a, b]].mean(axis=1) for a, b in pairs], axis=1)], axis=1)
+    frames = (_frames(points), _best_fit(pelvis))
+    found = {}
+    others = {label for name, labels in marker_set.segments.items() if name != "pelvis" for label in labels}
+    for label in others & set(place):
+        own = place[label][shown]
+        seen = np.isfinite(own).all(axis=1)
+        from_middle = np.linalg.norm(own - pelvis.mean(axis=1), axis=1)[seen]
+        if seen.sum() < _FEWEST or np.ptp(from_middle) > _NEAR_M:
+            continue
+        for origin, axes in frames:
+            local = np.einsum("ntji,ntj->nti", axes[seen], own[seen, None] - origin[seen])
+            if local.std(axis=0).max(axis=1).min() < _EXACT_M:
+                found[label] = ", ".join(corners)
+    return dict(sorted(found.items()))
+
+
+def _frames(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origins (n, t, 3) and axes (n, t, 3, 3) through all threes of points (n, p, 3) that are not in line."""
+    one, two, three = np.array(list(permutations(range(points.shape[1]), 3))).T
+    origin = points[:, one]
+    x, across = points[:, two] - origin, points[:, three] - origin
+    lengths = np.linalg.norm(x, axis=2) * np.linalg.norm(across, axis=2)
+    normal = np.cross(x, across)
+    sine = np.linalg.norm(normal, axis=2) / np.maximum(lengths, 1e-12)
+    bent = (sine > _FLAT).all(axis=0)
+    origin, x, normal = origin[:, bent], x[:, bent], normal[:, bent]
+    x, normal = (part / np.linalg.norm(part, axis=2, keepdims=True) for part in (x, normal))
+    return origin, np.stack([x, np.cross(normal, x), normal], axis=3)
+
+
+def _best_fit(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origin (n, 1, 3) and axes (n, 1, 3, 3) of the rigid body that fits points (n, p, 3) best (Kabsch), whose shape is
+    that of the first frame.
+    """
+    middle = points.mean(axis=1, keepdims=True)
+    u, _, vt = np.linalg.svd(np.einsum("npi,pj->nij", points - middle, (points - middle)[0]))
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    return middle, (u @ vt)[:, None]
+
+
+def _between(place: dict[str, FloatArray], marker_set: MarkerSet) -> dict[str, str]:
+    """Markers that are always at the same share of the way from the outer to the inner marker of a joint."""
+    found = {}
+    for joint in (f"{name}_{side}" for name in _JOINTS for side in "rl"):
+        head, _, side = joint.partition("_")
+        ends = [marker_set.landmarks.get(f"{head}_{which}_{side}", ()) for which in ("lateral", "medial")]
+        if any(len(own) != 1 or own[0] not in place for own in ends):
+            continue
+        outer, inner = (place[own[0]] for own in ends)
+        for label in set(marker_set.labels) & set(place) - {ends[0][0], ends[1][0]}:
+            from_outer, along = place[label] - outer, inner - outer
+            shown = np.isfinite(from_outer).all(axis=1) & np.isfinite(along).all(axis=1)
+            if shown.sum() < _FEWEST:
+                continue
+            from_outer, along = from_outer[shown], along[shown]
+            share = float((from_outer * along).sum() / np.square(along).sum())
+            if np.abs(from_outer - share * along).max() < _EXACT_M:
+                found[label] = " and ".join(own[0] for own in ends)
+    return dict(sorted(found.items()))

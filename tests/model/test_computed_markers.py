@@ -1,0 +1,77 @@
+"""Joint centres that programs computed from other markers are named; markers on skin never are."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.model.computed_markers import computed_doubts
+from kinertia.trial.data import Markers
+from recorded_walks import WALKS
+
+SUBJECT4 = Path(__file__).parents[1] / "subject4.toml"
+
+
+def with_point(markers, marker_set, segment, place):
+    """The recording with one more point, listed on this segment."""
+    more = Markers(
+        markers.time, (*markers.labels, "centre"), np.concatenate([markers.positions, place[:, None]], axis=1)
+    )
+    segments = {**marker_set.segments, segment: (*marker_set.segments[segment], "centre")}
+    return more, replace(marker_set, segments=segments)
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, measured_recording):
+    markers = measured_recording(*WALKS[request.param]).markers
+    return markers, choose_marker_set(markers.labels)
+
+
+def test_measured_markers_are_not_doubted(walk):
+    assert computed_doubts(*walk) == []
+
+
+def test_a_point_between_two_markers_of_a_joint(measured_recording):
+    markers, marker_set = measured_recording("subject4/walking1.trc").markers, read_marker_set(SUBJECT4)
+    middle = markers.select(["R_elbow_lat", "R_elbow_med"]).positions.mean(axis=1)
+    (doubt,) = computed_doubts(*with_point(markers, marker_set, "upper_arm_r", middle))
+    assert doubt.startswith("computed, not measured: centre (from R_elbow_lat and R_elbow_med)")
+    noisy = middle + np.random.default_rng(0).normal(0.0, 5e-4, middle.shape)
+    assert computed_doubts(*with_point(markers, marker_set, "upper_arm_r", noisy)) == []
+
+
+def test_a_point_in_axes_through_three_pelvis_markers(measured_recording):
+    markers = measured_recording(*WALKS["plug-in gait a"]).markers
+    marker_set = choose_marker_set(markers.labels)
+    right, left, back_r, back_l = np.moveaxis(markers.select(["RASI", "LASI", "RPSI", "LPSI"]).positions, 1, 0)
+    origin, z = (right + left) / 2, right - left
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    y = np.cross(z, origin - (back_r + back_l) / 2)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    hip = origin - 0.05 * np.cross(y, z) - 0.08 * y + 0.09 * z
+    (doubt,) = computed_doubts(*with_point(markers, marker_set, "thigh_r", hip))
+    assert doubt.startswith("computed, not measured: centre (from RASI, LASI, ")
+    on_skin = hip + np.random.default_rng(0).normal(0.0, 5e-4, hip.shape)
+    assert computed_doubts(*with_point(markers, marker_set, "thigh_r", on_skin)) == []
+
+
+@pytest.mark.parametrize("trial", ["walking1", "squats1"])
+def test_hip_centres_that_another_laboratory_computed(trial, measured_recording):
+    """By a rigid fit of all pelvis markers; regressions of the same study go with knees and hips, and are not seen."""
+    markers = measured_recording(f"subject4/{trial}.trc").markers
+    marker_set = read_marker_set(SUBJECT4)
+    assert computed_doubts(markers, marker_set) == []
+    thigh = (*marker_set.segments["thigh_r"], "R_HJC", "L_HJC")
+    (doubt,) = computed_doubts(markers, replace(marker_set, segments={**marker_set.segments, "thigh_r": thigh}))
+    assert "L_HJC (from" in doubt
+    assert "R_HJC (from" in doubt
+
+
+def test_too_short_or_too_few_markers_say_nothing(walk):
+    markers, marker_set = walk
+    assert computed_doubts(replace(markers, time=markers.time[:5], positions=markers.positions[:5]), marker_set) == []
+    pelvis = marker_set.segments["pelvis"][:2]
+    few = replace(marker_set, segments={**marker_set.segments, "pelvis": pelvis})
+    assert computed_doubts(markers, few) == []
