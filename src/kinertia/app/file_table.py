@@ -112,7 +112,7 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
     model = {key: value for key, value in _table(content, "model").items() if key not in ("static", "osim")}
     if model.get("markers") not in preset_names():
         model.pop("markers", None)
-    model |= {key: names[0] for key in _MODEL_FILES if (names := by_use.get(key))}
+    model |= {key: own[0] for key in _MODEL_FILES if (own := by_use.get(key))}
     if "osim" in model:
         model = {key: value for key, value in model.items() if key not in ("static", "markers", "length_unit")}
     else:
@@ -123,13 +123,13 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
         trial = {"markers": markers, **known.get(markers, {})}
         for key in ("forces", "loads"):
             trial.pop(key, None)
-            if names := by_use.get(f"{key}:{markers}"):
-                trial[key] = names[0]
+            if own := by_use.get(f"{key}:{markers}"):
+                trial[key] = own[0]
         trials.append(trial)
     changed = {**content, "model": model, "trial": trials}
     prior = {key: value for key, value in _table(content, "prior").items() if key != "bsp"}
-    if names := by_use.get("bsp"):
-        prior["bsp"] = names[0]
+    if bsp := by_use.get("bsp"):
+        prior["bsp"] = bsp[0]
     return {**changed, "prior": prior} if prior else {key: changed[key] for key in changed if key != "prior"}
 
 

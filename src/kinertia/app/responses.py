@@ -73,10 +73,8 @@ def result_file(folder: Path, name: str) -> Response:
     """
     within = folder.resolve()
     path = (within / name).resolve()
-    hidden = (
-        any(part.startswith(".") for part in path.relative_to(within).parts) if path.is_relative_to(within) else True
-    )
-    if hidden or not path.is_file():
+    inside = path.is_relative_to(within) and path.is_file()
+    if not inside or any(part.startswith(".") for part in path.relative_to(within).parts):
         raise HTTPException(404, "no such file")
     headers = {"content-security-policy": RESULT_POLICY}
     if path.suffix == ".html":

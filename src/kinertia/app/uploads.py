@@ -29,16 +29,12 @@ def harmless_name(given: str) -> str:
     """
     name = PureWindowsPath(given).name  # knows both separators, and drives
     shown = name[:_LONGEST_NAME] or given[:_LONGEST_NAME] or "a file without a name"
-    if (
-        name.startswith(".")
-        or not fits_everywhere(name)
-        or len(name.encode()) > _LONGEST_NAME
-        or not name.isprintable()
-    ):
+    sound = fits_everywhere(name) and name.isprintable() and len(name.encode()) <= _LONGEST_NAME
+    if name.startswith(".") or not sound:
         raise FileError(
             shown,
-            "not taken: a file's name must be one on every system (none of < > : \" / \\ | ? *, no dot first or last, no "
-            f"device of Windows, at most {_LONGEST_NAME} bytes); rename it",
+            "not taken: a file's name must be one on every system (none of < > : \" / \\ | ? *, no dot first or last, "
+            f"no device of Windows, at most {_LONGEST_NAME} bytes); rename it",
         )
     suffix = Path(name).suffix.lower()
     if suffix == ".zip":
@@ -67,9 +63,7 @@ async def receive(person: Person, given: str, chunks: AsyncIterator[bytes]) -> P
                 if file.tell() + len(chunk) > 1_000_000 * LARGEST_FILE_MB:
                     raise FileError(name, f"not taken: larger than {LARGEST_FILE_MB} MB, the most of one file")
                 if left < 0:
-                    raise FileError(
-                        name, f"not taken: the files of one person may have {LARGEST_PERSON_MB} MB together"
-                    )
+                    raise FileError(name, f"not taken: all files of a person have {LARGEST_PERSON_MB} MB at most")
                 file.write(chunk)
         os.replace(temporary, person.folder / name)
     except BaseException:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -50,8 +51,6 @@ def app(
         out.print(f"library: {library.folder}; Ctrl-C ends it", soft_wrap=True)
         if browser:
             webbrowser.open(server.address)
-        try:
+        with suppress(KeyboardInterrupt):
             server.run()
-        except KeyboardInterrupt:
-            pass
     out.print("ended; everything that was finished is in the library")
