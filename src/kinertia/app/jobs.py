@@ -12,12 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from kinertia.app.library import Library, Person, started
+from kinertia.app.library import Person, started
 from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit")
 LOG = "failure.log"
-_PATIENCE_S = 5.0
+_PATIENCE_S, _PAUSE_S = 5.0, 0.1
+_NO_WINDOW: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+"""Windows opens a console for every process otherwise."""
 
 
 class Job:
@@ -55,9 +57,6 @@ class Job:
 
     def run(self) -> dict[str, Any]:
         """Do it; how it ended, for the person's notes."""
-        if not is_compiled():
-            self._moved("compiling, once, about half a minute", 0.0)
-            self._done([sys.executable, "-m", "kinertia", "warm-up", "--quiet"])
         self._moved("starting", 0.0)
         status, error, log = self._done(
             [sys.executable, "-m", "kinertia.app.worker", self.kind, str(self.person.folder)]
@@ -92,7 +91,7 @@ class Job:
                 encoding="utf-8",
                 errors="replace",
                 cwd=Path.home(),  # results replace their folder, which must be nobody's current one
-                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                creationflags=_NO_WINDOW,
             )
         process = self._process
         assert process.stdout is not None
@@ -112,10 +111,16 @@ class Job:
 
 
 class Jobs:
-    """Two lines of people: one for checks, which take seconds, and one for fits."""
+    """Two lines of people: one for checks, which take seconds, and one for fits.
 
-    def __init__(self, library: Library) -> None:
-        self._library = library
+    Attributes:
+        compiling: whether fits wait for what is compiled once on a machine.
+    """
+
+    def __init__(self, warm_up: Sequence[str] = ()) -> None:
+        """Nobody waits yet; `warm_up` is the command that compiles, where that is to be done before the first fit."""
+        self._warm_up = warm_up
+        self.compiling = False
         self._lines: dict[str, list[Job]] = {kind: [] for kind in KINDS}
         self._changed = threading.Condition()
         self._closed = False
@@ -177,7 +182,22 @@ class Jobs:
                 ):
                     job.person.note(**{job.kind: {"how": "interrupted"}})
 
+    def _compile(self) -> None:
+        """Compile what has not been compiled on this machine, while people still look for their files."""
+        if not self._warm_up or is_compiled():
+            return
+        self.compiling = True
+        quiet = subprocess.DEVNULL
+        process = subprocess.Popen(self._warm_up, stdin=quiet, stdout=quiet, stderr=quiet, creationflags=_NO_WINDOW)
+        while process.poll() is None and not self._closed:
+            time.sleep(_PAUSE_S)
+        if process.poll() is None:
+            process.terminate()
+        self.compiling = False
+
     def _work(self, kind: str) -> None:
+        if kind == "fit":
+            self._compile()
         line = self._lines[kind]
         while True:
             with self._changed:

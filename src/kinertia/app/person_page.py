@@ -70,6 +70,8 @@ def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
 
 
 def _stage(job: Job, jobs: Jobs) -> str:
+    if job.kind == "fit" and jobs.compiling:
+        return "compiling, once on a computer: about half a minute"
     before = jobs.place(job)
     if job.stage or not before:
         return job.stage or "starting"

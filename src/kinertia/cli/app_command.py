@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import webbrowser
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +14,8 @@ from kinertia.cli.measured_demo import FILES
 from kinertia.cli.terminal import out
 from kinertia.errors import KinertiaError
 
+_WARM_UP = (sys.executable, "-c", "from kinertia.cli.start import main; main()", "warm-up", "--quiet")
+"""`kinertia warm-up` in a process of its own."""
 _HOW = 'pip install "kinertia[app]"'
 
 
@@ -46,7 +49,7 @@ def app(
         raise KinertiaError(problem) from None
     library = Library(Path.home() / "Kinertia" if folder is None else folder)
     with library.opened():
-        server = Server(library, port, FILES)
+        server = Server(library, port, FILES, _WARM_UP)
         out.print(f"Kinertia is at {server.address}", soft_wrap=True)
         out.print(f"library: {library.folder}; Ctrl-C ends it", soft_wrap=True)
         if browser:
