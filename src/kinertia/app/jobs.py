@@ -17,6 +17,7 @@ from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit")
 LOG = "failure.log"
+WORKER = (sys.executable, "-m", "kinertia.app.worker")
 _PATIENCE_S, _PAUSE_S = 5.0, 0.1
 _NO_WINDOW: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """Windows opens a console for every process otherwise."""
@@ -58,9 +59,7 @@ class Job:
     def run(self) -> dict[str, Any]:
         """Do it; how it ended, for the person's notes."""
         self._moved("starting", 0.0)
-        status, error, log = self._done(
-            [sys.executable, "-m", "kinertia.app.worker", self.kind, str(self.person.folder)]
-        )
+        status, error, log = self._done([*WORKER, self.kind, str(self.person.folder)])
         if self.cancelled:
             return {"how": "cancelled"}
         if status == 0:
