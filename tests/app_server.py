@@ -43,7 +43,10 @@ class Running:
         given = {name.replace("_", "-"): value for name, value in headers.items()}
         try:
             connection.putrequest(
-                method, path[1:] if path.startswith("//") else self.root + path, skip_host=True, skip_accept_encoding=True
+                method,
+                path[1:] if path.startswith("//") else self.root + path,
+                skip_host=True,
+                skip_accept_encoding=True,
             )
             connection.putheader("Host", host or place.netloc)
             content = body.encode() if isinstance(body, str) else body

@@ -55,7 +55,8 @@ def test_the_token_is_long_random_and_of_this_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", "127.0.0.1.evil.example:{port}", "[::1]"]
+    "host",
+    ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", "127.0.0.1.evil.example:{port}", "[::1]"],
 )
 def test_a_name_that_leads_here_is_refused(served, host):
     """DNS rebinding: a page of evil.example, whose name now means 127.0.0.1, has the right port and even the token."""

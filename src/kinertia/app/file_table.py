@@ -8,10 +8,11 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 from kinertia.errors import SettingsError
+from kinertia.io.file_names import last_part
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.subject_draft import holds_forces, holds_loads, is_capture
@@ -155,10 +156,10 @@ def within_folder(content: Content) -> Content:
     for name, keys in (("model", _MODEL_FILES), ("instruments", ("session",)), ("prior", ("bsp",))):
         for key in keys:
             if isinstance(value := tables.get(name, {}).get(key), str):
-                tables[name][key] = PureWindowsPath(value).name
+                tables[name][key] = last_part(value)
     trials = [
         {
-            key: PureWindowsPath(value).name if key in _TRIAL_FILES and isinstance(value, str) else value
+            key: last_part(value) if key in _TRIAL_FILES and isinstance(value, str) else value
             for key, value in trial.items()
         }
         for trial in _trials(content)

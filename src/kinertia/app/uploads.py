@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import AsyncIterator
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 from kinertia.app.library import Person
 from kinertia.checks.files import unknown_kind
 from kinertia.errors import FileError
-from kinertia.io.file_names import fits_everywhere, same_folder
+from kinertia.io.file_names import fits_everywhere, last_part, same_folder
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES
 
 LARGEST_FILE_MB, LARGEST_PERSON_MB, MOST_FILES = 500, 2000, 200
@@ -27,7 +27,7 @@ def harmless_name(given: str) -> str:
     Raises:
         FileError: it cannot be a file's name on every system, or is hidden, or Kinertia does not read its kind.
     """
-    name = PureWindowsPath(given).name  # knows both separators, and drives
+    name = last_part(given)
     shown = name[:_LONGEST_NAME] or given[:_LONGEST_NAME] or "a file without a name"
     sound = fits_everywhere(name) and name.isprintable() and len(name.encode()) <= _LONGEST_NAME
     if name.startswith(".") or not sound:
