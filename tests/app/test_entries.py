@@ -91,7 +91,7 @@ def test_what_was_corrected_stays_when_files_are_added_or_removed(person, measur
     put(person, measured_walk, "static.c3d", "walk.c3d")
     recognise(person)
     write_form(person, {"sex": "female", "mass_kg": "50", USE + "walk.c3d": "", USE + "static.c3d": "static"})
-    shutil.copyfile(measured_walk / "walk.c3d", person.folder / "walk2.c3d")
+    shutil.copyfile(measured_walk / "static.c3d", person.folder / "walk2.c3d")
     recognise(person)
     assert used(person) == {"static.c3d": "static", "walk2.c3d": "trial"}
     assert entries(person)["subject"]["mass_kg"] == 50.0
