@@ -23,7 +23,7 @@ def served(tmp_path_factory):
         person = app.library.add("Anna")
         (person.folder / "subject.toml").write_text("[subject]\n")
         person.results.mkdir()
-        (person.results / "fit.npz").touch()
+        (person.results / "fit.json").write_text("{}")
         (person.results / "report.html").write_text("<h1>report</h1>")
         (person.results / ".hidden.html").write_text("secret")
         (folder / "library" / "not a person").mkdir()

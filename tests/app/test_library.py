@@ -16,6 +16,7 @@ from kinertia.app.library import Library, started
 from kinertia.app.person_page import standing
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere
+from kinertia.io.provenance import sha256
 
 
 @pytest.fixture
@@ -69,14 +70,21 @@ def test_what_was_not_finished_is_said_to_be_interrupted_and_what_was_stays(libr
     anna, ben = library.add("Anna"), library.add("Ben")
     anna.note(fit=started())
     ben.results.mkdir()
-    (ben.results / "fit.npz").touch()
-    outcome = {"level": "pass", "headline": "All checks passed.", "ended": 1.7e9}
+    (ben.results / "fit.json").write_text("{}")
+    outcome = {
+        "summary": sha256(ben.results / "fit.json"),
+        "level": "pass",
+        "headline": "All checks passed.",
+        "ended": 1.7e9,
+    }
     (ben.results / "outcome.json").write_text(json.dumps(outcome))
     with library.opened():
         told = {person.name: standing(person, Jobs()) for person in library.people()}
     assert "Interrupted" in told["Anna"].sentence
     assert told["Ben"].sentence == "All checks passed."
     assert told["Ben"].fitted
+    (ben.results / "fit.json").write_text('{"kinertia": "of the command line"}')
+    assert standing(ben, Jobs()).level == "", "what is told of other results is not told of these"
 
 
 def test_a_record_that_is_broken_is_none(library):

@@ -25,12 +25,12 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.io.file_lock import sole_use
 from kinertia.io.file_names import fits_everywhere, same_folder
 from kinertia.io.output_folder import check_folder, write_then_rename
+from kinertia.io.provenance import sha256
 from kinertia.io.subject_file import read_subject
 from kinertia.io.working_folder import sweep
-from kinertia.report.saved_fit import FIT_FILE
 from kinertia.studies.cohort_record import inputs_of
 
-SUBJECT, OUTCOME = "subject.toml", "outcome.json"
+SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
 _RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
 _STARTED, _INTERRUPTED = "started", "interrupted"
 _LONGEST_NAME = 80
@@ -65,7 +65,7 @@ class Person:
     @property
     def fitted(self) -> bool:
         """Whether there are results."""
-        return (self.results / FIT_FILE).is_file()
+        return (self.results / SUMMARY).is_file()
 
     def files(self) -> list[Path]:
         """What was dropped: everything but the subject file."""
@@ -88,8 +88,12 @@ class Person:
             return ""
 
     def outcome(self, kind: str) -> dict[str, Any]:
-        """What the last check or fit left beside what it wrote; empty where there is none."""
-        return _json(getattr(self, kind) / OUTCOME)
+        """What the last check or fit left beside what it wrote; empty where there is none, or of other results."""
+        outcome = _json(getattr(self, kind) / OUTCOME)
+        summary = self.results / SUMMARY
+        if kind == "results" and (not summary.is_file() or outcome.get("summary") != sha256(summary)):
+            return {}
+        return outcome
 
     def notes(self) -> dict[str, Any]:
         """What else is remembered: how the last check and fit ended that left nothing, and which files were seen."""

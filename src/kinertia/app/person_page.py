@@ -137,7 +137,7 @@ def person_page(
         counts=_counts(checked),
         results=results if person.fitted else {},
         fitted=person.fitted,
-        results_old=person.fitted and results.get("inputs") != person.inputs,
+        results_old=bool(results) and results.get("inputs") != person.inputs,
         result_files=_result_files(person),
         limits=LIMITS,
     )

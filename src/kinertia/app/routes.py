@@ -25,8 +25,6 @@ from kinertia.app.responses import archive, chosen_folder, expect, form, page, r
 from kinertia.app.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import check_folder, complete_folder, expect_own_folder
-from kinertia.report.comparison import MOST_FITS, render_comparison
-from kinertia.report.saved_fit import load_fit
 
 Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
@@ -82,7 +80,6 @@ class _Actions:
             folder=self._library.folder,
             limits=LIMITS,
             example=self._example is not None,
-            most=MOST_FITS,
         )
 
     async def add(self, request: Request) -> Response:
@@ -208,12 +205,17 @@ class _Actions:
 
     async def compare(self, request: Request) -> Response:
         """The comparison of chosen results, in the page."""
+        from kinertia.report.comparison import MOST_FITS
+
         chosen = self._chosen(request)
         problem = "" if 2 <= len(chosen) <= MOST_FITS else f"Choose 2 to {MOST_FITS} people with results."
         return page(request, "compare.html.j2", people=chosen, problem=problem, query=request.url.query)
 
     async def compared(self, request: Request) -> Response:
         """What `kinertia compare` writes of them."""
+        from kinertia.report.comparison import MOST_FITS, render_comparison
+        from kinertia.report.saved_fit import load_fit
+
         chosen = self._chosen(request)
         if not 2 <= len(chosen) <= MOST_FITS:
             raise HTTPException(404, "nothing to compare")

@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
-from kinertia.app.library import OUTCOME, SUBJECT, Person
+from kinertia.app.library import OUTCOME, SUBJECT, SUMMARY, Person
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import command_line
+from kinertia.io.provenance import command_line, sha256
 from kinertia.io.subject_file import read_subject
 
 Progress = Callable[[str, float], None]
@@ -61,6 +61,7 @@ def fit(person: Person, progress: Progress) -> None:
             work,
             {
                 "inputs": person.inputs,
+                "summary": sha256(work / SUMMARY),
                 "level": told.level,
                 "headline": told.headline,
                 "ended": ended,
