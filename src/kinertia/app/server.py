@@ -94,6 +94,7 @@ def _listening(port: int) -> socket.socket:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         taken.bind(("127.0.0.1", port))
+        taken.listen()  # a browser that is opened before `run` waits
     except (OSError, OverflowError) as error:
         taken.close()
         problem = f"--port {port}: cannot be had ({error}); give another, or none for one that is free"

@@ -24,7 +24,7 @@ def app(
         Path | None, typer.Option(help="Library of people and their results; Kinertia in your own folder if left out.")
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
-    browser: Annotated[bool, typer.Option(help="Open it in the browser.")] = True,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only show the address.")] = False,
 ) -> None:
     """Drop files on a page in the browser, check them, fit, read the report.
 
@@ -52,7 +52,7 @@ def app(
         server = Server(library, port, FILES, _WARM_UP)
         out.print(f"Kinertia is at {server.address}", soft_wrap=True)
         out.print(f"library: {library.folder}; Ctrl-C ends it", soft_wrap=True)
-        if browser:
+        if not no_browser:
             webbrowser.open(server.address)
         with suppress(KeyboardInterrupt):
             server.run()
