@@ -17,7 +17,7 @@ import typer
 from kinertia.cli.app import application
 from kinertia.io.subject_file import InstrumentsFiles, Model, PriorFiles, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
-from kinertia.settings import KnownSegment, Settings, Subject, Table
+from kinertia.settings import Attached, KnownSegment, Settings, Subject, Table
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))
@@ -107,6 +107,7 @@ _GENERATED = {
     "instruments": lambda: _table(InstrumentsFiles),
     "prior": lambda: _table(PriorFiles),
     "segment": lambda: _table(KnownSegment),
+    "attached": lambda: _table(Attached),
 }
 
 

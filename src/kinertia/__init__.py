@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from kinertia.report.cohort_tables import read_cohort as read_cohort
     from kinertia.report.files import save_fit as save_fit
     from kinertia.report.saved_fit import load_fit as load_fit
+    from kinertia.settings import Attached as Attached
     from kinertia.settings import Instruments as Instruments
     from kinertia.settings import Settings as Settings
     from kinertia.settings import Subject as Subject
@@ -88,7 +89,7 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "errors": "FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
-    "settings": "Instruments Settings Subject",
+    "settings": "Attached Instruments Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",
     "model.anthropometry": "BodyGeometry literature_bsp",

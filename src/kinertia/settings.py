@@ -47,6 +47,48 @@ def _stated(value: object) -> tuple[float, float]:
 Stated = Annotated[tuple[float, float], BeforeValidator(_stated)]
 
 
+_WEIGHED_SD = 0.01
+"""Relative deviation of a mass that is given without one."""
+
+
+def _attached_mass(value: object) -> tuple[float, float] | None:
+    """Mass and deviation; None of an unknown one."""
+    if value is None or value == "unknown":
+        return None
+    if type(value) in (int, float) and 0 < value < float("inf"):  # type: ignore[operator]
+        return float(value), _WEIGHED_SD * float(value)  # type: ignore[arg-type]
+    try:
+        mass_kg, sd_kg = _stated(value)
+    except ValueError:
+        mass_kg = 0.0
+    if mass_kg > 0:
+        return mass_kg, sd_kg
+    raise ValueError('must be a mass in kg, one with its standard deviation in quotes ("10 +- 0.5"), or "unknown"')
+
+
+def _three(value: object) -> tuple[float, float, float]:
+    match value:
+        case [int() | float() as x, int() | float() as y, int() | float() as z]:
+            if all(abs(number) <= _FARTHEST_MM for number in (x, y, z)):
+                return float(x), float(y), float(z)
+    raise ValueError(f"must be three numbers, [x, y, z] in mm, none beyond {_FARTHEST_MM:g}")
+
+
+_FARTHEST_MM = 2000.0
+
+
+def _size(value: object) -> tuple[float, float, float]:
+    size = _three(value)
+    if min(size) > 0:
+        return size
+    raise ValueError("must be three lengths above zero, [depth, height, width] in mm")
+
+
+AttachedMass = Annotated[tuple[float, float] | None, BeforeValidator(_attached_mass)]
+Place = Annotated[tuple[float, float, float], BeforeValidator(_three)]
+Size = Annotated[tuple[float, float, float], BeforeValidator(_size)]
+
+
 def sex_of(value: object) -> object:
     """ "male" or "female", of which one letter is enough; anything else as it is."""
     known = ("male", "female")
@@ -92,6 +134,15 @@ class Subject(Table):
     )
     mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
     height_m: float | None = Field(default=None, description="stature, m")
+    age_years: float | None = Field(
+        default=None,
+        gt=0.0,
+        lt=130.0,
+        description="age; the tables are of young adults, below 18 and from 65 others apply",
+    )
+    population: Literal["adult", "child", "elderly", "obese"] | None = Field(
+        default=None, description='"adult", "child", "elderly" or "obese"; left out: by age and body-mass index'
+    )
     knee_width_mm: float | None = Field(
         default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"
     )
@@ -191,6 +242,9 @@ class KnownSegment(Table):
     ixx_kgm2: Stated | None = Field(default=None, description="moment of inertia about the x axis, kg m2")
     iyy_kgm2: Stated | None = Field(default=None, description="about the y axis")
     izz_kgm2: Stated | None = Field(default=None, description="about the z axis")
+    prosthesis: bool = Field(
+        default=False, description="true: not the body's own: neither like the tables nor like the other side"
+    )
     source: str | None = Field(default=None, description="how it was measured; shown in the notes of a fit")
 
     def parameters(self) -> dict[str, tuple[float, float]]:
@@ -198,8 +252,34 @@ class KnownSegment(Table):
         parameters = {}
         for key in type(self).model_fields:
             stated = getattr(self, key)
-            if key != "source" and stated is not None:
+            if key not in ("source", "prosthesis") and stated is not None:
                 parameter, unit = key.rsplit("_", 1)
                 factor = 1e-3 if unit == "mm" else 1.0
                 parameters[parameter] = (factor * stated[0], factor * stated[1])
         return parameters
+
+
+class Attached(Table):
+    """Something that is not body and moves with a segment in all trials: a rucksack, a held weight, an orthosis, shoes.
+
+    Places count along the axes of the segment from its origin, as centres of mass in `bsp.csv` do.
+
+    Examples:
+        >>> pack = dict(name="rucksack", segment="torso", com_mm=[-200, 300, 0], on_scale=False)
+        >>> kinertia.Attached(mass_kg=10.0, **pack).mass_kg
+        (10.0, 0.1)
+        >>> kinertia.Attached(mass_kg="unknown", **pack).mass_kg is None
+        True
+    """
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="a name of its own, of letters, digits and _")
+    segment: str = Field(description='segment that it moves with, like "torso"; of an OpenSim model a body')
+    mass_kg: AttachedMass = Field(description='kg: a number, "10 +- 0.5", or "unknown": then it is estimated')
+    on_scale: bool = Field(description="true: mass_kg of [subject] was weighed with it; false: without")
+    com_mm: Place = Field(description="its centre of mass in the segment: [forwards, upwards, to the right], mm")
+    com_sd_mm: float = Field(default=30.0, gt=0.0, le=500.0, description="how far that may be off along each axis, mm")
+    size_mm: Size | None = Field(
+        default=None,
+        description="its extent along the same axes, for its inertia: that of a solid block; left out: of a ball of "
+        "the density of water",
+    )

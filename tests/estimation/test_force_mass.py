@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import TrialError
+from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import check_force_masses, check_masses, force_mass, unit_hint
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
@@ -47,12 +48,12 @@ def test_gaps_change_little(made):
 
 def said(made, force) -> str:
     with pytest.raises(TrialError, match="the vertical force corresponds to") as caught:
-        check_force_masses(made.skeleton, made.bsp.total_mass_kg, [trial(made, force)])
+        check_force_masses(made.skeleton, CarriedMass.of(made.bsp.total_mass_kg, ()), [trial(made, force)])
     return str(caught.value)
 
 
 def test_each_cause_is_told_by_its_evidence_and_none_is_accused_without(made):
-    check_force_masses(made.skeleton, made.bsp.total_mass_kg, [trial(made)])
+    check_force_masses(made.skeleton, CarriedMass.of(made.bsp.total_mass_kg, ()), [trial(made)])
     gain = said(made, lambda time, force: 0.75 * force)
     chair = said(made, lambda time, force: force - np.array([0.0, 100.0, 0.0]))
     for text in (gain, chair):
@@ -73,10 +74,10 @@ def test_trials_of_different_masses_are_not_pooled(made):
         force_mass(made.skeleton, trial(made, lambda time, force, k=k: k * force, name))
         for name, k in (("a", 0.93), ("b", 1.09))
     )
-    check_masses(made.bsp.total_mass_kg, [light])
-    check_masses(made.bsp.total_mass_kg, [heavy])
+    check_masses(CarriedMass.of(made.bsp.total_mass_kg, ()), [light])
+    check_masses(CarriedMass.of(made.bsp.total_mass_kg, ()), [heavy])
     with pytest.raises(TrialError, match=r"trial 'b'.*kg, in 'a' .*kg; pool only trials of one person"):
-        check_masses(made.bsp.total_mass_kg, [light, heavy])
+        check_masses(CarriedMass.of(made.bsp.total_mass_kg, ()), [light, heavy])
 
 
 def test_too_short_a_window_says_nothing(made):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import SubjectError, TrialError
+from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import force_mass
 from kinertia.estimation.input_checks import check_same_person, complete_subject
 from kinertia.estimation.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
@@ -69,8 +70,8 @@ def test_mass_by_force_knows_the_movement_of_the_body(short_fit):
 def warned(fit, mass_kg=None, **changes):
     result = SimpleNamespace(**{"bsp": fit.literature, "converged": True, "evaluations": 7, **changes})
     mass = force_mass(fit.skeleton, fit.trials[0].kinematics.trial).mass_kg if mass_kg is None else mass_kg
-    said = force_warnings(mass, fit.literature, fit.trials[:1], fit.skeleton)
-    return said + fit_warnings(mass, fit.literature, result.bsp) + two_level_warnings(result)
+    said = force_warnings(CarriedMass.of(mass, ()), fit.literature, fit.trials[:1], fit.skeleton)
+    return said + fit_warnings(CarriedMass.of(mass, ()), fit.literature, result.bsp) + two_level_warnings(result)
 
 
 def test_warnings_come_one_by_one(short_fit):
@@ -105,7 +106,7 @@ def test_a_motion_that_the_forces_do_not_make_accuses_inverse_kinematics_and_nob
     trial, literature = short_fit.trials[0], short_fit.literature
     force = trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean()
     wrong = {**trial.residuals, "literature": trial.residuals["literature"] + 0.3 * force * np.eye(6)[1]}
-    mass = force_mass(short_fit.skeleton, trial.kinematics.trial).mass_kg
+    mass = CarriedMass.of(force_mass(short_fit.skeleton, trial.kinematics.trial).mass_kg, ())
     (said,) = force_warnings(mass, literature, [replace(trial, residuals=wrong)], short_fit.skeleton)
     assert "inverse kinematics went wrong, not the plates" in said
     assert force_warnings(mass, literature, [trial], short_fit.skeleton) == []

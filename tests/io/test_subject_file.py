@@ -156,7 +156,7 @@ def test_byte_order_mark_and_windows_line_ends(folder):
 @pytest.mark.parametrize("table", [field.alias or name for name, field in SubjectFile.model_fields.items()])
 def test_unknown_key_in_every_table(folder, table):
     table = "segment.thigh_r" if table == "segment" else table
-    heading = f"[[{table}]]" if table == "trial" else f"[{table}]"
+    heading = f"[[{table}]]" if table in ("trial", "attached") else f"[{table}]"
     text = GOOD if heading in GOOD else f"{GOOD}\n{heading}\n"
     text = text.replace(heading, f"{heading}\nzzz = 1", 1)
     with pytest.raises(FileError, match=rf"unknown key 'zzz' in \[{table}\]; known: "):

@@ -35,6 +35,8 @@ def report_fit(fit: Fit) -> None:
     named = {"measured": "stated", "literature": _before(fit)}
     masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
     out.print(f"total mass (kg): {masses}\n")
+    if fit_summary["asymmetry"]:
+        out.print(f"left and right: {'; '.join(fit_summary['asymmetry'])}\n")
     for warning in fit.warnings:
         show_warning(warning)
 

@@ -17,12 +17,15 @@ from kinertia.io.subject_file import read_subject
 from kinertia.report.accuracy import HEADINGS, JOINT_CAPTION, JOINT_HEADINGS, accuracy_rows, joint_rows, save_accuracy
 from kinertia.report.extras import HOW, has_matplotlib
 from kinertia.report.faults import counts, save_faults
+from kinertia.report.populations import CAPTION, population_rows, rucksack_sentence, save_populations
+from kinertia.report.populations import HEADINGS as POPULATION_HEADINGS
 from kinertia.report.sensitivity import save_sensitivity
 from kinertia.report.table1 import save_table1, table1_rows
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.table1_variants import save_variants, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.faults import run_faults, synthetic_walk
+from kinertia.studies.populations import run_populations
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.studies.table1_variants import run_variants
@@ -134,6 +137,35 @@ def accuracy(
     out.print(JOINT_CAPTION)
     save_accuracy(accuracies, seed, output)
     out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
+
+
+@study.command()
+def populations(
+    people: Annotated[int, typer.Option(min=2, help="People of each population.")] = 20,
+    seed: Seed = 1,
+    workers: Workers = None,
+    output: Output = Path("out"),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """What does a wrong prior cost? Children, obese, old people, prostheses, with the adults' prior and their own.
+
+    Also: is a rucksack of unknown mass found?
+
+    [bold]Example[/]
+
+    kinertia study populations -o out
+    """
+    results_folder(output, force)
+    with shown_progress() as progress:
+        accuracies, rucksack = run_populations(people, seed, workers, lambda share: progress("people", share))
+    shown = plain_table(*POPULATION_HEADINGS)
+    for row in population_rows(accuracies):
+        shown.add_row(*row)
+    out.print(shown)
+    out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksack)}")
+    save_populations(accuracies, rucksack, seed, output)
+    out.print(f"\nresults in {output}: populations.json, populations.md", soft_wrap=True)
 
 
 @study.command()

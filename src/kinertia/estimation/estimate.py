@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinertia.estimation.attached import with_attached
 from kinertia.estimation.forces_used import forces_used
-from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
@@ -27,7 +27,7 @@ from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, 
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import interpolate
-from kinertia.settings import Settings, Subject
+from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.telling_movements import TellingMovements, missing_movements
 
@@ -41,6 +41,7 @@ def estimate_bsp(
     marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
     prior: BspPrior | None = None,
+    attached: Sequence[Attached] = (),
 ) -> Fit:
     """Body segment parameters of a person from a static trial and one or more gait trials.
 
@@ -52,11 +53,12 @@ def estimate_bsp(
         marker_set: found from the static trial's labels if None.
         progress: called as the work goes on.
         prior: of the body segment parameters, for the simultaneous estimate; the literature's if None.
+        attached: what the person wore or carried in all gait trials.
 
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
-    ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress)
+    ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress, attached)
     return estimate(ready if prior is None else replace(ready, prior=prior), settings, progress)
 
 
@@ -68,6 +70,7 @@ def estimate_bsp_of_model(
     settings: Settings | None = None,
     calibrate: bool = False,
     progress: Progress = lambda stage, share: None,
+    attached: Sequence[Attached] = (),
 ) -> Fit:
     """Body segment parameters of a person whose scaled OpenSim model is known, by the simultaneous estimate.
 
@@ -78,6 +81,7 @@ def estimate_bsp_of_model(
         settings: defaults if None.
         calibrate: let markers and joint centres move; else they stay where the model has them.
         progress: called as the work goes on.
+        attached: what the person wore or carried in all trials.
 
     Raises:
         KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
@@ -85,7 +89,8 @@ def estimate_bsp_of_model(
     from kinertia.estimation.prepare_osim import prepare_osim
 
     settings = settings or Settings()
-    return estimate(prepare_osim(subject, model, inputs, settings, calibrate, progress), settings, progress)
+    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached)
+    return estimate(ready, settings, progress)
 
 
 @one_blas_thread
@@ -100,15 +105,15 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     Raises:
         KinertiaError: the trials contradict each other, or the scale.
     """
-    settings = settings or Settings()
+    settings, ready = settings or Settings(), with_attached(ready)
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     warnings = (
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
         *outcome.warnings,
-        *force_warnings(known(ready.subject.mass_kg), ready.literature, outcome.trials, ready.skeleton),
-        *fit_warnings(known(ready.subject.mass_kg), ready.literature, outcome.bsp, ready.uncertainty.source),
+        *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),
+        *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source),
     )
     return Fit(
         subject=ready.subject,

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.errors import TrialError
+from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.markers_centre import centre_height, owners_of
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
@@ -34,6 +35,7 @@ _FEWEST_FRAMES = 2 * MIN_SAMPLES
 _CARRIED, _MISSING = 0.15, 0.25
 """Share of body weight within which all of it is carried, and from which on some of it is not."""
 _SHORTEST_S = 0.1
+CARRIED_HINT = "if something was worn or carried that the scale did not weigh, give it as [[attached]]"
 _MOSTLY = 0.25
 """Share of the window in which all must be carried for the rest to be called an unmeasured contact."""
 
@@ -55,22 +57,25 @@ class ForceMass:
     time: FloatArray
     carried: FloatArray
 
-    def contradicts(self, mass_kg: float) -> bool:
+    def contradicts(self, carried: CarriedMass) -> bool:
         """Whether a person of this mass can hardly have been on the plates."""
-        return abs(self.mass_kg - mass_kg) > CONTRADICTING_MASS * mass_kg + 2 * self.sd_kg
+        allowed = CONTRADICTING_MASS * carried.total_kg + 2 * np.hypot(self.sd_kg, carried.sd_kg)
+        return bool(abs(self.mass_kg - carried.total_kg) > allowed)
 
-    def sentence(self, mass_kg: float) -> str:
+    def sentence(self, carried: CarriedMass) -> str:
         """What was found beside this stated mass, what may be the cause, and what to do."""
+        mass_kg = carried.total_kg
         text = (
             f"from {self.time[0]:.3f} to {self.time[-1]:.3f} s the vertical force corresponds to {self.mass_kg:.1f} "
-            f"kg; stated mass {mass_kg:.1f} kg"
+            f"kg; stated mass {carried}"
         )
         if hint := unit_hint(self.mass_kg, mass_kg):
             return f"{hint}: {text}"
         share = self.carried / mass_kg - 1.0
         if self.mass_kg > mass_kg:
             return (
-                f"{text}; correct the mass, the gain, the zero or the units of the plates, or see who else is on them"
+                f"{text}: {CARRIED_HINT}; else correct the mass, the gain, the zero or the units of the plates, or see "
+                f"who else is on them"
             )
         whole = np.abs(share) < _CARRIED
         spans = [(a, b) for a, b in runs(share < -_MISSING) if self.time[b] - self.time[a] >= _SHORTEST_S]
@@ -137,11 +142,11 @@ def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
     return ForceMass(trial.name, mass, float(sd), time, carried)
 
 
-def check_masses(mass_kg: float, by_force: Sequence[ForceMass]) -> None:
+def check_masses(carried: CarriedMass, by_force: Sequence[ForceMass]) -> None:
     """Raise TrialError when trials cannot be of one person, or not of the one on the scale."""
     for one in by_force:
-        if one.contradicts(mass_kg):
-            raise TrialError(one.trial, one.sentence(mass_kg))
+        if one.contradicts(carried):
+            raise TrialError(one.trial, one.sentence(carried))
     if by_force:
         heaviest, lightest = (pick(by_force, key=lambda one: one.mass_kg) for pick in (max, min))
         allowed = CONTRADICTING_MASS * lightest.mass_kg + 2 * np.hypot(heaviest.sd_kg, lightest.sd_kg)
@@ -153,6 +158,6 @@ def check_masses(mass_kg: float, by_force: Sequence[ForceMass]) -> None:
             )
 
 
-def check_force_masses(skeleton: Skeleton, mass_kg: float, trials: Sequence[Trial]) -> None:
+def check_force_masses(skeleton: Skeleton, carried: CarriedMass, trials: Sequence[Trial]) -> None:
     """`check_masses` of the trials whose forces tell a mass."""
-    check_masses(mass_kg, [mass for trial in trials if (mass := force_mass(skeleton, trial)) is not None])
+    check_masses(carried, [mass for trial in trials if (mass := force_mass(skeleton, trial)) is not None])

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from kinertia.errors import SessionError, SettingsError
+from kinertia.estimation.attached import with_attached
 from kinertia.estimation.estimate import estimate
 from kinertia.estimation.known_body import with_known_body
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
@@ -50,7 +51,7 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     session = () if known.session is None else read_session(known.session)
     if session:
         check_plates(wanted)
-    ready = _with_known_body(_prepared(wanted, progress), wanted)
+    ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted))
     if known == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
@@ -90,9 +91,10 @@ def _prepared(wanted: SubjectFile, progress: Progress) -> Prepared:
         from kinertia.io.osim.reader import read_osim
 
         model, trials = read_osim(wanted.model.osim), read_trials(wanted, progress)
-        return prepare_osim(wanted.subject, model, trials, wanted.settings, wanted.model.calibrate, progress)
+        calibrate, attached = wanted.model.calibrate, wanted.attached
+        return prepare_osim(wanted.subject, model, trials, wanted.settings, calibrate, progress, attached)
     static, inputs, marker_set = read_inputs(wanted, progress)
-    return prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress)
+    return prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress, wanted.attached)
 
 
 def fit_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:

@@ -22,6 +22,8 @@ from kinertia.settings import KnownSegment, PriorSettings
 
 _UNLIKE_SD = 3.0
 """Deviations from the tables beyond which the user is asked to look again."""
+_PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
+"""Relative deviation of a prosthesis' mass, and the factor on the tables' other deviations."""
 _KEPT_SHARE = 1e-3
 """Deviation of a mass that is kept, over its prior's."""
 
@@ -47,6 +49,9 @@ def with_known_body(
     if settings.sides_correlation is not None:
         covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
         prior = replace(prior, covariance=covariance)
+    for name in (name for name, known in segments.items() if known.prosthesis):
+        prior = with_prosthesis(prior, name)
+        notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
     measured = _measured(prior, segments)
     for (row, column), (value, sd) in measured.items():
         k = 10 * row + column
@@ -86,16 +91,37 @@ def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
     )
 
 
+def with_prosthesis(prior: BspPrior, segment: str) -> BspPrior:
+    """The prior of a segment that is none of the body's: wide, and independent of all others.
+
+    The side of a below-knee prosthesis is often some 2 kg lighter than the other (Smith & Martin 2011, J Prosthet
+    Orthot 23:114), which is 40 % of shank and foot; its centre of mass is further up by an amount for which there are
+    no numbers.
+    """
+    row = _row(prior, segment)
+    rows = slice(10 * row, 10 * row + 10)
+    factor = np.full(10, _PROSTHESIS_SPREAD)
+    factor[0] = max(_PROSTHESIS_MASS_SD * prior.mean.mass_kg[row] / prior.sd[row, 0], 1.0)
+    covariance = prior.covariance.copy()
+    own = covariance[rows, rows] * np.outer(factor, factor)
+    covariance[rows, :] = covariance[:, rows] = 0.0
+    covariance[rows, rows] = own
+    return replace(prior, covariance=covariance)
+
+
+def _row(prior: BspPrior, segment: str) -> int:
+    if segment not in prior.mean.segments:
+        raise PriorError(f"[segment.{segment}]: the model has no such segment; it has {', '.join(prior.mean.segments)}")
+    return prior.mean.segments.index(segment)
+
+
 def _measured(prior: BspPrior, segments: Mapping[str, KnownSegment]) -> dict[tuple[int, int], tuple[float, float]]:
     """Value and deviation, SI, by row and column of the table."""
     result = {}
     for name, known in segments.items():
-        if name not in prior.mean.segments:
-            raise PriorError(
-                f"[segment.{name}]: the model has no such segment; it has {', '.join(prior.mean.segments)}"
-            )
+        row = _row(prior, name)
         for parameter, (value, sd) in known.parameters().items():
-            result[prior.mean.segments.index(name), PARAMETERS.index(parameter)] = value, sd
+            result[row, PARAMETERS.index(parameter)] = value, sd
     return result
 
 

@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from kinertia.errors import MarkerSetError, TrialError
+from kinertia.errors import MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled
+from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.doubts import motion_doubts, static_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import (
@@ -17,6 +18,7 @@ from kinertia.estimation.input_checks import (
     known,
 )
 from kinertia.estimation.joint_widths import with_widths
+from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.io.marker_set_file import choose_marker_set
@@ -29,7 +31,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.swapped_markers import check_labels
-from kinertia.settings import Settings, Subject
+from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
 
@@ -71,6 +73,7 @@ class Prepared:
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
         warnings, notes: one sentence each.
+        attached: what the person wore or carried.
 
     Examples:
         >>> ready = kinertia.prepare_subject("lab/subject.toml")
@@ -88,6 +91,12 @@ class Prepared:
     seconds: tuple[Mapping[str, float], ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+    attached: tuple[Attached, ...] = ()
+
+    @property
+    def carried(self) -> CarriedMass:
+        """What the scale says of the body, and of what the forces carry."""
+        return CarriedMass.of(known(self.subject.mass_kg), self.attached)
 
 
 @one_blas_thread
@@ -97,6 +106,7 @@ def calibrate(
     marker_set: MarkerSet,
     subject: Subject,
     hip_centre: str,
+    attached: Sequence[Attached] = (),
 ) -> tuple[Gait27, Skeleton, list[str]]:
     """The 27-DOF model of the static trial, adapted to the trials.
 
@@ -106,7 +116,7 @@ def calibrate(
     model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), hip_centre)
     for trial in trials:
         check_visible(model.skeleton, trial)
-    check_force_masses(model.skeleton, known(subject.mass_kg), trials)
+    check_force_masses(model.skeleton, CarriedMass.of(known(subject.mass_kg), attached), trials)
     check_same_person(model.skeleton, trials)
     poses = first_poses(model.skeleton, trials)
     skeleton, held = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
@@ -136,6 +146,7 @@ def prepare(
     settings: Settings | None = None,
     marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
+    attached: Sequence[Attached] = (),
 ) -> Prepared:
     """Calibrated skeleton, literature BSPs and smoothed kinematics of all trials; the arguments are `estimate_bsp`'s.
 
@@ -143,6 +154,8 @@ def prepare(
         KinertiaError: the subject, a marker set or a trial cannot be used.
     """
     settings = settings or Settings()
+    if attached and settings.method == "two-level":
+        raise SettingsError("two-level knows the body only; where something is attached, use the default method")
     recordings = [item.recording for item in inputs]
     subject, warnings = complete_subject(subject, [static, *recordings])
     if marker_set is None:
@@ -159,10 +172,11 @@ def prepare(
         trial, doubts = _looked_at(item, static, marker_set)
         warnings += doubts
         turned.append(_turned(trial, marker_set))
-    model, skeleton, notes = calibrate(static, [trial for trial, _ in turned], marker_set, subject, settings.hip_centre)
-    literature = literature_bsp(
-        known(subject.mass_kg), known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
-    )
+    trials = [trial for trial, _ in turned]
+    model, skeleton, notes = calibrate(static, trials, marker_set, subject, settings.hip_centre, attached)
+    body_kg = CarriedMass.of(known(subject.mass_kg), attached).body_kg
+    literature = literature_bsp(body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp)
+    expected = population_prior(literature_prior(literature), subject)
     calibration_s = (time.perf_counter() - started) / len(inputs)
 
     kinematics, seconds = [], []
@@ -178,18 +192,19 @@ def prepare(
         absent = [label for label in skeleton.labels if label not in trial.markers.labels]
         if absent:
             notes.append(f"{trial.name}: markers of the static trial that it does not have: {', '.join(absent)}")
-    notes += [note for k in kinematics for note in k.notes]
+    notes += [*expected.notes, *(note for k in kinematics for note in k.notes)]
     return Prepared(
         subject=subject,
         skeleton=skeleton,
-        literature=literature,
-        prior=literature_prior(literature),
+        literature=expected.prior.mean,
+        prior=expected.prior,
         uncertainty=GAIT27_UNCERTAINTY.with_axes() if settings.joint_axes else GAIT27_UNCERTAINTY,
         file=None,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=tuple(warnings),
+        warnings=(*warnings, *expected.warnings),
         notes=tuple(dict.fromkeys(notes)),
+        attached=tuple(attached),
     )
 
 

@@ -14,9 +14,11 @@ import numpy as np
 
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
+from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
@@ -27,7 +29,7 @@ from kinertia.model.model_markers import markers_of_model
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.settings import Settings, Subject
+from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Trial
 from kinertia.trial.plate_assignment import build_trial
 
@@ -44,6 +46,7 @@ def prepare_osim(
     settings: Settings | None = None,
     calibrate: bool = False,
     progress: Progress = lambda stage, share: None,
+    attached: Sequence[Attached] = (),
 ) -> Prepared:
     """The model fitted to all trials; the arguments are `estimate_bsp_of_model`'s.
 
@@ -64,14 +67,17 @@ def prepare_osim(
         trials.append(trial)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
-    check_force_masses(skeleton, known(subject.mass_kg), trials)
+    carried = CarriedMass.of(known(subject.mass_kg), attached)
+    check_force_masses(skeleton, carried, trials)
     poses = first_poses(skeleton, trials)
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
     if calibrate:
         skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
     calibration_s = (time.perf_counter() - started) / len(inputs)
-    own, factor = at_mass(model.bsp, known(subject.mass_kg))
+    own, factor = at_mass(model.bsp, carried.body_kg)
     prior, held = parted(skeleton, own)
+    expected = population_prior(prior, subject.model_copy(update={"sex": None}))
+    prior = expected.prior
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     uncertainty = ModelUncertainty(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
 
@@ -84,6 +90,7 @@ def prepare_osim(
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
     notes = [
         f"OpenSim model: {model.path.name}",
+        *expected.notes,
         *_mass_note(model, own, factor),
         *_idle_note(model, idle),
         *_held_note(skeleton, held),
@@ -101,6 +108,7 @@ def prepare_osim(
         seconds=tuple(seconds),
         warnings=(*warnings, *_impossible_warning(model)),
         notes=tuple(dict.fromkeys(notes)),
+        attached=tuple(attached),
     )
 
 

@@ -65,6 +65,7 @@ class BspPrior:
         mean: need not be physically consistent (a start off by 50 % is not); estimates always are.
         covariance: (10 s, 10 s) of the table rows (mass, CoM, moments, products), segment after segment.
         mass_kg, mass_sd_kg: the total mass by the scale, and its deviation.
+        weighed: (s,) which segments the scale weighed; None: all.
 
     Raises:
         PriorError: the covariance has the wrong shape or is not positive definite, or a deviation is not positive.
@@ -81,6 +82,7 @@ class BspPrior:
     covariance: np.ndarray
     mass_kg: float
     mass_sd_kg: float
+    weighed: tuple[bool, ...] | None = None
 
     def __post_init__(self) -> None:
         size = 10 * len(self.mean.segments)
@@ -111,13 +113,18 @@ class BspPrior:
         """(s, 10) prior SDs, in the table's order and units."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 10)
 
+    @property
+    def on_scale(self) -> np.ndarray:
+        """(s,) 1 of segments that the scale weighed, 0 of others."""
+        return np.ones(len(self.mean.segments)) if self.weighed is None else np.array(self.weighed, dtype=float)
+
     def given_scale(self) -> tuple[np.ndarray, np.ndarray]:
         """(10 s,) mean and (10 s, 10 s) covariance of the table rows once the scale has said `mass_kg`."""
         scale = np.zeros(self.covariance.shape[0])
-        scale[::10] = 1.0
+        scale[::10] = self.on_scale
         with_total = self.covariance @ scale
         variance = scale @ with_total + self.mass_sd_kg**2
-        mean = self.mean.table().ravel() + with_total * (self.mass_kg - self.mean.total_mass_kg) / variance
+        mean = self.mean.table().ravel() + with_total * (self.mass_kg - self.on_scale @ self.mean.mass_kg) / variance
         return mean, self.covariance - np.outer(with_total, with_total) / variance
 
     def draw(self, rng: np.random.Generator) -> BodySegmentParameters:
@@ -155,7 +162,7 @@ def literature_prior(literature: BodySegmentParameters, kinds: Sequence[str] | N
             sd[row, 3] = MIDLINE_SD_M
     blocks = np.zeros((len(names), 10, 10))
     blocks[:, range(4), range(4)] = np.square(sd[:, :4])
-    blocks[:, 4:, 4:] = _inertia_covariance(nearest_consistent(literature))
+    blocks[:, 4:, 4:] = inertia_covariance(nearest_consistent(literature))
     covariance = with_symmetry(block_diagonal(blocks), literature.segments, SIDES_CORRELATION)
     for i, j in product(range(len(names)), repeat=2):
         if names[i] == "thigh" and names[j] in ("pelvis", "torso"):
@@ -165,7 +172,7 @@ def literature_prior(literature: BodySegmentParameters, kinds: Sequence[str] | N
     return BspPrior(literature, covariance, total, SCALE_SD * total)
 
 
-def _inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
+def inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
     """(s, 6, 6) covariance of ixx, iyy, izz, ixy, ixz, iyz: second moments L (1 + E) L^T with E isotropic.
 
     E is a common number on the diagonal plus a symmetric matrix whose elements beside the diagonal vary 1 / sqrt(2) as

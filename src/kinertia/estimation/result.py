@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
@@ -279,6 +280,19 @@ class Fit:
 
         names = (self.bsp["segment"] + "." + self.bsp["parameter"]).tolist()
         return pd.DataFrame(self.posterior.covariance, index=names, columns=names)
+
+    @property
+    def asymmetry(self) -> pd.DataFrame | None:
+        """Right minus left of every pair of segments, with its deviation and whether it differs; None after two-level.
+
+        Centres of mass and products of inertia are compared with the mirror image. `differs` allows for the ten
+        parameters of a pair: by chance in 5 % of pairs at most.
+        """
+        if self.posterior is None:
+            return None
+        import pandas as pd
+
+        return pd.DataFrame(asymmetry_columns(asymmetries(self.estimate, self.posterior.covariance)))
 
     @property
     def calibration(self) -> pd.DataFrame | None:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinertia.estimation.force_mass import force_mass
+from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.force_mass import CARRIED_HINT, force_mass
 from kinertia.estimation.input_checks import mass_by_force_kg
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.two_level import TwoLevelResult
@@ -21,6 +22,8 @@ MOTION_TOLERANCE = 0.05
 """Mass by the forces may differ by this share between the motion found and the markers' centre."""
 ESTIMATE_TOLERANCE = 0.03
 """Scale and estimated total mass may differ by this share before a warning."""
+LIGHTEST_LOAD_KG = 2.0
+"""From which on a surplus may be something that was worn or carried."""
 CONTRADICTING_COM_M = 0.1
 """A centre of mass this far from the literature contradicts it."""
 
@@ -31,7 +34,7 @@ def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> fl
 
 
 def force_warnings(
-    mass_kg: float, literature: BodySegmentParameters, trials: Sequence[TrialFit], skeleton: Skeleton
+    carried: CarriedMass, literature: BodySegmentParameters, trials: Sequence[TrialFit], skeleton: Skeleton
 ) -> list[str]:
     """Trials whose vertical force is not that of the person on the scale, or not that of the motion found.
 
@@ -39,15 +42,17 @@ def force_warnings(
     wrongly can accuse the scale or the plates.
     """
     warnings = []
+    mass_kg = carried.total_kg
     for trial in trials:
         by_markers = force_mass(skeleton, trial.kinematics.trial)
         if by_markers is None:
             continue
         by_force, by_motion = by_markers.mass_kg, mass_from_force_kg(literature, trial)
-        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg:
+        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg + 2 * carried.sd_kg:
+            hint = f"; {CARRIED_HINT}" if by_force - mass_kg > LIGHTEST_LOAD_KG else ""
             warnings.append(
-                f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {mass_kg:.1f} kg "
-                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates"
+                f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {carried} "
+                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates{hint}"
             )
         if abs(by_motion - by_force) > MOTION_TOLERANCE * by_force + 2 * by_markers.sd_kg:
             warnings.append(
@@ -59,7 +64,7 @@ def force_warnings(
 
 
 def fit_warnings(
-    mass_kg: float,
+    carried: CarriedMass,
     literature: BodySegmentParameters,
     estimate: BodySegmentParameters,
     source: str = "the literature",
@@ -69,10 +74,10 @@ def fit_warnings(
     `source` says where the parameters before the estimate come from.
     """
     warnings = []
-    total = estimate.total_mass_kg
-    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg:
+    total, mass_kg = estimate.total_mass_kg, carried.total_kg
+    if abs(total - mass_kg) > ESTIMATE_TOLERANCE * mass_kg + 2 * carried.sd_kg:
         warnings.append(
-            f"the estimated total mass is {total:.1f} kg; stated mass {mass_kg:.1f} kg "
+            f"the estimated total mass is {total:.1f} kg; stated mass {carried} "
             f"({100 * (total / mass_kg - 1):+.1f} %): the estimate follows the plates more than the scale"
         )
     moved = np.linalg.norm(estimate.com_m - literature.com_m, axis=1)

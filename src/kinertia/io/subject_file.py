@@ -27,6 +27,13 @@
     mass_kg = "8.9 +- 0.4"
     source = "DXA"
 
+    [[attached]]                   # what is not body and moves with a segment; as many as there are
+    name = "rucksack"
+    segment = "torso"
+    mass_kg = "unknown"            # or 10.0, or "10 +- 0.5"
+    on_scale = false               # whether the person was weighed with it
+    com_mm = [-200, 300, 0]
+
     [prior]
     bsp = "spring/bsp.csv"         # an earlier estimate in place of the literature's
 
@@ -56,7 +63,7 @@ from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, pat
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Instruments, KnownSegment, PriorSettings, Settings, Subject, Table, folder_of
+from kinertia.settings import Attached, Instruments, KnownSegment, PriorSettings, Settings, Subject, Table, folder_of
 
 
 def _file(value: object, info: ValidationInfo) -> Path:
@@ -175,6 +182,7 @@ class SubjectFile(Table):
     instruments: InstrumentsFiles = InstrumentsFiles()
     prior: PriorFiles = PriorFiles()
     segments: dict[str, KnownSegment] = Field(default={}, alias="segment")
+    attached: tuple[Attached, ...] = Field(default=(), strict=False)
 
 
 def subject_file_in(folder: Path) -> Path:
@@ -303,6 +311,7 @@ _TABLES: dict[str, type[Table]] = dict(
     instruments=InstrumentsFiles,
     prior=PriorFiles,
     segment=KnownSegment,
+    attached=Attached,
 )
 
 
@@ -320,11 +329,14 @@ def _sentence(detail: Any) -> str:
         return "every segment is a table of its own under a heading like [segment.thigh_r]"
     if table == "trial" and (not holder or isinstance(key, int)) and kind != "missing":
         return "every trial is a table of its own under the heading [[trial]], in double brackets"
+    if table == "attached" and (not holder or isinstance(key, int)) and kind != "missing":
+        return "everything attached is a table of its own under the heading [[attached]], in double brackets"
     if not holder:
-        heading = "[[trial]]" if table == "trial" else f"[{table}]"
+        heading = f"[[{table}]]" if table in ("trial", "attached") else f"[{table}]"
         return f"there is no heading {heading} with its entries below; add it"
     if kind == "missing":
-        return f"[{table}] lacks '{key}' ({_TABLES[table].model_fields[key].description}); add it"
+        heading = f"[[{table}]]" if table == "attached" else f"[{table}]"
+        return f"{heading} lacks '{key}' ({_TABLES[table].model_fields[key].description}); add it"
     problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
     if kind == "value_error":
         problem = str(detail["ctx"]["error"])

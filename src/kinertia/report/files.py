@@ -31,6 +31,7 @@ from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.report.wording import asymmetry_sentences
 from kinertia.trial.rms import rms, rms_length
 
 _PARTS = (slice(0, 3), slice(3, 6))
@@ -90,7 +91,9 @@ def _write_model(fit: Fit, folder: Path) -> None:
 
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
-    changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts)
+    own = fit.file.skeleton.segments
+    welds = {joint.child: joint.parent for joint in fit.skeleton.joints if joint.child not in own}
+    changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts, welds)
     changes.map(inert).to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
 
 
@@ -148,6 +151,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         },
         "converged": fit.converged,
         **_posterior_summary(fit),
+        "asymmetry": asymmetry_sentences(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
         "uses": [{"output": use.output, "use": use.word, "reason": use.reason} for use in uses(fit)],
         "verdicts": [verdict._asdict() for verdict in verdicts(fit)],

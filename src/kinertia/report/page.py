@@ -46,7 +46,7 @@ from kinertia.report.time_figures import (
     moment_figure,
     residual_figure,
 )
-from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in, start_of
+from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, fixed, read_in, start_of
 from kinertia.trial.data import runs
 from kinertia.trial.rms import rms_length
 
@@ -79,6 +79,7 @@ def render(
         start=start_of(fit),
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
+        asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms),
         body={

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from kinertia.estimation.asymmetry import Asymmetry, asymmetries
 from kinertia.estimation.result import Fit
-from kinertia.model.bsp import UNITS
+from kinertia.model.bsp import PARAMETERS, UNITS
 
 INTERVAL_SD = 1.96
 """Half of a 95 % interval, in standard deviations."""
@@ -58,3 +59,28 @@ def fixed(value: float, digits: int, sign: bool = False) -> str:
     """A number with so many decimals; what rounds to zero has no sign."""
     text = f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
     return text if float(text) else text.lstrip("+-")
+
+
+def asymmetry_sentences(fit: Fit) -> list[str]:
+    """For each pair of limbs, whether left and right differ beyond their error bars; nothing after two-level."""
+    if fit.posterior is None:
+        return []
+    pairs = asymmetries(fit.estimate, fit.posterior.covariance)
+    alike = [_said(pair.segment) for pair in pairs if not pair.differing]
+    differing = [f"{_said(pair.segment)}: {_differences(pair)}" for pair in pairs if pair.differing]
+    return [*differing, *([f"no difference beyond the error bars: {', '.join(alike)}"] if alike else [])]
+
+
+def _said(segment: str) -> str:
+    return segment.replace("_", " ")
+
+
+def _differences(pair: Asymmetry) -> str:
+    """The parameters that differ, right minus left."""
+    parts = []
+    for k in pair.differing:
+        unit, factor = read_in(k)
+        value, sd = factor * pair.difference[k], factor * pair.sd[k]
+        digits = decimals(k, sd)
+        parts.append(f"{PARAMETERS[k]} of the right {fixed(value, digits, sign=True)} ± {fixed(sd, digits)} {unit}")
+    return ", ".join(parts)

@@ -175,3 +175,22 @@ def test_the_27_dof_model_as_a_file(opensim, tmp_path):
     np.testing.assert_array_equal(ours.bsp.table()[rows], bsp.table())
     assert warnings_of(opensim, path, tmp_path / "log") == []
     assert_opensim_agrees(path, ours)
+
+
+def test_bodies_are_welded_to_those_of_the_file(opensim, shared_data, tmp_path):
+    """In format 4 and in format 3, where the joint stands in its body."""
+    (tmp_path / "old.osim").write_text(old_model())
+    for source in (shared_data / MODELS[0], tmp_path / "old.osim"):
+        ours = read_osim(source)
+        parent = ours.skeleton.segments[-1]
+        row = np.array([[3.0, -0.1, 0.2, 0.05, 0.03, 0.02, 0.04, 0.001, -0.002, 0.0]])
+        wanted = BodySegmentParameters.from_table((*ours.bsp.segments, "bag"), np.concatenate([ours.bsp.table(), row]))
+        path = tmp_path / "out.osim"
+        changes = write_osim(path, ours, wanted, welds={"bag": parent})
+        assert list(changes.component) == ["bag"]
+        again = read_osim(path)
+        joint = next(one for one in again.skeleton.joints if one.child == "bag")
+        assert (joint.parent, joint.axes) == (parent, ())
+        np.testing.assert_allclose(opensim_table(opensim, path)["bag"], row[0])
+        assert again.skeleton.coordinates == ours.skeleton.coordinates
+        assert all(".vtp" in one for one in warnings_of(opensim, path, tmp_path / "log.txt"))

@@ -17,6 +17,7 @@ from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.estimation.simultaneous.unlike import unlikeness
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
@@ -237,7 +238,8 @@ def _warnings(
             f"the data contradict the model: {', '.join(far)} prior SDs from {uncertainty.source}; a wrong joint, "
             f"plate or marker is more likely than an unusual body"
         )
-    return warnings
+    whole = unlikeness(prior, result.bsp, result.bsp_covariance)
+    return [*warnings, whole.sentence()] if whole.unlike and not far else warnings
 
 
 def _instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) -> list[str]:

@@ -253,8 +253,8 @@ class MapProblem:
         bsp = self.bsp(static)
         jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
         gap = (bsp.table() - self.prior.mean.table()).ravel()
-        mass_row = jacobian[0::10].sum(axis=0) / self.prior.mass_sd_kg
-        mass_gap = (bsp.total_mass_kg - self.prior.mass_kg) / self.prior.mass_sd_kg
+        mass_row = self.prior.on_scale @ jacobian[0::10] / self.prior.mass_sd_kg
+        mass_gap = (float(self.prior.on_scale @ bsp.mass_kg) - self.prior.mass_kg) / self.prior.mass_sd_kg
         information = np.diag(self.weight)
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinertia.io.osim.exporter import body_text, weld_text
 from kinertia.io.osim.reader import INERTIA_TAGS, body_elements, marker_elements
 from kinertia.io.osim.xml import Element, parse, replaced
 from kinertia.model.bsp import BodySegmentParameters
@@ -21,6 +22,7 @@ from kinertia.model.skeleton import Marker
 if TYPE_CHECKING:
     import pandas as pd
 
+_FORMAT_4 = 40000
 CHANGE_COLUMNS = ("component", "property", "old", "new")
 
 
@@ -39,6 +41,7 @@ def write_osim(
     bsp: BodySegmentParameters,
     markers: Mapping[str, np.ndarray] | None = None,
     joint_shifts: Mapping[str, np.ndarray] | None = None,
+    welds: Mapping[str, str] | None = None,
 ) -> pd.DataFrame:
     """Write the model's file with these parameters, and tell what changed.
 
@@ -48,11 +51,13 @@ def write_osim(
         bsp: of some or all of its bodies.
         markers: by label, (3,) m in the marker's body.
         joint_shifts: by joint with an `offset`, (3,) m by which it moves in its parent, in the parent's axes.
+        welds: by segment of `bsp` that the model has not, the body that it is welded to.
 
     Returns:
         one row per changed property: component, property, old and new text; no rows if nothing changed.
     """
-    document = parse(model.content).child("Model")
+    top = parse(model.content)
+    document = top.child("Model")
     assert document is not None  # it was read before
     edits = [*_body_edits(document, bsp), *_marker_edits(model, document, markers or {})]
     edits += _joint_edits(model, document, joint_shifts or {})
@@ -65,6 +70,10 @@ def write_osim(
         new = " ".join(repr(float(value)) for value in edit.values)
         spans.append(_replacement(edit.element, edit.tag, old, new))
         rows.append((edit.element.name, edit.tag, before, new))
+    for child, parent in (welds or {}).items():
+        row = bsp.table()[bsp.segments.index(child)]
+        spans += _welded(top, document, parent, child, row)
+        rows.append((child, "body", "", f"welded to {parent}, {float(row[0])!r} kg"))
     Path(path).write_bytes(replaced(model.content, spans))
     import pandas as pd
 
@@ -80,6 +89,25 @@ def _replacement(element: Element, tag: str, old: Element | None, new: str) -> t
         return old.outer, whole
     assert element.inner is not None  # it has other properties
     return (element.inner[1], element.inner[1]), whole
+
+
+def _welded(
+    top: Element, document: Element, parent: str, child: str, row: np.ndarray
+) -> list[tuple[tuple[int, int], bytes]]:
+    """What goes where for one more body: of format 3 the joint stands in its body, of format 4 in a set."""
+    ends = {}
+    for tag in ("BodySet", "JointSet"):
+        objects = members.child("objects") if (members := document.child(tag)) is not None else None
+        ends[tag] = objects.inner[1] if objects is not None and objects.inner is not None else 0
+    if int(top.attributes["Version"]) >= _FORMAT_4:
+        texts = {"BodySet": body_text(child, row), "JointSet": weld_text(parent, child)}
+    else:
+        values = " ".join(repr(float(value)) for value in row[1:4])
+        inertia = "".join(f"<{tag}>{float(value)!r}</{tag}>" for tag, value in zip(INERTIA_TAGS, row[4:], strict=True))
+        joint = f'<WeldJoint name="to_{child}"><parent_body>{parent}</parent_body></WeldJoint>'
+        text = f'<Body name="{child}"><mass>{float(row[0])!r}</mass><mass_center>{values}</mass_center>{inertia}'
+        texts = {"BodySet": f"{text}<Joint>{joint}</Joint></Body>"}
+    return [((ends[tag], ends[tag]), f"{text}\n".encode()) for tag, text in texts.items()]
 
 
 def _body_edits(document: Element, bsp: BodySegmentParameters) -> Iterator[_Edit]:

@@ -31,7 +31,7 @@ def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters
         ValueError: an axis follows its coordinate by a function, or rotates before another slides.
     """
     rows = dict(zip(bsp.segments, bsp.table(), strict=True))
-    bodies = [_body(segment, rows.get(segment, np.zeros(10))) for segment in skeleton.segments]
+    bodies = [body_text(segment, rows.get(segment, np.zeros(10))) for segment in skeleton.segments]
     text = "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8" ?>',
@@ -59,7 +59,8 @@ def _numbers(values: Sequence[float] | np.ndarray) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _body(name: str, row: np.ndarray) -> str:
+def body_text(name: str, row: np.ndarray) -> str:
+    """A body of the current formats; `row` is one of `BodySegmentParameters.table`."""
     return (
         f"<Body name={quoteattr(name)}><mass>{_numbers(row[:1])}</mass><mass_center>{_numbers(row[1:4])}</mass_center>"
         f"<inertia>{_numbers(row[4:])}</inertia></Body>"
@@ -70,6 +71,15 @@ def _marker(marker: Marker) -> str:
     return (
         f"<Marker name={quoteattr(marker.label)}><socket_parent_frame>/bodyset/{escape(marker.segment)}"
         f"</socket_parent_frame><location>{_numbers(marker.position)}</location><fixed>false</fixed></Marker>"
+    )
+
+
+def weld_text(parent: str, child: str) -> str:
+    """A joint of the current formats that holds one body fast in the frame of another."""
+    near, far = (_frame(f"{name}_offset", f"/bodyset/{name}", np.eye(3), np.zeros(3)) for name in (parent, child))
+    return (
+        f"<WeldJoint name={quoteattr('to_' + child)}><socket_parent_frame>{parent}_offset</socket_parent_frame>"
+        f"<socket_child_frame>{child}_offset</socket_child_frame><frames>{near}{far}</frames></WeldJoint>"
     )
 
 

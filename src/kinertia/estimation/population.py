@@ -1,0 +1,108 @@
+"""People whom the tables do not describe: how the literature's prior changes for children, old and obese people.
+
+The tables are of young adults of ordinary build (de Leva's men were 24 years old, body-mass index 24). Where numbers
+for others are known they go in, with their source; where they are not, nothing is invented: deviations double, so that
+the data decide more and error bars say less.
+
+- elderly: segment masses by Pavol, Owings and Grabiner (2002, J Biomech 35:707), whose table could be read in one
+  transcription only; trunk and head together keep the tables' split between pelvis and torso, since trunks are cut in
+  other places. Deviations of masses stay, those of centres of mass and inertias double.
+- child: head and trunk are heavier, thighs, shanks and feet lighter than an adult's (Jensen 1986, J Biomech 19:359);
+  his coefficients could not be checked. Deviations double.
+- obese: trunks are heavier, thighs and shanks lighter for the same mass (Chambers et al. 2010, Clin Biomech 25:131,
+  people over 65); de Leva's masses were off by up to 60 % on average in a sample of working adults (Merrill et al.
+  2019). Deviations double.
+
+Doubled, the deviation of a thigh's mass is 28 %, so that 60 % is just beyond two of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.estimation.prior import BspPrior
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.settings import Subject
+
+UNKNOWN_SPREAD = 2.0
+"""Factor on deviations for which no numbers are known."""
+GROWN_UP_YEARS, OLD_YEARS = 18.0, 65.0
+OBESE_KG_M2 = 30.0
+"""Body-mass index from which on a person counts as obese (WHO)."""
+_SHORT_M = 1.4
+"""Below it a person without a stated age may well be a child."""
+_PAVOL = {
+    "male": {"thigh": 0.1127, "shank": 0.0441, "foot": 0.0127, "upper_arm": 0.0299, "forearm": 0.0175 + 0.0065},
+    "female": {"thigh": 0.1162, "shank": 0.0456, "foot": 0.0123, "upper_arm": 0.0301, "forearm": 0.0141 + 0.0054},
+}
+"""Shares of body mass; the forearm with its hand."""
+HELP = "measured segments ([segment.thigh_r] mass_kg = ...), squats or a swaying trunk as further trials would help"
+
+
+@dataclass(frozen=True, eq=False)
+class PopulationPrior:
+    """A prior, and what the user should know of it: one sentence each."""
+
+    prior: BspPrior
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
+    """The prior for this person: as the subject says, or by age and body-mass index.
+
+    Args:
+        prior: the literature's, or that of a scaled model.
+        subject: mass and height may be unknown.
+    """
+    stated = subject.population
+    population, why = (stated, "as stated") if stated is not None else _by_age_and_build(subject)
+    said = []
+    if population == "elderly" and subject.sex is not None:
+        prior = _spread(_with_masses(prior, _PAVOL[subject.sex]), keep_masses=True)
+        said.append("segment masses by Pavol 2002, deviations of all else doubled")
+    elif population != "adult":
+        prior = _spread(prior)
+        said.append("no numbers that could be checked: young adults' values with doubled deviations")
+    sentences = [f"population: {population} ({why}), of whom the tables are not: {one}; {HELP}" for one in said]
+    notes, warnings = (sentences, []) if stated is not None else ([], sentences)
+    short = subject.age_years is None and stated is None and (subject.height_m or _SHORT_M) < _SHORT_M
+    warning = (
+        f"height {subject.height_m:g} m: the tables are of adults; give age_years (or population) under [subject] if "
+        "this is a child"
+    )
+    return PopulationPrior(prior, tuple(notes), (*warnings, *((warning,) if short else ())))
+
+
+def _by_age_and_build(subject: Subject) -> tuple[str, str]:
+    age, mass_kg, height_m = subject.age_years, subject.mass_kg, subject.height_m
+    if age is not None and age < GROWN_UP_YEARS:
+        return "child", f"{age:g} years"
+    if mass_kg and height_m and mass_kg / height_m**2 >= OBESE_KG_M2:
+        return "obese", f"body-mass index {mass_kg / height_m**2:.1f} kg/m2"
+    if age is not None and age >= OLD_YEARS:
+        return "elderly", f"{age:g} years"
+    return "adult", "nothing speaks against it"
+
+
+def _with_masses(prior: BspPrior, shares: dict[str, float]) -> BspPrior:
+    """The prior with these shares of body mass for the limbs; trunk and head have the rest. Shapes stay."""
+    mean = prior.mean
+    kinds = [name.removesuffix("_r").removesuffix("_l") for name in mean.segments]
+    total = mean.total_mass_kg
+    mass = np.array([shares.get(kind, 0.0) * total for kind in kinds])
+    rest = np.array([kind not in shares for kind in kinds])
+    mass[rest] = (total - mass.sum()) * mean.mass_kg[rest] / mean.mass_kg[rest].sum()
+    factor = mass / mean.mass_kg
+    moved = BodySegmentParameters(mean.segments, mass, mean.com_m, mean.inertia_kgm2 * factor[:, None, None])
+    scale = np.ones((len(kinds), 10))
+    scale[:, [0, *range(4, 10)]] = factor[:, None]
+    return replace(prior, mean=moved, covariance=prior.covariance * np.outer(scale, scale))
+
+
+def _spread(prior: BspPrior, keep_masses: bool = False) -> BspPrior:
+    scale = np.full((len(prior.mean.segments), 10), UNKNOWN_SPREAD)
+    scale[:, 0] = 1.0 if keep_masses else UNKNOWN_SPREAD
+    return replace(prior, covariance=prior.covariance * np.outer(scale, scale))

@@ -1,0 +1,69 @@
+"""The study of populations on paper and screen: `populations.json`, `populations.md`, and rows for the terminal."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
+from kinertia.studies.populations import RUCKSACK_KG, PopulationAccuracy, RucksackAccuracy
+
+HEADINGS = ("population", "prior", "mass (kg)", "CoM (mm)", "inertia (kg m2)", "moments (N m)", "coverage", "unlike")
+CAPTION = (
+    "RMS errors, after the estimate / of what it started from. moments: what wrong parameters make of joint moments, "
+    "with the true motion and forces. coverage: parameters within their 95 % intervals. unlike: people of whom the fit "
+    "says that they are unlike the prior."
+)
+_SHOWN = {"mass": (1.0, ".2f"), "CoM": (1e3, ".1f"), "inertia": (1.0, ".3f")}
+"""Factor to the unit of the heading, and digits."""
+
+
+def population_rows(accuracies: Sequence[PopulationAccuracy]) -> list[list[str]]:
+    """One row per population and prior, under `HEADINGS`."""
+    rows = []
+    for one in accuracies:
+        cells = [
+            _both(factor * one.rms[name], factor * one.rms_before[name], form)
+            for name, (factor, form) in _SHOWN.items()
+        ]
+        cells.append(_both(one.moments_nm, one.moments_before_nm, ".2f"))
+        rows.append([one.title, one.prior, *cells, f"{100 * one.coverage:.1f} %", f"{100 * one.unlike:.0f} %"])
+    return rows
+
+
+def rucksack_sentence(rucksack: RucksackAccuracy) -> str:
+    """What is found of a rucksack that was declared with unknown mass."""
+    return (
+        f"A rucksack of {RUCKSACK_KG:g} kg, declared with unknown mass, {rucksack.people} people: RMS error "
+        f"{rucksack.rms_kg:.2f} kg, stated deviation {rucksack.sd_kg:.2f} kg; within the 95 % interval in "
+        f"{100 * rucksack.coverage:.0f} %."
+    )
+
+
+def _both(after: float, before: float, form: str) -> str:
+    return f"{after:{form}} / {before:{form}}"
+
+
+def populations_markdown(accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy) -> str:
+    """The table, its caption, and the sentence of the rucksack."""
+    lines = [HEADINGS, ("---",) * 2 + ("--:",) * (len(HEADINGS) - 2), *population_rows(accuracies)]
+    table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+    return f"{table}\n\n{accuracies[0].people} people each. {CAPTION}\n\n{rucksack_sentence(rucksack)}\n"
+
+
+def save_populations(
+    accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy, seed: int, folder: str | Path
+) -> None:
+    """Write `populations.json` and `populations.md` into a folder."""
+    content = {
+        "kinertia": VERSION,
+        "seed": seed,
+        "populations": [asdict(one) for one in accuracies],
+        "rucksack": asdict(rucksack),
+    }
+    with complete_folder(folder, "study populations") as work:
+        (work / "populations.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        (work / "populations.md").write_text(populations_markdown(accuracies, rucksack), encoding="utf-8")

@@ -1,0 +1,184 @@
+"""What does a wrong prior cost? People whom the tables do not describe, with the adults' prior and with their own.
+
+Every person walks once in a laboratory with skin motion and calibration errors (`accuracy`), and is estimated twice
+from the same recording: as if nothing were known, and with what the subject file can say of such a person. A draw
+depends on seed, population and its number only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from kinertia.estimation.attached import with_attached_prior
+from kinertia.estimation.known_body import with_prosthesis
+from kinertia.estimation.population import population_prior
+from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.fit import calibration_prior
+from kinertia.estimation.simultaneous.observation import Observations, observe
+from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.estimation.simultaneous.unlike import unlikeness
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.motion.kinematics import Kinematics
+from kinertia.settings import Attached, Subject
+from kinertia.studies.accuracy import WALK_S
+from kinertia.studies.joint_accuracy import WITHIN
+from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.populations import POPULATIONS
+from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticTrial, walk, walking_subject
+from kinertia.trial.rms import rms
+
+LABORATORY = Faults("artefact", calibration=True)
+COLUMNS = {"mass": slice(0, 1), "CoM": slice(1, 4), "inertia": slice(4, 7)}
+"""Of `BodySegmentParameters.table`; products of inertia are in none."""
+RUCKSACK = Attached(name="rucksack", segment="torso", mass_kg=None, com_mm=(-200.0, 300.0, 0.0), on_scale=False)
+RUCKSACK_KG = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class PersonOutcome:
+    """One person with one prior.
+
+    Attributes:
+        errors, before: (s, 10) estimate and prior mean minus truth.
+        sd: (s, 10) posterior deviations.
+        moments_nm, moments_before_nm: RMS error of all joint moments that the parameters make, with the true motion and
+            the true forces.
+        unlike: whether the fit says that the person is unlike the prior.
+    """
+
+    errors: np.ndarray
+    before: np.ndarray
+    sd: np.ndarray
+    moments_nm: float
+    moments_before_nm: float
+    unlike: bool
+
+
+@dataclass(frozen=True)
+class PopulationAccuracy:
+    """All people of a population with one prior.
+
+    Attributes:
+        title, prior: of the rows.
+        people: how many.
+        rms, rms_before: by class of `COLUMNS`, RMS errors of the estimate and of what it started from, SI.
+        coverage: share of all parameters within their 95 % intervals.
+        moments_nm, moments_before_nm: RMS over people.
+        unlike: share of people of whom the fit says so.
+    """
+
+    title: str
+    prior: str
+    people: int
+    rms: Mapping[str, float]
+    rms_before: Mapping[str, float]
+    coverage: float
+    moments_nm: float
+    moments_before_nm: float
+    unlike: float
+
+
+@dataclass(frozen=True)
+class RucksackAccuracy:
+    """What is found of a rucksack of unknown mass.
+
+    Attributes:
+        people: how many carried one.
+        rms_kg, sd_kg: RMS error of its mass, and RMS of what the estimate says of it.
+        coverage: share of people in which the mass is within its 95 % interval.
+    """
+
+    people: int
+    rms_kg: float
+    sd_kg: float
+    coverage: float
+
+
+def run_populations(
+    people: int = 20, seed: int = 1, workers: int | None = None, progress: Callable[[float], None] = lambda share: None
+) -> tuple[list[PopulationAccuracy], RucksackAccuracy]:
+    """Every population with the adults' prior and with its own, and people with a rucksack."""
+    cases = [(name, number) for name in (*POPULATIONS, RUCKSACK.name) for number in range(people)]
+    drawn = in_parallel(partial(run_person, seed), cases, workers, progress)
+    rows = []
+    for i, population in enumerate(POPULATIONS.values()):
+        both = zip(*drawn[i * people : (i + 1) * people], strict=True)
+        rows += [
+            _summarised(population.title, prior, each) for prior, each in zip(("adults'", "own"), both, strict=True)
+        ]
+    carried = [one[0] for one in drawn[len(POPULATIONS) * people :]]
+    error, sd = (np.array([getattr(one, name)[-1, 0] for one in carried]) for name in ("errors", "sd"))
+    return rows, RucksackAccuracy(people, rms(error), rms(sd), float(np.mean(np.abs(error) < WITHIN * sd)))
+
+
+def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
+    """One person: with the adults' prior and with the own one; of the rucksack with the own one only."""
+    name, number = case
+    of_person, of_noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2))
+    subject = walking_subject()
+    adults = literature_prior(subject.literature)
+    if name == RUCKSACK.name:
+        skeleton, own = with_attached_prior(subject.skeleton, adults, [RUCKSACK], MASS_KG)
+        true = own.draw(of_person).table()
+        true[-1, 0] = RUCKSACK_KG
+        person = replace(subject, skeleton=skeleton, bsp=BodySegmentParameters.from_table(own.mean.segments, true))
+        priors: Sequence[BspPrior] = (own,)
+    else:
+        person = replace(subject, bsp=POPULATIONS[name].of(adults).draw(of_person))
+        priors = (adults, own_prior(name, adults))
+    trial = walk(person, WALK_S, trapezoid=False)
+    laboratory = measured([trial], LABORATORY, of_noise)
+    return tuple(_outcome(trial, *laboratory, prior) for prior in priors)
+
+
+def own_prior(name: str, adults: BspPrior) -> BspPrior:
+    """What the subject file makes of the adults' prior for a person of this population."""
+    if name == "prosthesis":
+        return with_prosthesis(with_prosthesis(adults, "shank_l"), "foot_l")
+    content = {"name": name, "sex": SEX, "mass_kg": MASS_KG, "height_m": HEIGHT_M, "population": name}
+    return population_prior(adults, Subject.model_validate(content)).prior
+
+
+def _outcome(
+    trial: SyntheticTrial, skeleton: Skeleton, recorded: Sequence[Kinematics], prior: BspPrior
+) -> PersonOutcome:
+    bandwidth = Bandwidth.of(recorded)
+    seen: Observations = observe(skeleton, recorded, prior.mass_kg, bandwidth)
+    result: SimultaneousResult = estimate_simultaneous(
+        skeleton, prior, calibration_prior(skeleton), seen.together, bandwidth.spacing_s
+    )
+    expected, after, before = (
+        inverse_dynamics(trial.skeleton, bsp, trial.motion, trial.foot_loads)[:, 6:]
+        for bsp in (trial.bsp, result.bsp, prior.mean)
+    )
+    return PersonOutcome(
+        result.bsp.table() - trial.bsp.table(),
+        prior.mean.table() - trial.bsp.table(),
+        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
+        rms(after - expected),
+        rms(before - expected),
+        unlikeness(prior, result.bsp, result.bsp_covariance).unlike,
+    )
+
+
+def _summarised(title: str, prior: str, people: Sequence[PersonOutcome]) -> PopulationAccuracy:
+    errors, before, sd = (np.array([getattr(one, name) for one in people]) for name in ("errors", "before", "sd"))
+    return PopulationAccuracy(
+        title,
+        prior,
+        len(people),
+        {name: rms(errors[..., columns]) for name, columns in COLUMNS.items()},
+        {name: rms(before[..., columns]) for name, columns in COLUMNS.items()},
+        float(np.mean(np.abs(errors) < WITHIN * sd)),
+        rms(np.array([one.moments_nm for one in people])),
+        rms(np.array([one.moments_before_nm for one in people])),
+        float(np.mean([one.unlike for one in people])),
+    )

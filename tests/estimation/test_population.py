@@ -1,0 +1,114 @@
+"""People whom the tables do not describe: who they are by age and build, and what becomes of the prior."""
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.known_body import with_prosthesis
+from kinertia.estimation.population import UNKNOWN_SPREAD, population_prior
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.unlike import unlikeness
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.settings import Subject
+from kinertia.studies.populations import own_prior, run_person
+from kinertia.synthetic.populations import POPULATIONS
+from kinertia.synthetic.walk import walking_subject
+
+PRIOR = literature_prior(walking_subject().literature)
+SEGMENTS = PRIOR.mean.segments
+
+
+def subject(**values):
+    return Subject(name="A", sex="male", **{"mass_kg": 70.0, "height_m": 1.8, **values})
+
+
+@pytest.mark.parametrize(
+    ("values", "word"),
+    [
+        ({"age_years": 7.0}, "child (7 years)"),
+        ({"age_years": 72.0}, "elderly (72 years)"),
+        ({"mass_kg": 100.0}, "obese (body-mass index 30.9 kg/m2)"),
+        ({"age_years": 72.0, "mass_kg": 100.0}, "obese"),
+    ],
+)
+def test_age_and_build_choose_and_warn(values, word):
+    result = population_prior(PRIOR, subject(**values))
+    (warning,) = result.warnings
+    assert word in warning
+    assert "would help" in warning
+    assert not result.notes
+    assert result.prior.sd[0, 1] == pytest.approx(UNKNOWN_SPREAD * PRIOR.sd[0, 1])
+
+
+@pytest.mark.parametrize("values", [{}, {"age_years": 30.0}, {"age_years": 7.0, "population": "adult"}])
+def test_adults_keep_the_tables(values):
+    result = population_prior(PRIOR, subject(**values))
+    assert result.prior is PRIOR
+    assert not result.warnings
+
+
+def test_what_is_stated_is_a_note():
+    result = population_prior(PRIOR, subject(population="obese"))
+    assert not result.warnings
+    assert "obese (as stated)" in result.notes[0]
+    np.testing.assert_allclose(result.prior.covariance, UNKNOWN_SPREAD**2 * PRIOR.covariance)
+
+
+def test_somebody_short_may_be_a_child():
+    (warning,) = population_prior(PRIOR, subject(height_m=1.2, mass_kg=25.0)).warnings
+    assert "height 1.2 m: the tables are of adults; give age_years" in warning
+
+
+def test_masses_of_the_elderly_are_those_of_their_table():
+    prior = population_prior(PRIOR, subject(population="elderly")).prior
+    share = dict(zip(SEGMENTS, prior.mean.mass_kg / prior.mean.total_mass_kg, strict=True))
+    assert share["thigh_r"] == pytest.approx(0.1127)
+    assert share["forearm_l"] == pytest.approx(0.0240)
+    assert prior.mean.total_mass_kg == pytest.approx(PRIOR.mean.total_mass_kg)
+    before = dict(zip(SEGMENTS, PRIOR.mean.mass_kg, strict=True))
+    assert share["torso"] / share["pelvis"] == pytest.approx(before["torso"] / before["pelvis"])
+    assert prior.mean.physically_consistent().all()
+
+
+def test_a_prosthesis_leans_on_nobody():
+    prior = with_prosthesis(PRIOR, "shank_l")
+    row = SEGMENTS.index("shank_l")
+    rows = np.arange(10 * row, 10 * row + 10)
+    others = np.setdiff1d(np.arange(len(prior.covariance)), rows)
+    assert not prior.covariance[np.ix_(rows, others)].any()
+    np.testing.assert_array_equal(prior.covariance[np.ix_(others, others)], PRIOR.covariance[np.ix_(others, others)])
+    assert prior.sd[row, 0] == pytest.approx(0.4 * prior.mean.mass_kg[row])
+
+
+@pytest.mark.parametrize("name", POPULATIONS)
+def test_bodies_of_a_population_are_possible_and_weigh_the_same(name):
+    population = POPULATIONS[name].of(PRIOR)
+    assert population.mean.total_mass_kg == pytest.approx(PRIOR.mean.total_mass_kg)
+    assert population.draw(np.random.default_rng(0)).physically_consistent().all()
+    assert np.all(own_prior(name, PRIOR).sd >= PRIOR.sd * 0.7)
+
+
+def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
+    """An estimate that knows everything is the person: squares of the distance are chi-square."""
+    rng, exact = np.random.default_rng(0), 1e-6 * PRIOR.covariance
+    people = [unlikeness(PRIOR, PRIOR.draw(rng), exact) for _ in range(200)]
+    assert {one.combinations for one in people} == {120}
+    assert np.mean([one.chance < 0.05 for one in people]) < 0.15
+    assert np.mean([one.unlike for one in people]) < 0.03
+    light = PRIOR.mean.table()
+    light[SEGMENTS.index("shank_l"), 0] *= 0.5
+    far = unlikeness(PRIOR, BodySegmentParameters.from_table(SEGMENTS, light), exact)
+    assert far.unlike
+    assert far.segments[0] == "shank_l"
+    assert "prosthesis" in far.sentence()
+    assert not unlikeness(PRIOR, PRIOR.mean, PRIOR.covariance).unlike, "data that say nothing contradict nothing"
+
+
+@pytest.mark.slow
+def test_an_undeclared_prosthesis_is_named_and_a_declared_one_is_estimated_better():
+    adults, own = run_person(1, ("prosthesis", 0))
+    assert adults.unlike
+    assert not own.unlike
+    rows = [SEGMENTS.index(name) for name in ("shank_l", "foot_l")]
+    error, before = (np.abs(one.errors[rows, 0]).sum() for one in (own, adults))
+    assert error < before
+    assert own.moments_nm < adults.moments_before_nm
