@@ -13,6 +13,7 @@ from kinertia.app.file_table import file_table, uses_of, with_uses, within_folde
 from kinertia.app.library import Library
 from kinertia.errors import FileError, SettingsError
 from kinertia.io.subject_file import read_subject
+from kinertia.settings import Subject
 
 
 @pytest.fixture
@@ -202,3 +203,25 @@ def test_texts_and_keys_of_any_kind_are_written_as_toml():
         "loose": 3,
     }
     assert tomllib.loads(subject_text(content, "heading")) == content
+
+
+def test_the_form_has_every_entry_of_the_person():
+    shown = {field.key: field for field in fields({"subject": {"sex": "f", "age_years": 9.0}})}
+    assert set(shown) == set(Subject.model_fields)
+    assert (shown["sex"].value, shown["sex"].choices) == ("female", ("male", "female"))
+    assert shown["population"].choices == ("adult", "child", "elderly", "obese")
+    assert shown["age_years"].value == "9.0"
+    assert not shown["mass_kg"].choices
+
+
+def test_age_population_and_what_is_attached_reach_the_subject_file(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    text = person.subject.read_text(encoding="utf-8")
+    attached = '[[attached]]\nname = "rucksack"\nsegment = "torso"\nmass_kg = "8.0 +- 0.1"\n'
+    write_text(person, text + attached)
+    write_form(person, {"sex": "male", "mass_kg": "41.5", "age_years": "11,5", "population": "child"})
+    content = entries(person)
+    assert content["attached"] == [{"name": "rucksack", "segment": "torso", "mass_kg": "8.0 +- 0.1"}]
+    wanted = tomllib.loads(person.subject.read_text(encoding="utf-8"))["subject"]
+    assert (wanted["age_years"], wanted["population"]) == (11.5, "child")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from kinertia.app.file_table import (
     Content,
@@ -30,6 +30,8 @@ _LABELS = {
     "sex": "Sex",
     "mass_kg": "Body mass (kg)",
     "height_m": "Height (m)",
+    "age_years": "Age (years)",
+    "population": "Population",
     "knee_width_mm": "Knee width (mm)",
     "ankle_width_mm": "Ankle width (mm)",
     "elbow_width_mm": "Elbow width (mm)",
@@ -65,13 +67,20 @@ def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Fie
     shown = []
     for key, about in Subject.model_fields.items():
         value = str((typed or {}).get(key, known.get(key, "")))
-        choices = ("female", "male") if key == "sex" else ()
+        choices = _choices(about.annotation)
         label = _LABELS.get(key, key.replace("_", " "))
-        optional = key not in ("sex", "mass_kg", "height_m")
+        optional = key == "name" or key.endswith("_mm")
         shown.append(
             Field(key, label, about.description or "", str(sex_of(value)) if choices else value, choices, optional)
         )
     return sorted(shown, key=lambda field: field.optional)
+
+
+def _choices(annotation: object) -> tuple[str, ...]:
+    """What an entry can be where there is a list of it."""
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    return next((found for part in get_args(annotation) if (found := _choices(part))), ())
 
 
 def entries(person: Person) -> Content:
@@ -138,7 +147,8 @@ def write_form(person: Person, form: Mapping[str, str]) -> None:
         text = form[key].strip()
         subject.pop(key, None)
         if text:
-            subject[key] = text if key in ("name", "sex") else _number(key, text)
+            number = not _choices(Subject.model_fields[key].annotation) and key != "name"
+            subject[key] = _number(key, text) if number else text
     uses = {name.removeprefix(USE): use for name, use in form.items() if name.startswith(USE)}
     rows = file_table(person.files(), content)
     known = {row.name: uses.get(row.name, row.use) for row in rows if row.choices}

@@ -128,6 +128,8 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
                 trial[key] = own[0]
         trials.append(trial)
     changed = {**content, "model": model, "trial": trials}
+    if not trials:
+        del changed["trial"]
     prior = {key: value for key, value in _table(content, "prior").items() if key != "bsp"}
     if bsp := by_use.get("bsp"):
         prior["bsp"] = bsp[0]

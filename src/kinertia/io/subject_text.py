@@ -5,18 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kinertia.io.subject_file import InstrumentsFiles, Model, PriorFiles, TrialFiles
+from kinertia.io.subject_file import TABLES
 from kinertia.io.toml_lines import quoted
-from kinertia.settings import KnownSegment, Settings, Subject, Table
-
-_TABLES: dict[str, type[Table]] = {
-    "subject": Subject,
-    "model": Model,
-    "trial": TrialFiles,
-    "settings": Settings,
-    "instruments": InstrumentsFiles,
-    "prior": PriorFiles,
-}
+from kinertia.settings import KnownSegment, Table
 
 
 def subject_text(content: Mapping[str, Any], heading: str) -> str:
@@ -27,16 +18,16 @@ def subject_text(content: Mapping[str, Any], heading: str) -> str:
         heading: first line, a comment.
     """
     lines = [f"# {heading}"]
-    for name in sorted(content, key=lambda name: [*_TABLES, name].index(name)):
+    for name in sorted(content, key=lambda name: [*TABLES, name].index(name)):
         value = content[name]
         if name == "segment" and isinstance(value, Mapping):
             for segment, entries in value.items():
                 lines += ["", f"[segment.{_key(segment)}]", *_entries(KnownSegment, entries)]
         elif isinstance(value, Mapping):
-            lines += ["", f"[{_key(name)}]", *_entries(_TABLES.get(name), value)]
+            lines += ["", f"[{_key(name)}]", *_entries(TABLES.get(name), value)]
         elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
             for one in value:
-                lines += ["", f"[[{_key(name)}]]", *_entries(_TABLES.get(name), one)]
+                lines += ["", f"[[{_key(name)}]]", *_entries(TABLES.get(name), one)]
         else:  # tables come after all plain entries
             lines.insert(1, f"{_key(name)} = {_value(value)}")
     return "\n".join([*lines, ""])
