@@ -31,7 +31,7 @@ def main() -> None:
             page.get_by_role("button", name="Try it with a measured walk").click()
             page.wait_for_selector("section[aria-labelledby=check] .headline")
             page.get_by_role("button", name="Estimate", exact=True).click()
-            page.frame_locator("iframe.report").locator(".plot[data-drawn]").first.wait_for()
+            page.frame_locator("iframe.report").locator(".headline").wait_for()
             page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(3000)
             page.screenshot(path=str(PICTURE))

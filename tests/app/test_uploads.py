@@ -156,6 +156,11 @@ def test_limits_of_size_are_kept_and_leave_nothing(tmp_path, monkeypatch, limit,
     assert (person.folder / "walk1.trc").stat().st_size == 1_000_000
 
 
+def test_a_subject_file_is_small(tmp_path):
+    with pytest.raises(FileError, match="larger than 1 MB, the most of a TOML file"):
+        received(Library(tmp_path).add("Anna"), "subject.toml", 1_100_000)
+
+
 def test_the_number_of_files_is_limited(tmp_path, monkeypatch):
     monkeypatch.setattr(uploads, "MOST_FILES", 2)
     person = Library(tmp_path).add("Anna")

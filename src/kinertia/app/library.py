@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -34,6 +35,8 @@ SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
 _RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
 _STARTED, _INTERRUPTED = "started", "interrupted"
 _LONGEST_NAME = 80
+_NOTING = threading.Lock()
+"""Check, fit and page note what they know of a person at the same time."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,8 @@ class Person:
 
     def note(self, **values: Any) -> None:
         """Remember this as well."""
-        write_then_rename(self.folder / _RECORD, json.dumps({**self.notes(), **values}, indent=1) + "\n")
+        with _NOTING:
+            write_then_rename(self.folder / _RECORD, json.dumps({**self.notes(), **values}, indent=1) + "\n")
 
 
 class Library:

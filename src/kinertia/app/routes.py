@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import traceback
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,8 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/people/{name}/{kind}/cancel", actions.cancel, methods=["POST"]),
         Mount("/static", StaticFiles(directory=_STATIC)),
     ]
-    return Starlette(routes=routes, exception_handlers={HTTPException: _not_found, KinertiaError: _trouble})
+    handlers = {HTTPException: _not_found, KinertiaError: _trouble, OSError: _no_file, Exception: _failed}
+    return Starlette(routes=routes, exception_handlers=handlers)
 
 
 class _Actions:
@@ -281,6 +283,24 @@ async def _not_found(request: Request, error: Exception) -> Response:
 
 async def _trouble(request: Request, error: Exception) -> Response:
     return _told(request, str(error), 422)
+
+
+async def _no_file(request: Request, error: Exception) -> Response:
+    """A full disk, a folder that may not be written to."""
+    assert isinstance(error, OSError)
+    where = "" if error.filename is None else f"{error.filename}: "
+    sentence = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
+    return _told(request, sentence, 500)
+
+
+async def _failed(request: Request, error: Exception) -> Response:
+    """Kinertia's own failure; the terminal has all of it."""
+    problem = traceback.format_exception_only(error)[-1].strip()
+    sentence = (
+        f"Kinertia failed, which it should not on any input ({problem}); "
+        "please send what its terminal shows to its developers"
+    )
+    return _told(request, sentence, 500)
 
 
 def _told(request: Request, sentence: str, status: int) -> Response:

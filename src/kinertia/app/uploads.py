@@ -18,7 +18,7 @@ LARGEST_FILE_MB, LARGEST_PERSON_MB, MOST_FILES = 500, 2000, 200
 ENDINGS = tuple(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".xml", ".osim", ".toml")))
 LIMITS = {"file_mb": LARGEST_FILE_MB, "person_mb": LARGEST_PERSON_MB, "files": MOST_FILES, "endings": ENDINGS}
 """As pages say them."""
-_LONGEST_NAME = 150
+_LONGEST_NAME, _LARGEST_TOML_MB = 150, 1
 
 
 def harmless_name(given: str) -> str:
@@ -55,13 +55,15 @@ async def receive(person: Person, given: str, chunks: AsyncIterator[bytes]) -> P
     if len(files) >= MOST_FILES:
         raise FileError(name, f"not taken: {len(files)} files are here, the most of one person; remove some")
     left = 1_000_000 * LARGEST_PERSON_MB - sum(path.stat().st_size for path in files)
+    text = name.lower().endswith(".toml")
+    largest_mb, what = (_LARGEST_TOML_MB, "a TOML file") if text else (LARGEST_FILE_MB, "one file")
     handle, temporary = tempfile.mkstemp(dir=person.folder, prefix=".upload.")
     try:
         with os.fdopen(handle, "wb") as file:
             async for chunk in chunks:
                 left -= len(chunk)
-                if file.tell() + len(chunk) > 1_000_000 * LARGEST_FILE_MB:
-                    raise FileError(name, f"not taken: larger than {LARGEST_FILE_MB} MB, the most of one file")
+                if file.tell() + len(chunk) > 1_000_000 * largest_mb:
+                    raise FileError(name, f"not taken: larger than {largest_mb} MB, the most of {what}")
                 if left < 0:
                     raise FileError(name, f"not taken: all files of a person have {LARGEST_PERSON_MB} MB at most")
                 file.write(chunk)

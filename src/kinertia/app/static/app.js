@@ -134,12 +134,17 @@
         const answer = await fetch(this.root.dataset.progress, { headers: { accept: "application/json" } });
         if (answer.status === 404) return location.reload();
         const job = (await answer.json())[this.root.dataset.kind];
-        if (!job) return location.reload();
+        if (!job) return this.done();
         this.show(job);
       } catch {
         this.root.querySelector("[data-left]").textContent = "Kinertia does not answer: is it still running?";
       }
       return setTimeout(() => this.ask(), PAUSE_MS);
+    }
+
+    done() {
+      if (this.root.dataset.kind === "fit") location.hash = "results";
+      location.reload();
     }
 
     show(job) {
