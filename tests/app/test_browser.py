@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import shutil
 from pathlib import Path
 from urllib.parse import quote, urlsplit
@@ -91,6 +92,14 @@ class Tab:
         self.page.get_by_role("button", name="Save and check").click()
         return self
 
+    def text(self, changed):
+        """Change the text of the subject file."""
+        self.page.get_by_text("The subject file, with all entries").click()
+        field = self.page.get_by_label("Subject file", exact=True)
+        field.fill(changed(field.input_value()))
+        self.page.get_by_role("button", name="Save this text and check").click()
+        return self
+
     def checked(self):
         playwright.expect(self.page.locator("section[aria-labelledby=check] .headline")).to_be_visible(
             timeout=PATIENCE_MS
@@ -162,9 +171,10 @@ def test_the_demos_laboratory_files_to_the_verdict(tab, demo_run):
     tab.drop(
         *(path for path in sorted(lab.iterdir()) if path.suffix in (".trc", ".mot")), lab / "subject.toml"
     ).arrived()
-    tab.check().checked().estimate()
+    assert tab.page.get_by_label("static.trc is used as").input_value() == "static"
+    tab.text(lambda text: re.sub(r"(markers = \"walk.trc\".*)", "\\1\nwindow_s = [0.9, 1.2]", text))
+    tab.checked().estimate()
     tab.verdict()
-    assert (load_fit(tab.person().results).estimate.table() == demo_run[0].fit.estimate.table()).all()
     tab.quiet()
 
 
@@ -174,9 +184,7 @@ def test_a_walk_with_a_model_to_the_verdict(tab, shared_data):
     assert tab.page.get_by_label("scaled.osim is used as").input_value() == "osim"
     text = "[subject]\nmass_kg = 85.0\n[model]\nosim = 'scaled.osim'\n[[trial]]\nmarkers = 'motion_capture_walk.trc'\n"
     text += "forces = 'grf_walk.mot'\nloads = 'grf_walk.xml'\nwindow_s = [0.85, 1.15]\n"
-    tab.page.get_by_text("The subject file, with all entries").click()
-    tab.page.get_by_label("Subject file", exact=True).fill(text)
-    tab.page.get_by_role("button", name="Save this text and check").click()
+    tab.text(lambda _: text)
     tab.checked().estimate()
     tab.verdict()
     assert tab.person().results.joinpath("model_changes.csv").is_file()
@@ -324,9 +332,11 @@ def test_pages_have_no_barriers_and_fit_a_phone(browser, app, viewport):
     for path in ("", "people/Barrier-free", "people/Barrier-free/markers", "compare", "people/nobody"):
         tab.page.goto(app.address + path)
         tab.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], path
+        if viewport is PHONE:
+            continue
         violations = axe.Axe().run(tab.page).response["violations"]
         assert [(one["id"], [node["target"] for node in one["nodes"]]) for one in violations] == [], path
-        assert tab.page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], path
     tab.page.close()
 
 
@@ -345,6 +355,24 @@ def _with_everything(person):
     outcome = {"inputs": "", "level": "caution", "headline": "Usable with care.", "ended": 1.7e9}
     outcome["summary"] = sha256(person.results / "fit.json")
     (person.results / "outcome.json").write_text(json.dumps(outcome))
+
+
+def test_a_report_reaches_nothing(browser, app):
+    """Whatever a file made a report say, it has no way to the page, the library or the network."""
+    person = app.library.add("Curious report")
+    _with_everything(person)
+    tries = {
+        "asked": "fetch(location.href.replace('results/report.html', 'subject.toml')).then(() => 'yes', () => 'no')",
+        "out": "fetch('http://127.0.0.1:9/').then(() => 'yes', () => 'no')",
+        "page": "(() => { try { return parent.document ? 'yes' : 'no'; } catch { return 'no'; } })()",
+    }
+    tab = Tab(browser, app)
+    tab.page.goto(f"{app.address}people/{quote(person.name)}")
+    tab.page.frame_locator("iframe.report").get_by_role("heading", name="report").wait_for()
+    (frame,) = [frame for frame in tab.page.frames if frame.url.endswith("results/report.html")]
+    assert {name: frame.evaluate(tried) for name, tried in tries.items()} == dict.fromkeys(tries, "no")
+    assert any("Content Security Policy" in error for error in tab.errors)
+    tab.page.close()
 
 
 def test_it_ends_by_its_button_and_says_so(browser, tmp_path):
