@@ -172,7 +172,7 @@ def test_the_demos_laboratory_files_to_the_verdict(tab, demo_run):
         *(path for path in sorted(lab.iterdir()) if path.suffix in (".trc", ".mot")), lab / "subject.toml"
     ).arrived()
     assert tab.page.get_by_label("static.trc is used as").input_value() == "static"
-    tab.text(lambda text: re.sub(r"(markers = \"walk.trc\".*)", "\\1\nwindow_s = [0.9, 1.2]", text))
+    tab.text(lambda text: re.sub(r"(markers = \"walk.trc\".*)", "\\1\nwindow_s = [1.1, 1.4]", text))
     tab.checked().estimate()
     tab.verdict()
     tab.quiet()

@@ -159,13 +159,16 @@ def test_no_file_outside_the_folder_is_read(person, tmp_path, measured_walk):
     within = within_folder(
         {
             "model": {"osim": "C:b.osim", "markers": "/a/set.toml"},
-            "prior": {"bsp": "../bsp.csv"},
+            "prior": {"bsp": "../bsp.csv", "population": "~/group.toml"},
             "instruments": {"session": "\\\\server\\s.toml"},
             "trial": [{"forces": "x/y.mot", "loads": "~/z.xml", "markers": "w.trc"}],
         }
     )
     assert within["model"] == {"osim": "b.osim", "markers": "set.toml"}
-    assert (within["prior"], within["instruments"]) == ({"bsp": "bsp.csv"}, {"session": "s.toml"})
+    assert (within["prior"], within["instruments"]) == (
+        {"bsp": "bsp.csv", "population": "group.toml"},
+        {"session": "s.toml"},
+    )
     assert within["trial"] == [{"forces": "y.mot", "loads": "z.xml", "markers": "w.trc"}]
 
 

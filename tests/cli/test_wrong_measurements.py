@@ -7,7 +7,7 @@ import pytest
 
 from command_line import run
 from kinertia.io.sto import read_sto, write_sto
-from spoilt_lab import changed_markers, expect, refused
+from spoilt_lab import changed_markers, complaint, expect, refused
 
 
 @pytest.mark.parametrize(
@@ -87,3 +87,22 @@ def assert_checked(lab, words):
     outcome = run("check", lab / "walk.trc", lab / "walk.mot", lab / "static.trc", "--loads", lab / "walk.xml")
     assert outcome.status == 1
     assert words in " ".join(outcome.out.split())
+
+
+@pytest.mark.slow
+def test_a_declared_load_is_not_refused_and_told_apart_from_the_body(lab):
+    """The plates carry 72.6 kg: a scale that said 64 kg has not weighed 8.6."""
+    subject = lab / "subject.toml"
+    subject.write_text(
+        '[subject]\nsex = "male"\nmass_kg = 64.0\nheight_m = 1.803\n[model]\nstatic = "static.trc"\n'
+        '[[trial]]\nmarkers = "walk.trc"\nforces = "walk.mot"\nloads = "walk.xml"\n'
+    )
+    assert "was worn or carried that the scale did not weigh, give it as [[attached]]" in complaint(lab, subject)
+    with subject.open("a") as file:
+        file.write('[[attached]]\nname = "rucksack"\nsegment = "torso"\nmass_kg = "unknown"\non_scale = false\n')
+        file.write("com_mm = [-150, 300, 0]\n")
+    outcome = run("fit", subject, "-o", lab.parent / "out")
+    assert outcome.status in (0, 1), outcome.err
+    carried = re.search(r"total mass \(kg\): stated 64\.0, .*, ([\d.]+) of it not body", outcome.out)
+    assert carried is not None
+    assert abs(float(carried[1]) - 8.6) < 2.5

@@ -58,6 +58,11 @@ def test_somebody_short_may_be_a_child():
     assert "height 1.2 m: the tables are of adults; give age_years" in warning
 
 
+def test_nothing_is_said_of_a_height_that_nobody_knows():
+    """As with an OpenSim model, which needs no height."""
+    assert population_prior(PRIOR, subject(height_m=None)).warnings == ()
+
+
 def test_masses_of_the_elderly_are_those_of_their_table():
     prior = population_prior(PRIOR, subject(population="elderly")).prior
     share = dict(zip(SEGMENTS, prior.mean.mass_kg / prior.mean.total_mass_kg, strict=True))

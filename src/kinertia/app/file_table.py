@@ -9,19 +9,19 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from kinertia.errors import SettingsError
 from kinertia.io.file_names import last_part
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.subject_draft import holds_forces, holds_loads, is_capture
+from kinertia.io.subject_file import TABLES
 
 Content = dict[str, Any]
 """Entries of a subject file, as `tomllib` reads them."""
 NOT_USED = ""
 _MODEL_FILES = ("static", "osim", "markers")
-_TRIAL_FILES = ("markers", "forces", "loads")
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
         return "marker set", (("markers", "marker set"), unused)
     if suffix == ".csv" and "information" in _first_line(file):
         return "body segment parameters of an earlier fit", (("bsp", "what the estimate starts from"), unused)
+    if suffix in (".toml", ".csv"):
+        return "used only where the text of the subject file names it", ()
     return "nothing that Kinertia reads", ()
 
 
@@ -152,21 +154,24 @@ def with_new_files(content: Content, draft: Content, present: Iterable[str], see
 
 def within_folder(content: Content) -> Content:
     """The entries with every file by its name only: all are in the person's folder, none is looked for elsewhere."""
-    tables: dict[str, dict[str, Any]] = {
-        name: dict(_table(content, name)) for name in ("model", "instruments", "prior") if name in content
+    changed = dict(content)
+    for name, table in TABLES.items():
+        keys = [key for key, field in table.model_fields.items() if _names_a_file(field.annotation)]
+        if isinstance(entries := content.get(name), Mapping):
+            changed[name] = _by_names_only(entries, keys)
+        elif isinstance(entries, list):
+            changed[name] = [_by_names_only(one, keys) if isinstance(one, Mapping) else one for one in entries]
+    return changed
+
+
+def _by_names_only(entries: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    return {
+        key: last_part(value) if key in keys and isinstance(value, str) else value for key, value in entries.items()
     }
-    for name, keys in (("model", _MODEL_FILES), ("instruments", ("session",)), ("prior", ("bsp",))):
-        for key in keys:
-            if isinstance(value := tables.get(name, {}).get(key), str):
-                tables[name][key] = last_part(value)
-    trials = [
-        {
-            key: last_part(value) if key in _TRIAL_FILES and isinstance(value, str) else value
-            for key, value in trial.items()
-        }
-        for trial in _trials(content)
-    ]
-    return {**content, **tables, **({"trial": trials} if trials else {})}
+
+
+def _names_a_file(annotation: object) -> bool:
+    return annotation is Path or any(map(_names_a_file, get_args(annotation)))
 
 
 def is_subject_file(file: Path) -> bool:

@@ -80,6 +80,7 @@ _MODULES = {
     "plan": "plan",
     "instruments": "instruments",
     "cohort": "cohort",
+    "population": "population",
     "study": "study",
     "app": "app_command",
     "warm-up": "warm_up",

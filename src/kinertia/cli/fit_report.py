@@ -34,7 +34,8 @@ def report_fit(fit: Fit) -> None:
         )
     named = {"measured": "stated", "literature": _before(fit)}
     masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
-    out.print(f"total mass (kg): {masses}\n")
+    beside = f", {fit.attached_kg:.1f} of it not body" if fit.attached_kg else ""
+    out.print(f"total mass (kg): {masses}{beside}\n")
     if fit_summary["asymmetry"]:
         out.print(f"left and right: {'; '.join(fit_summary['asymmetry'])}\n")
     for warning in fit.warnings:

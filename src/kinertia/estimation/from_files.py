@@ -6,15 +6,17 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from kinertia.errors import SessionError, SettingsError
+from kinertia.errors import PriorError, SessionError, SettingsError
 from kinertia.estimation.attached import with_attached
 from kinertia.estimation.estimate import estimate
 from kinertia.estimation.known_body import with_known_body
+from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.result import Fit
 from kinertia.estimation.session import with_instruments
 from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.population_file import read_population
 from kinertia.io.provenance import recordings
 from kinertia.io.recording import read_recording
 from kinertia.io.session_file import read_session
@@ -67,7 +69,19 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile) -> Prepared:
     if wanted.settings.method == "two-level":
         return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
-    return with_known_body(ready, wanted.prior, earlier, wanted.segments)
+    group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
+    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group)
+
+
+def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
+    """What was learnt of the person's group, unless the person was in it."""
+    file = read_population(path)
+    if set(recordings(wanted)) & set(file.files):
+        raise PriorError(
+            f"{path.name} was learnt from these trials, too, which would count twice; write one for this person: "
+            f"kinertia population ... --without {wanted.subject.name}"
+        )
+    return LearntPrior.from_file(file)
 
 
 def check_plates(wanted: SubjectFile) -> None:

@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.errors import PriorError
+from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared
-from kinertia.estimation.prior import BspPrior, with_symmetry
+from kinertia.estimation.prior import BspPrior, literature_prior, with_symmetry
 from kinertia.io.bsp_file import BspTable
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.settings import KnownSegment, PriorSettings
@@ -29,7 +30,11 @@ _KEPT_SHARE = 1e-3
 
 
 def with_known_body(
-    ready: Prepared, settings: PriorSettings, earlier: BspTable | None, segments: Mapping[str, KnownSegment]
+    ready: Prepared,
+    settings: PriorSettings,
+    earlier: BspTable | None,
+    segments: Mapping[str, KnownSegment],
+    group: LearntPrior | None = None,
 ) -> Prepared:
     """A prepared person of whom more is known than mass, height and sex.
 
@@ -38,11 +43,17 @@ def with_known_body(
         settings: of the prior.
         earlier: an estimate with deviations, in place of the literature's.
         segments: measured parameters by segment.
+        group: what was learnt of the person's group, in place of the literature's.
 
     Raises:
-        PriorError: a segment that the model has not, or an earlier estimate of another model.
+        PriorError: both an earlier estimate and a group, a segment that the model has not, or either of another model.
     """
     prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
+    if group is not None:
+        if earlier is not None:
+            raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
+        prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
+        notes.append(f"prior: learnt from {group.people} people in place of the literature's")
     if earlier is not None:
         prior = _from_earlier(prior, earlier)
         notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")

@@ -1,19 +1,17 @@
 """People whom the tables do not describe: how the literature's prior changes for children, old and obese people.
 
 The tables are of young adults of ordinary build (de Leva's men were 24 years old, body-mass index 24). Where numbers
-for others are known they go in, with their source; where they are not, nothing is invented: deviations double, so that
-the data decide more and error bars say less.
+for others are known they go in, with their source; where they are not, nothing is invented: deviations are half as
+large again, as if a group's mean were as far from the tables as people are from one another, and somewhat more.
 
 - elderly: segment masses by Pavol, Owings and Grabiner (2002, J Biomech 35:707), whose table could be read in one
   transcription only; trunk and head together keep the tables' split between pelvis and torso, since trunks are cut in
-  other places. Deviations of masses stay, those of centres of mass and inertias double.
+  other places. Deviations of masses stay, those of centres of mass and inertias grow.
 - child: head and trunk are heavier, thighs, shanks and feet lighter than an adult's (Jensen 1986, J Biomech 19:359);
-  his coefficients could not be checked. Deviations double.
+  his coefficients could not be checked. Deviations grow.
 - obese: trunks are heavier, thighs and shanks lighter for the same mass (Chambers et al. 2010, Clin Biomech 25:131,
   people over 65); de Leva's masses were off by up to 60 % on average in a sample of working adults (Merrill et al.
-  2019). Deviations double.
-
-Doubled, the deviation of a thigh's mass is 28 %, so that 60 % is just beyond two of them.
+  2019). Deviations grow.
 """
 
 from __future__ import annotations
@@ -26,7 +24,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Subject
 
-UNKNOWN_SPREAD = 2.0
+UNKNOWN_SPREAD = 1.5
 """Factor on deviations for which no numbers are known."""
 GROWN_UP_YEARS, OLD_YEARS = 18.0, 65.0
 OBESE_KG_M2 = 30.0
@@ -62,18 +60,19 @@ def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
     said = []
     if population == "elderly" and subject.sex is not None:
         prior = _spread(_with_masses(prior, _PAVOL[subject.sex]), keep_masses=True)
-        said.append("segment masses by Pavol 2002, deviations of all else doubled")
+        said.append("segment masses by Pavol 2002, deviations of all else half as large again")
     elif population != "adult":
         prior = _spread(prior)
-        said.append("no numbers that could be checked: young adults' values with doubled deviations")
+        said.append("no numbers that could be checked: young adults' values with deviations half as large again")
     sentences = [f"population: {population} ({why}), of whom the tables are not: {one}; {HELP}" for one in said]
     notes, warnings = (sentences, []) if stated is not None else ([], sentences)
-    short = subject.age_years is None and stated is None and (subject.height_m or _SHORT_M) < _SHORT_M
-    warning = (
-        f"height {subject.height_m:g} m: the tables are of adults; give age_years (or population) under [subject] if "
-        "this is a child"
-    )
-    return PopulationPrior(prior, tuple(notes), (*warnings, *((warning,) if short else ())))
+    height_m = subject.height_m
+    if subject.age_years is None and stated is None and height_m is not None and height_m < _SHORT_M:
+        warnings.append(
+            f"height {height_m:g} m: the tables are of adults; give age_years (or population) under [subject] if "
+            "this is a child"
+        )
+    return PopulationPrior(prior, tuple(notes), tuple(warnings))
 
 
 def _by_age_and_build(subject: Subject) -> tuple[str, str]:

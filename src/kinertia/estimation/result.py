@@ -15,6 +15,7 @@ from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotempora
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Skeleton
@@ -252,6 +253,13 @@ class Fit:
     def mass_kg(self) -> float:
         """Body mass as stated."""
         return known(self.subject.mass_kg)
+
+    @property
+    def attached_kg(self) -> float:
+        """Mass, as estimated, of what the person wore or carried: of segments that are none of the model's."""
+        own = SEGMENTS if self.file is None else self.file.bsp.segments
+        rows = zip(self.estimate.segments, self.estimate.mass_kg.tolist(), strict=True)
+        return float(sum(mass for segment, mass in rows if segment not in own))
 
     def save(self, folder: str | Path) -> Path:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""

@@ -164,6 +164,9 @@ class PriorFiles(PriorSettings):
     bsp: File | None = Field(
         default=None, description="bsp.csv of an earlier fit: its estimates and sd in place of the literature's"
     )
+    population: File | None = Field(
+        default=None, description="what kinertia population learnt of the person's group, in place of the literature's"
+    )
 
 
 class SubjectFile(Table):

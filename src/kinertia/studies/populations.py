@@ -14,7 +14,9 @@ from functools import partial
 import numpy as np
 
 from kinertia.estimation.attached import with_attached_prior
+from kinertia.estimation.input_checks import known
 from kinertia.estimation.known_body import with_prosthesis
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, PersonInformation, learn, person_information
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
@@ -40,6 +42,8 @@ COLUMNS = {"mass": slice(0, 1), "CoM": slice(1, 4), "inertia": slice(4, 7)}
 """Of `BodySegmentParameters.table`; products of inertia are in none."""
 RUCKSACK = Attached(name="rucksack", segment="torso", mass_kg=None, com_mm=(-200.0, 300.0, 0.0), on_scale=False)
 RUCKSACK_KG = 10.0
+_PARTS = 4
+"""Of a group; the prior of each part is learnt from the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +56,8 @@ class PersonOutcome:
         moments_nm, moments_before_nm: RMS error of all joint moments that the parameters make, with the true motion and
             the true forces.
         unlike: whether the fit says that the person is unlike the prior.
+        trial: what the person did.
+        information: what the recording says; None where the estimate started elsewhere than the adults' mean.
     """
 
     errors: np.ndarray
@@ -60,6 +66,8 @@ class PersonOutcome:
     moments_nm: float
     moments_before_nm: float
     unlike: bool
+    trial: SyntheticTrial
+    information: PersonInformation | None
 
 
 @dataclass(frozen=True)
@@ -111,9 +119,9 @@ def run_populations(
     rows = []
     for i, population in enumerate(POPULATIONS.values()):
         both = zip(*drawn[i * people : (i + 1) * people], strict=True)
-        rows += [
-            _summarised(population.title, prior, each) for prior, each in zip(("adults'", "own"), both, strict=True)
-        ]
+        adults, own = (list(each) for each in both)
+        outcomes = {"adults'": adults, "own": own, "learnt from others": _with_learnt_prior(adults)}
+        rows += [_summarised(population.title, prior, each) for prior, each in outcomes.items() if each]
     carried = [one[0] for one in drawn[len(POPULATIONS) * people :]]
     error, sd = (np.array([getattr(one, name)[-1, 0] for one in carried]) for name in ("errors", "sd"))
     return rows, RucksackAccuracy(people, rms(error), rms(sd), float(np.mean(np.abs(error) < WITHIN * sd)))
@@ -139,6 +147,35 @@ def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
     return tuple(_outcome(trial, *laboratory, prior) for prior in priors)
 
 
+def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
+    """Each person once more, with the prior learnt from those of the other parts of the group; none where they are few.
+
+    In linear theory: what the recording says joined with the prior, without estimating anew.
+    """
+    prior = literature_prior(walking_subject().literature)
+    parts = [list(people[k::_PARTS]) for k in range(_PARTS)]
+    outcomes = []
+    for k, part in enumerate(parts):
+        others = [known(one.information) for other in parts[:k] + parts[k + 1 :] for one in other]
+        if len(others) < FEWEST_PEOPLE:
+            return []
+        group = learn(others).of(prior)
+        outcomes += [_again(person, prior, group) for person in part]
+    return outcomes
+
+
+def _again(person: PersonOutcome, literature: BspPrior, group: BspPrior) -> PersonOutcome:
+    seen = known(person.information)
+    sd = literature.sd.ravel()
+    mean, before = (group.mean.table() - literature.mean.table()).ravel() / sd, group.covariance / np.outer(sd, sd)
+    covariance = np.linalg.inv(seen.information + np.linalg.inv(before))
+    relative = mean + covariance @ (seen.right - seen.information @ mean)
+    table = literature.mean.table() + (sd * relative).reshape(-1, 10)
+    estimate = BodySegmentParameters.from_table(group.mean.segments, table)
+    deviations = (np.sqrt(np.diag(covariance)) * sd).reshape(-1, 10)
+    return _compared(person.trial, estimate, group.mean, deviations, False, seen)
+
+
 def own_prior(name: str, adults: BspPrior) -> BspPrior:
     """What the subject file makes of the adults' prior for a person of this population."""
     if name == "prosthesis":
@@ -155,17 +192,35 @@ def _outcome(
     result: SimultaneousResult = estimate_simultaneous(
         skeleton, prior, calibration_prior(skeleton), seen.together, bandwidth.spacing_s
     )
+    information, adults = None, literature_prior(walking_subject().literature)
+    if np.array_equal(prior.mean.table(), adults.mean.table()):
+        information = person_information("", adults, prior, result.bsp, result.bsp_covariance)
+    sd = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
+    unlike = unlikeness(prior, result.bsp, result.bsp_covariance).unlike
+    return _compared(trial, result.bsp, prior.mean, sd, unlike, information)
+
+
+def _compared(
+    trial: SyntheticTrial,
+    estimate: BodySegmentParameters,
+    start: BodySegmentParameters,
+    sd: np.ndarray,
+    unlike: bool,
+    information: PersonInformation | None,
+) -> PersonOutcome:
     expected, after, before = (
         inverse_dynamics(trial.skeleton, bsp, trial.motion, trial.foot_loads)[:, 6:]
-        for bsp in (trial.bsp, result.bsp, prior.mean)
+        for bsp in (trial.bsp, estimate, start)
     )
     return PersonOutcome(
-        result.bsp.table() - trial.bsp.table(),
-        prior.mean.table() - trial.bsp.table(),
-        np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
+        estimate.table() - trial.bsp.table(),
+        start.table() - trial.bsp.table(),
+        sd,
         rms(after - expected),
         rms(before - expected),
-        unlikeness(prior, result.bsp, result.bsp_covariance).unlike,
+        unlike,
+        trial,
+        information,
     )
 
 

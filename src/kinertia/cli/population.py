@@ -1,0 +1,129 @@
+"""`kinertia population`: what the fits of a group teach about its people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from kinertia.cli.options import Quiet
+from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.errors import FileError, KinertiaError, PriorError
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.population_file import PopulationFile, population_text, read_population
+from kinertia.io.provenance import VERSION
+from kinertia.model.bsp import PARAMETERS
+from kinertia.report.saved_fit import FIT_FILE, read_saved
+
+_SHOWN = 12
+
+
+def population(
+    results: Annotated[
+        list[Path], typer.Argument(help="Folders of kinertia cohort, or of kinertia fit, of people of one group.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("population.toml"),
+    without: Annotated[
+        list[str] | None, typer.Option(help="Person to leave out, by name; may be given several times.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Learn the mean body and the spread of a group from the fits of its people.
+
+    Each person's trials say little about most parameters, all together say
+    much about their mean. Writes a file for population = "..." under [prior]
+    in the subject files of other people of the group.
+
+    [bold]Examples[/]
+
+    kinertia population out -o population.toml
+
+    kinertia population out --without anna -o for_anna.toml
+    """
+    _check_output(output)
+    people, files = _read(_folders(results), set(without or ()))
+    learnt = learn(people)
+    names = tuple(person.name for person in people)
+    content = PopulationFile(
+        kinertia=VERSION,
+        people=names,
+        files=files,
+        segments=learnt.segments,
+        mean=tuple(learnt.mean.tolist()),
+        mean_sd=tuple(learnt.mean_sd.tolist()),
+        covariance=tuple(tuple(row) for row in learnt.covariance.tolist()),
+    )
+    write_then_rename(output, population_text(content))
+    _report(learnt)
+    out.print(f"written to {output}; name it in subject files: population = ... under [prior]", soft_wrap=True)
+
+
+def _folders(results: list[Path]) -> list[Path]:
+    """Every person's results in these folders."""
+    folders = []
+    for path in results:
+        if (path / FIT_FILE).is_file():
+            folders.append(path)
+        elif people := sorted(path.glob(f"people/*/{FIT_FILE}")):
+            folders += [one.parent for one in people]
+        else:
+            raise FileError(path, "holds no results of kinertia cohort or kinertia fit")
+    return folders
+
+
+def _read(folders: list[Path], without: set[str]) -> tuple[list[PersonInformation], tuple[str, ...]]:
+    """What each person's recordings say, and the SHA-256 of all files; people without error bars are left out, said."""
+    people: list[PersonInformation] = []
+    files: list[str] = []
+    met = set()
+    with shown_progress() as progress:
+        for k, folder in enumerate(folders):
+            progress("reading", k / len(folders))
+            saved = read_saved(folder)
+            if names := {saved.fit.subject.name, folder.name} & without:
+                met |= names
+                continue
+            own = [] if saved.provenance is None else list(saved.provenance.files.values())
+            if twice := set(own) & set(files):
+                raise PriorError(f"{folder}: {len(twice)} of its files are another person's here, too; give each once")
+            try:
+                people.append(information_of(saved.fit))
+            except KinertiaError as error:
+                out.print(f"left out: {error}", soft_wrap=True)
+                continue
+            files += own
+    if lost := without - met:
+        raise PriorError(f"nobody is called {', '.join(sorted(lost))} here")
+    return people, tuple(files)
+
+
+def _check_output(output: Path) -> None:
+    if output.is_dir():
+        raise FileError(output, "a folder; give the name of a file")
+    if not output.absolute().parent.is_dir():
+        raise FileError(output, f"no such folder: {output.absolute().parent}")
+    if output.exists():
+        try:
+            read_population(output)
+        except FileError:
+            raise FileError(output, "not a file that kinertia population wrote; give another name with -o") from None
+
+
+def _report(learnt: LearntPrior) -> None:
+    """The parameters whose mean is furthest from the tables, and how much was learnt in all."""
+    words = [evidence(share) for share in learnt.learnt]
+    table = plain_table("segment", "parameter", "mean", "known to", "spread")
+    spread = np.sqrt(np.diag(learnt.covariance))
+    for k in np.argsort(-np.abs(learnt.mean) / learnt.mean_sd)[:_SHOWN]:
+        numbers = (f"{learnt.mean[k]:+.2f}", f"{learnt.mean_sd[k]:.2f}", f"{spread[k]:.2f}")
+        table.add_row(learnt.segments[k // len(PARAMETERS)], PARAMETERS[k % len(PARAMETERS)], *numbers)
+    out.print(table)
+    counts = ", ".join(f"{words.count(word)} {word}" for word in ("measured", "informed", "assumed"))
+    out.print(
+        f"{learnt.people} people; means in the literature's deviations from its values, the plainest first; of a "
+        f"further person's parameters {counts} by the group"
+    )

@@ -1,0 +1,105 @@
+"""What `kinertia population` learnt of a group: one TOML text, which the fits of others of the group start from.
+
+At its top stands, for people, what was learnt of each parameter. Below it are mean and covariance in relative
+parameters, and the files that they are from, so that nobody's recordings count twice.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, ValidationError, model_validator
+
+from kinertia.errors import FileError
+from kinertia.io.toml_lines import read_toml
+from kinertia.model.bsp import PARAMETERS
+from kinertia.settings import Table
+
+Numbers = Annotated[tuple[float, ...], Field(strict=False)]
+_DIGITS = 13
+
+
+class PopulationFile(Table):
+    """A whole file.
+
+    Attributes:
+        kinertia: version.
+        people: names.
+        files: SHA-256 of all files that it is from.
+        segments: names.
+        mean, mean_sd: (10 s,) of the group in the literature's deviations, and how well that is known.
+        covariance: (10 s, 10 s) of one more person of the group.
+
+    Examples:
+        >>> from kinertia.io.population_file import PopulationFile
+        >>> zeros = (0.0,) * 10
+        >>> made = dict(mean=zeros, mean_sd=zeros, covariance=(zeros,) * 10)
+        >>> PopulationFile(kinertia="0.1", people=("A",), files=("9f",), segments=("leg",), **made).segments
+        ('leg',)
+    """
+
+    kinertia: str
+    people: tuple[str, ...] = Field(strict=False)
+    files: tuple[str, ...] = Field(strict=False)
+    segments: tuple[str, ...] = Field(strict=False)
+    mean: Numbers
+    mean_sd: Numbers
+    covariance: tuple[Numbers, ...] = Field(strict=False)
+
+    @model_validator(mode="after")
+    def _complete(self) -> PopulationFile:
+        size = len(PARAMETERS) * len(self.segments)
+        if {len(self.mean), len(self.mean_sd), len(self.covariance), *map(len, self.covariance)} != {size}:
+            raise ValueError(f"mean and covariance must have {size} rows and columns for {len(self.segments)} segments")
+        if np.linalg.eigvalsh(np.array(self.covariance))[0] <= 0:
+            raise ValueError("the covariance is not positive definite")
+        return self
+
+
+def read_population(path: Path) -> PopulationFile:
+    """What was learnt of a group.
+
+    Raises:
+        FileError: no such file, or not one that `kinertia population` wrote; with the line.
+    """
+    document = read_toml(path, "what kinertia population wrote (population.toml)")
+    try:
+        return PopulationFile.model_validate(document.content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"])) or "its numbers"
+        problem = f"not what kinertia population wrote: {place}: {first['msg']}; write it anew"
+        raise FileError(path, problem, document.line(first["loc"]) or document.last_line) from None
+
+
+def population_text(population: PopulationFile) -> str:
+    """The text of the file."""
+    lines = [
+        f"# {len(population.people)} people of a group, learnt by kinertia population. For the fits of others of it:",
+        "#     [prior]",
+        '#     population = "population.toml"',
+        "# Mean (+- how well it is known) and spread within the group, in the literature's deviations from its values:",
+    ]
+    spread = np.sqrt(np.diag(np.array(population.covariance)))
+    names = [f"{segment} {parameter}" for segment in population.segments for parameter in PARAMETERS]
+    lines += [
+        f"# {name:20s} {mean:+6.2f} +- {sd:4.2f}   {each:4.2f}"
+        for name, mean, sd, each in zip(names, population.mean, population.mean_sd, spread.tolist(), strict=True)
+    ]
+    lines += ["", f"kinertia = {json.dumps(population.kinertia)}"]
+    lines += [
+        f"people = {json.dumps(population.people, ensure_ascii=False)}",
+        f"files = {json.dumps(population.files)}",
+    ]
+    lines += [f"segments = {json.dumps(population.segments)}", f"mean = {_numbers(population.mean)}"]
+    lines += [f"mean_sd = {_numbers(population.mean_sd)}"]
+    rows = ",\n".join(f"    {_numbers(row)}" for row in population.covariance)
+    return "\n".join([*lines, f"covariance = [\n{rows},\n]"]) + "\n"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return f"[{', '.join(repr(float(f'{value:.{_DIGITS}g}')) for value in values)}]"

@@ -1,0 +1,84 @@
+"""`kinertia population`: from people's results to a file that the fits of others start from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from command_line import run
+from kinertia.estimation.from_files import prepare_subject
+from kinertia.estimation.learnt_prior import information_of
+from kinertia.estimation.prior import literature_prior
+from kinertia.io.provenance import Provenance, recordings
+from kinertia.io.subject_file import read_subject
+from kinertia.report.saved_fit import FIT_FILE, write_fit
+
+
+@pytest.fixture
+def cohort(fit, tmp_path):
+    """Six people of the same recordings, each called by another name."""
+    rng = np.random.default_rng(0)
+    # posterior means of people spread as much as the data have taken from the prior's variance
+    values, vectors = np.linalg.eigh(literature_prior(fit.literature).covariance - fit.posterior.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    for k in range(6):
+        noise = root @ rng.standard_normal(len(root))
+        table = fit.literature.table() + noise.reshape(12, 10)
+        bsp = type(fit.estimate).from_table(fit.estimate.segments, table)
+        person = replace(fit, estimate=bsp, subject=fit.subject.model_copy(update={"name": f"p{k}"}))
+        folder = tmp_path / "out" / "people" / f"p{k}"
+        folder.mkdir(parents=True)
+        write_fit(person, Provenance("kinertia fit", {"walk.trc": f"hash{k}"}), folder / FIT_FILE)
+    return tmp_path / "out"
+
+
+def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
+    _, folder, _ = demo_command
+    outcome = run("population", cohort, "--without", "p3", "-o", tmp_path / "population.toml")
+    assert outcome.status == 0, outcome.err
+    assert "5 people" in outcome.out
+    text = (tmp_path / "population.toml").read_text(encoding="utf-8")
+    assert '"hash2"' in text
+    assert '"hash3"' not in text
+    subject = folder / "lab" / "subject.toml"
+    with_group = subject.with_name("grouped.toml")
+    with_group.write_text(
+        subject.read_text(encoding="utf-8")
+        + f'\n[prior]\npopulation = "{(tmp_path / "population.toml").as_posix()}"\n',
+        encoding="utf-8",
+    )
+    plain, grouped = (prepare_subject(path) for path in (subject, with_group))
+    assert any("learnt from 5 people" in note for note in grouped.notes)
+    assert np.all(grouped.prior.sd <= 1.01 * plain.prior.sd)
+    assert grouped.prior.sd.min() > 0
+    own = recordings(read_subject(subject))[0]
+    with_own = (tmp_path / "population.toml").read_text(encoding="utf-8").replace("hash2", own)
+    (tmp_path / "population.toml").write_text(with_own, encoding="utf-8")
+    refused = run("fit", with_group, "-o", tmp_path / "fit")
+    assert refused.status == 2
+    assert "was learnt from these trials, too, which would count twice" in refused.err
+
+
+def test_what_cannot_be_learnt_is_said(cohort, tmp_path):
+    assert "5 people" in run("population", cohort, "-o", tmp_path / "x.toml", "--without", "p0").out
+    for arguments, words in (
+        ([cohort, "--without", "nobody"], "nobody is called nobody here"),
+        ([cohort, "--without", "p0", "--without", "p1"], "4 people; a group's mean and spread take at least 5"),
+        ([tmp_path], "holds no results of kinertia cohort or kinertia fit"),
+        ([cohort, cohort / "people" / "p0"], "of its files are another person's here, too"),
+    ):
+        outcome = run("population", *arguments, "-o", tmp_path / "y.toml")
+        assert outcome.status == 2
+        assert words in outcome.err
+    (tmp_path / "mine.toml").write_text("[subject]\n", encoding="utf-8")
+    assert "not a file that kinertia population wrote" in run("population", cohort, "-o", tmp_path / "mine.toml").err
+
+
+def test_information_is_what_the_prior_does_not_explain(fit):
+    """With the prior put back it gives the estimate, but for what is too little to count."""
+    person = information_of(fit)
+    sd = fit.posterior.prior_sd.ravel()
+    posterior = np.linalg.inv(person.information + np.linalg.inv(person.correlation))
+    np.testing.assert_allclose(posterior * np.outer(sd, sd), fit.posterior.covariance, atol=1e-3 * sd.max() ** 2)
+    moved = (fit.estimate.table() - fit.literature.table()).ravel() / sd
+    np.testing.assert_allclose(posterior @ person.right, moved, atol=0.05)
