@@ -150,7 +150,7 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
     tab.page.get_by_role("link", name="Go on").click()
     tab.arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
-    assert "lacks 'sex'" in tab.message()
+    playwright.expect(tab.page.locator(".message.caution")).to_contain_text("lacks 'sex'")
     tab.fill(sex="male", mass="41,5", height="1.61").check().checked().estimate()
     verdict = tab.verdict()
     ours, theirs = load_fit(tab.person().results), measured_demo.fit

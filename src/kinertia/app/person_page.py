@@ -129,6 +129,7 @@ def person_page(
         trouble=found,
         draft=notes.get("draft", "") if person.files() else "",
         said=said,
+        saved=notes.get("saved", False),
         jobs=progress(person, jobs),
         ended={kind: _how(notes, kind) for kind in KINDS},
         check=checked,

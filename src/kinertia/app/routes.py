@@ -253,6 +253,7 @@ class _Actions:
         return [person for person in people if person is not None and person.fitted]
 
     def _checked(self, request: Request, person: Person) -> Response:
+        person.note(saved=True)
         if not trouble(person):
             self._jobs.add(person, "check")
         return to(request, "people", person.name)
