@@ -65,6 +65,18 @@ def opensim():
 
 
 @pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium, without any network of its own."""
+    chromium = pytest.importorskip("chromium")
+    if not chromium.CHROMIUM.exists():
+        pytest.skip(f"needs {chromium.CHROMIUM} (apt-get install chromium)")
+    with chromium.playwright.sync_playwright() as engine:
+        started = engine.chromium.launch(executable_path=str(chromium.CHROMIUM), args=chromium.FLAGS)
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="session")
 def fit_of(shared_data, tmp_path_factory):
     """Results of `kinertia fit` for a measured walk, by its name in `walks.WALKS`; run once."""
     done = {}

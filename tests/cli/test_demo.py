@@ -13,7 +13,9 @@ from kinertia.estimation.from_files import read_inputs
 from kinertia.estimation.prepare import prepare
 from kinertia.io.subject_file import read_subject
 from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.report.page import render
 from kinertia.synthetic.walk import unlike_literature, walking_subject
+from report_page import figures_of, numbers
 
 
 def check_outcome(outcome, folder):
@@ -114,7 +116,22 @@ def test_joint_moments_against_the_truth(demo_run):
     fit, walk = result.fit, result.walk
     at = np.searchsorted(walk.time, fit.trials[0].time - 1e-9)
     true = inverse_dynamics(walk.skeleton, walk.bsp, walk.motion.cut(at), walk.foot_loads[at])
-    moments = pd.DataFrame(true, columns=list(walk.skeleton.coordinates))
-    exact = SimpleNamespace(time=fit.trials[0].time, moments={"literature": moments, "estimate": moments})
-    again = replace(result, fit=SimpleNamespace(trials=[exact]))
+    assert walk.skeleton.coordinates == fit.skeleton.coordinates
+    exact = replace(fit.trials[0], joint_loads={"literature": true, "estimate": true})
+    again = replace(result, fit=replace(fit, trials=(exact,)))
     assert set(again.moment_errors.values()) == {(0.0, 0.0)}
+
+
+def test_the_report_shows_the_truth(demo_run):
+    result, folder = demo_run
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Against the truth" in page
+    figures = figures_of(page)
+    table = result.table.set_index(["segment", "parameter"])
+    forest = figures["changes"]
+    (truth, *_) = [trace for trace in forest["data"] if trace["name"] == "truth"]
+    expected = (table["truth"] - table["literature"]).xs("mass", level="parameter")[list(result.truth.segments)]
+    np.testing.assert_allclose(numbers(truth["x"]), expected, atol=1e-5)
+    drawn = [trace for trace in figures["trial1-moments"]["data"] if trace.get("name") == "truth"]
+    assert len(drawn) == 21
+    assert "Against the truth" not in render(result.fit)

@@ -1,6 +1,5 @@
 """Report and comparison in a browser: headless Chromium opens it as a user does, from a file."""
 
-import io
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -9,22 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from chromium import DESKTOP, PHONE, Opened, colour, ink, playwright
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import render_comparison
 
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (pip install -e '.[test]')")
-
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
 SWITCHED = """plot => {
     const panel = plot.closest(".panel");
     if (!panel) return null;
@@ -32,41 +19,8 @@ SWITCHED = """plot => {
     return [panel.parentElement.querySelector("input").name, siblings.indexOf(panel)];
 }"""
 """Name of the choice that shows a plot, and which of its answers; null for a plot that always shows."""
-PATIENCE_MS = 30_000
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def browser():
-    if not CHROMIUM.exists():
-        pytest.skip(f"needs {CHROMIUM} (apt-get install chromium)")
-    with playwright.sync_playwright() as engine:
-        started = engine.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield started
-        started.close()
-
-
-class Opened:
-    """A report in a tab, with what it said and asked for."""
-
-    def __init__(self, browser, path, viewport=None, scheme="light"):
-        self.page = browser.new_page(viewport=viewport or DESKTOP, color_scheme=scheme)
-        self.errors, self.requests = [], []
-        self.page.on(
-            "console", lambda message: message.type in ("error", "warning") and self.errors.append(message.text)
-        )
-        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(path.as_uri())
-        self.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
-        playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
-
-    def picture(self, locator):
-        """Pixels (h, w, 3), 0 to 1."""
-        from matplotlib.image import imread  # takes longer to load than most tests
-
-        return imread(io.BytesIO(locator.screenshot()), format="png")[..., :3]
 
 
 @pytest.fixture(scope="module")
@@ -85,16 +39,6 @@ def opened(request, browser, demo_run):
     report = Opened(browser, folder / "report.html")
     yield report
     report.page.close()
-
-
-def ink(pixels):
-    """Share of the pixels that are not white."""
-    return float((pixels.min(axis=2) < 0.9).mean())
-
-
-def colour(pixels):
-    """Share of the pixels that are neither white, grey nor black: lines and markers, not axes and letters."""
-    return float((np.ptp(pixels, axis=2) > 0.25).mean())
 
 
 def test_nothing_goes_wrong_and_nothing_is_asked_for(opened):
@@ -138,10 +82,10 @@ def test_a_page_without_data_would_be_found_blank(demo):
 
 @pytest.fixture
 def canvas(demo):
-    demo.page.locator("#trial1-view input[type=range]").evaluate(
+    demo.page.locator("#motion-view input[type=range]").evaluate(
         "slider => { slider.value = 0; slider.dispatchEvent(new Event('input')); }"
     )
-    return demo.page.locator("#trial1-view canvas")
+    return demo.page.locator("#motion-view canvas")
 
 
 def frame(canvas):
@@ -151,7 +95,7 @@ def frame(canvas):
 def test_view_plays_and_pauses(demo, canvas):
     before = demo.picture(canvas)
     assert colour(before) > 0.005
-    button = demo.page.locator("#trial1-view [data-do=play]")
+    button = demo.page.locator("#motion-view [data-do=play]")
     button.click()
     playwright.expect(button).to_have_text("Pause")
     demo.page.wait_for_timeout(600)
@@ -166,8 +110,8 @@ def test_view_plays_and_pauses(demo, canvas):
 
 def test_view_plays_in_real_time_and_starts_again(demo, canvas):
     """At full speed a second of the trial takes a second, whatever the number of frames, and the end leads back."""
-    view = demo.page.locator("#trial1-view")
-    view.locator("select").select_option("1")
+    view = demo.page.locator("#motion-view")
+    view.locator("select[data-set=speed]").select_option("1")
     seen = canvas.evaluate(
         """canvas => new Promise(resolve => {
             const seen = [], started = performance.now();
@@ -175,12 +119,12 @@ def test_view_plays_in_real_time_and_starts_again(demo, canvas):
                 seen.push([performance.now() - started, Number(canvas.dataset.frame)]);
                 if (seen.at(-1)[0] < 1500) requestAnimationFrame(look); else resolve(seen);
             };
-            document.querySelector("#trial1-view [data-do=play]").click();
+            document.querySelector("#motion-view [data-do=play]").click();
             look();
         })"""
     )
     view.locator("[data-do=play]").click()
-    view.locator("select").select_option("0.5")
+    view.locator("select[data-set=speed]").select_option("0.5")
     times, frames = np.array(seen).T
     back = np.flatnonzero(np.diff(frames) < 0)
     until = back[0] + 1 if len(back) else len(frames)
@@ -191,7 +135,7 @@ def test_view_plays_in_real_time_and_starts_again(demo, canvas):
 
 def test_drawing_300_frames_is_quick_enough_for_60_a_second(demo, canvas):
     """Median time of one frame, so that a busy machine does not decide."""
-    milliseconds = demo.page.locator("#trial1-view input[type=range]").evaluate(
+    milliseconds = demo.page.locator("#motion-view input[type=range]").evaluate(
         """slider => {
             const spent = [];
             for (let k = 1; k <= 300; k++) {
@@ -207,7 +151,7 @@ def test_drawing_300_frames_is_quick_enough_for_60_a_second(demo, canvas):
 
 
 def test_view_is_scrubbed_and_turned_by_keyboard_and_pointer(demo, canvas):
-    slider = demo.page.locator("#trial1-view input[type=range]")
+    slider = demo.page.locator("#motion-view input[type=range]")
     slider.focus()
     for _ in range(3):
         demo.page.keyboard.press("ArrowRight")
@@ -218,7 +162,7 @@ def test_view_is_scrubbed_and_turned_by_keyboard_and_pointer(demo, canvas):
         lambda: demo.page.keyboard.press("ArrowLeft"),
         lambda: demo.page.keyboard.press("ArrowUp"),
         lambda: drag(demo.page, canvas),
-        lambda: demo.page.locator("#trial1-view [data-do=right]").click(),
+        lambda: demo.page.locator("#motion-view [data-do=right]").click(),
     ):
         before = demo.picture(canvas)
         turn()
@@ -240,11 +184,12 @@ def drag(page, canvas):
 
 
 def test_parts_of_the_view_are_switched_off(demo, canvas):
-    boxes = demo.page.locator("#trial1-view [data-show]")
+    boxes = demo.page.locator("#motion-view [data-show]")
     for box in boxes.all():
         before = demo.picture(canvas)
         box.uncheck()
-        assert ink(demo.picture(canvas)) < ink(before), box.get_attribute("data-show")
+        changed = np.abs(demo.picture(canvas) - before).max(axis=2) > 0.05
+        assert changed.mean() > 1e-4, box.get_attribute("data-show")
     for box in boxes.all():
         box.check()
 
@@ -464,39 +409,3 @@ def test_comparison_is_drawn_fits_the_window_and_sorts(browser, comparison, widt
     assert opened.errors == []
     assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [page.url]
     page.close()
-
-
-CONTRAST = """() => {
-    const channels = colour => colour.match(/[\\d.]+/g).map(Number);
-    const light = colour => {
-        const linear = c => c <= .03928 ? c / 12.92 : ((c + .055) / 1.055) ** 2.4;
-        const [r, g, b] = channels(colour).map(c => linear(c / 255));
-        return .2126 * r + .7152 * g + .0722 * b;
-    };
-    const ground = element => {
-        for (let one = element; one; one = one.parentElement) {
-            const colour = getComputedStyle(one).backgroundColor;
-            if (channels(colour).length === 3 || channels(colour)[3] > 0) return colour;
-        }
-        return "rgb(255, 255, 255)";
-    };
-    const worded = element => [...element.childNodes].some(node => node.nodeType === 3 && node.textContent.trim());
-    const judged = element => worded(element) && element.checkVisibility() && !element.closest(".plot, script, button");
-    return [...document.querySelectorAll("main *, header *, footer")].filter(judged)
-        .map(element => {
-            const [a, b] = [light(getComputedStyle(element).color), light(ground(element))].sort((x, y) => y - x);
-            return [(a + .05) / (b + .05), element.tagName + " " + element.textContent.slice(0, 40)];
-        }).sort((one, other) => one[0] - other[0]).slice(0, 3);
-}"""
-"""The three texts that stand out least from their ground, by WCAG's ratio."""
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("which", ["report", "comparison"])
-def test_texts_stand_out_in_light_and_dark(browser, demo_run, comparison, scheme, which):
-    path = comparison if which == "comparison" else demo_run[1] / "report.html"
-    opened = Opened(browser, path, scheme=scheme)
-    ground = opened.picture(opened.page.locator("main")).mean(axis=(0, 1)).mean()
-    assert (ground < 0.3) == (scheme == "dark")
-    assert opened.page.evaluate(CONTRAST)[0][0] >= 4.5, opened.page.evaluate(CONTRAST)
-    opened.page.close()

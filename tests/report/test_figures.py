@@ -15,7 +15,7 @@ from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import change_figure, departure_figure, departures, information_figure
 from kinertia.report.coordinate_titles import panels_of, title_of
 from kinertia.report.figure import Figure, compact
-from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
+from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.plots import as_plotly
@@ -222,9 +222,9 @@ def test_markers_are_sorted_and_gaps_drawn(fit):
     column = markers.labels.index(label)
     positions[:, :, 0] = np.where(np.isfinite(positions[:, :, 0]), positions[:, :, 0], 0.0)
     positions = np.where(np.isfinite(positions), positions, 0.0)
-    assert gap_figure(_with_positions(trial, positions)) is None
+    assert fit_gap_figure(_with_positions(trial, positions)) is None
     positions[10:15, column, 1] = np.nan
-    gaps = as_plotly(gap_figure(_with_positions(trial, positions)))
+    gaps = as_plotly(fit_gap_figure(_with_positions(trial, positions)))
     assert gaps.data[0].y == (label, label, None)
     first, last, _ = gaps.data[0].x
     half = 0.5 / markers.rate_hz

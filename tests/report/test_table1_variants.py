@@ -45,9 +45,16 @@ def test_frame_has_every_draw(tables):
     assert set(frame[~frame["condition"].isin(NOISY)]["draw"]) == {0}
 
 
+@pytest.mark.slow
 def test_files_are_written(tables, without, tmp_path):
     folder = save_variants(tables, tmp_path / "out")
-    assert sorted(path.name for path in folder.glob("variants*")) == ["variants.csv", "variants.md", "variants.png"]
+    assert sorted(path.name for path in folder.glob("variants*")) == [
+        "variants.csv",
+        "variants.html",
+        "variants.md",
+        "variants.png",
+    ]
+    assert "<svg" in (folder / "variants.html").read_text(encoding="utf-8")
     assert len((folder / "variants.md").read_text(encoding="utf-8").splitlines()) == 2 + 3
     assert pd.read_csv(folder / "variants.csv").shape == (12, 4 + 10)
     without("matplotlib")

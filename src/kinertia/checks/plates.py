@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, Recording, Trial, runs
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
+from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording, Trial, runs
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates
 from kinertia.trial.strides import periods
 
-_FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
-"""Below this a centre of pressure is too noisy to be judged."""
 _FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}
 _LISTED = 4
 _LONG_WINDOW_S = 2.0
@@ -106,7 +105,7 @@ def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> Plat
             for contact in _contacts(loads.time, loads.force[:, foot, 1] > 0, name)
         ]
     share, distance = None, 0.0
-    firm = force[:, 1] > _FIRM_LOAD_N
+    firm = force[:, 1] > FIRM_LOAD_N
     if plates.corners is not None and firm.any():
         share, distance = _off_plate(force[firm], moment[firm], plates.corners[p])
     ordered = tuple(sorted(contacts, key=lambda contact: contact.start_s))
@@ -121,9 +120,7 @@ def _contacts(time: FloatArray, loaded: BoolArray, foot: str | None) -> list[Con
 def _off_plate(force: FloatArray, moment: FloatArray, corners: FloatArray) -> tuple[float, float]:
     """Share of the samples whose centre of pressure is off the plate (4, 3), and their distance from it (m)."""
     height = corners[:, 1].mean()
-    pressure = np.column_stack(
-        [(moment[:, 2] + height * force[:, 0]), (height * force[:, 2] - moment[:, 0])] / force[:, 1]
-    )
+    pressure = centre_of_pressure(np.concatenate([force, moment], axis=1), float(height))[:, [0, 2]]
     flat = corners[:, [0, 2]]
     edges = np.roll(flat, -1, axis=0) - flat
     normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]

@@ -42,6 +42,7 @@ class RecordingCheck:
     Attributes:
         recording: what was read.
         marker_set: how its labels fit.
+        used_set: the marker set that fits, or None.
         markers: visibility, over the whole recording, of the set's markers, or of all where no set fits.
         travel: what the person does.
         telling: how far trunk and pelvis move, or None.
@@ -61,6 +62,7 @@ class RecordingCheck:
 
     recording: Recording
     marker_set: MarkerSetMatch
+    used_set: MarkerSet | None
     markers: tuple[Visibility, ...]
     travel: Travel
     telling: TellingMovements | None
@@ -158,7 +160,7 @@ def check_recording(
     verdicts += _weight(mass, scale)
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
-        recording, match, seen, moves, telling, plates, windows, mass, scale, tuple(verdicts), tuple(notes)
+        recording, match, used, seen, moves, telling, plates, windows, mass, scale, tuple(verdicts), tuple(notes)
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -16,7 +15,7 @@ from kinertia.checks.model import ModelCheck, check_model
 from kinertia.checks.recording import RecordingCheck
 from kinertia.checks.verdict import stands_against
 from kinertia.cli.options import AsJson, Force, Quiet, Sex, Verbose, number, results_folder
-from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
+from kinertia.cli.terminal import out, plain_table, print_json, show_error, show_verdicts, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
@@ -103,7 +102,7 @@ def check(
     mistakes += more
     page = None if output is None else save_check_page(recordings, models, mistakes, output)
     if as_json:
-        typer.echo(json.dumps(_told(recordings, models, mistakes), indent=2))
+        print_json(_told(recordings, models, mistakes))
     else:
         with suppress(SystemExit):  # rich's, where nobody reads on (| head)
             _show(recordings, models, page, verbose)

@@ -7,11 +7,18 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Force, Quiet, results_folder
-from kinertia.cli.terminal import out
+from kinertia.cli.options import AsJson, Force, Quiet, results_folder
+from kinertia.cli.terminal import out, print_json
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import names_from_common_folder
-from kinertia.report.comparison import MOST_FITS, comparison_columns, differences, remarks, render_comparison
+from kinertia.report.comparison import (
+    MOST_FITS,
+    comparison_columns,
+    comparison_summary,
+    differences,
+    remarks,
+    render_comparison,
+)
 from kinertia.report.files import write_columns
 from kinertia.report.saved_fit import load_fit
 
@@ -19,6 +26,7 @@ from kinertia.report.saved_fit import load_fit
 def compare(
     results: Annotated[list[Path], typer.Argument(help="Folders that kinertia fit has written, two or more.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for page and table.")] = Path("comparison"),
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -41,6 +49,9 @@ def compare(
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")
         write_columns(work / "compare.csv", comparison_columns(fits))
+    if as_json:
+        print_json(comparison_summary(fits))
+        return
     (first_name, first), *others = fits.items()
     for sentence in remarks(fits):
         out.print(f"note: {sentence}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import typer
 from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.fit_report import report_fit, report_verdicts
 from kinertia.cli.options import AsJson, Force, Output, Quiet, Sex, Verbose, number, results_folder
-from kinertia.cli.terminal import out, show_error, shown_progress
+from kinertia.cli.terminal import out, print_json, show_error, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
@@ -115,7 +114,7 @@ def fit(
             report_verdicts(judged, result, verbose)
             out.print(f"results in {one.folder}", soft_wrap=True)
     if as_json:
-        typer.echo(json.dumps(summaries if len(runs) > 1 else summaries[0], indent=2))
+        print_json(summaries if len(runs) > 1 else summaries[0])
     raise typer.Exit(status)
 
 

@@ -11,18 +11,32 @@ import numpy as np
 import typer
 
 from kinertia.cli.measured_demo import FILES as MEASURED_WALK
-from kinertia.cli.options import Force, Output, Quiet, results_folder
-from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.cli.options import AsJson, Force, Output, Quiet, results_folder
+from kinertia.cli.terminal import out, plain_table, print_json, shown_progress
 from kinertia.io.subject_file import read_subject
-from kinertia.report.accuracy import HEADINGS, JOINT_CAPTION, JOINT_HEADINGS, accuracy_rows, joint_rows, save_accuracy
+from kinertia.report.accuracy import (
+    HEADINGS,
+    JOINT_CAPTION,
+    JOINT_HEADINGS,
+    accuracy_rows,
+    accuracy_summary,
+    joint_rows,
+    save_accuracy,
+)
 from kinertia.report.extras import HOW, has_matplotlib
-from kinertia.report.faults import counts, save_faults
-from kinertia.report.populations import CAPTION, population_rows, rucksack_sentence, save_populations
+from kinertia.report.faults import counts, faults_summary, save_faults
+from kinertia.report.populations import (
+    CAPTION,
+    population_rows,
+    populations_summary,
+    rucksack_sentence,
+    save_populations,
+)
 from kinertia.report.populations import HEADINGS as POPULATION_HEADINGS
-from kinertia.report.sensitivity import save_sensitivity
-from kinertia.report.table1 import save_table1, table1_rows
+from kinertia.report.sensitivity import save_sensitivity, sensitivity_summary
+from kinertia.report.table1 import save_table1, table1_rows, table1_summary
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
-from kinertia.report.table1_variants import save_variants, variants_rows
+from kinertia.report.table1_variants import save_variants, variants_frame, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
 from kinertia.studies.faults import run_faults, synthetic_walk
 from kinertia.studies.populations import run_populations
@@ -48,6 +62,7 @@ def table1(
         typer.Option("--variants", help="The noisy half again, one thing changed at a time; some 15 minutes."),
     ] = False,
     output: Output = Path("out"),
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -71,12 +86,18 @@ def table1(
             source, name = measured or (study_trial(), "synthetic walk")
             table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     if variants:
-        _report_variants(results, seed)
         save_variants(results, output)
-        _say_where(output, ("variants.md", "variants.csv"), "variants.png")
+        if as_json:
+            print_json({"seed": seed, "draws": variants_frame(results).to_dict(orient="records")})
+            return
+        _report_variants(results, seed)
+        _say_where(output, ("variants.html", "variants.md", "variants.csv"), "variants.png")
+        return
+    save_table1(table, output)
+    if as_json:
+        print_json(table1_summary(table))
         return
     _report_table1(table, source.deviation)
-    save_table1(table, output)
     _say_where(output, ("report.html", "table1.json", "table1.csv"), "table1.png")
 
 
@@ -115,6 +136,7 @@ def accuracy(
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -127,6 +149,10 @@ def accuracy(
     results_folder(output, force)
     with shown_progress() as progress:
         accuracies = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
+    save_accuracy(accuracies, seed, output)
+    if as_json:
+        print_json(accuracy_summary(accuracies, seed))
+        return
     for scenario in accuracies.values():
         out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
         for headings, rows in ((JOINT_HEADINGS, joint_rows), (HEADINGS, accuracy_rows)):
@@ -135,8 +161,7 @@ def accuracy(
                 shown.add_row(*row)
             out.print(shown)
     out.print(JOINT_CAPTION)
-    save_accuracy(accuracies, seed, output)
-    out.print(f"\nresults in {output}: accuracy.json, accuracy.md")
+    out.print(f"\nresults in {output}: accuracy.html, accuracy.json, accuracy.md")
 
 
 @study.command()
@@ -145,6 +170,7 @@ def populations(
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -159,13 +185,16 @@ def populations(
     results_folder(output, force)
     with shown_progress() as progress:
         accuracies, rucksack = run_populations(people, seed, workers, lambda share: progress("people", share))
+    save_populations(accuracies, rucksack, seed, output)
+    if as_json:
+        print_json(populations_summary(accuracies, rucksack, seed))
+        return
     shown = plain_table(*POPULATION_HEADINGS)
     for row in population_rows(accuracies):
         shown.add_row(*row)
     out.print(shown)
     out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksack)}")
-    save_populations(accuracies, rucksack, seed, output)
-    out.print(f"\nresults in {output}: populations.json, populations.md", soft_wrap=True)
+    out.print(f"\nresults in {output}: populations.html, populations.json, populations.md", soft_wrap=True)
 
 
 @study.command()
@@ -174,6 +203,7 @@ def sensitivity(
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -186,12 +216,15 @@ def sensitivity(
     results_folder(output, force)
     with shown_progress() as progress:
         result = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
+    save_sensitivity(result, output)
+    if as_json:
+        print_json(sensitivity_summary(result))
+        return
     for kind, title in KINDS.items():
         listed = ", ".join(result.insensitive(kind)) or "none"
         out.print(f"small errors up to twice the amplitude of {title}: {listed}")
     out.print(f"shown by no condition: {', '.join(result.never()) or 'none'}")
-    save_sensitivity(result, output)
-    _say_where(output, ("sensitivity.md", "sensitivity.json", "sensitivity.csv"), "sensitivity.png")
+    _say_where(output, ("sensitivity.html", "sensitivity.md", "sensitivity.json", "sensitivity.csv"), "sensitivity.png")
 
 
 @study.command()
@@ -202,6 +235,7 @@ def faults(
     ] = None,
     workers: Workers = None,
     output: Output = Path("out"),
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -226,6 +260,10 @@ def faults(
             name = wanted.subject.name
             sources[name if name not in sources else f"{name} ({len(sources)})"] = wanted
         sound, outcomes = run_faults(sources, workers=workers, progress=lambda share: progress("mistakes", share))
+    save_faults(sound, outcomes, output)
+    if as_json:
+        print_json(faults_summary(sound, outcomes))
+        return
     shown = plain_table("", *(one.name for one in sound))
     for kind in counts(()):
         shown.add_row(kind, *(str(counts([one for one in outcomes if one.walk == walk.name])[kind]) for walk in sound))
@@ -233,8 +271,7 @@ def faults(
     for one in outcomes:
         if one.outcome in ("silent", "warned"):
             out.print(f"{one.outcome}: {one.walk}: {one.mistake}" + (f": {one.said}" if one.said else ""))
-    save_faults(sound, outcomes, output)
-    out.print(f"results in {output}: faults.md, faults.json", soft_wrap=True)
+    out.print(f"results in {output}: faults.html, faults.md, faults.json", soft_wrap=True)
 
 
 def _say_where(output: Path, files: Sequence[str], picture: str) -> None:

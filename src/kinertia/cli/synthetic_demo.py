@@ -23,10 +23,9 @@ from kinertia.io.subject_file import read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.files import save_fit
-from kinertia.studies.joint_accuracy import JOINTS
+from kinertia.report.truth import Truth
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
-from kinertia.trial.rms import rms
 
 PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
 """Force plates at 1000 Hz, cameras at 100 Hz."""
@@ -57,23 +56,8 @@ class Demo:
 
     @cached_property
     def moment_errors(self) -> dict[str, tuple[float, float]]:
-        """Per joint, RMS error (N m) of joint moments by the usual way (measured motion, literature BSPs, forces as
-        measured) and by the simultaneous estimate.
-        """
-        trial = self.fit.trials[0]
-        at = np.searchsorted(self.walk.time, trial.time - 1e-9)
-        true = inverse_dynamics(self.walk.skeleton, self.walk.bsp, self.walk.motion.cut(at), self.walk.foot_loads[at])
-        coordinates = self.walk.skeleton.coordinates
-        expected = pd.DataFrame(true, columns=list(coordinates))
-        errors = {}
-        for joint, begins in JOINTS.items():
-            names = [n for n in coordinates if n.startswith(begins) and n in trial.moments["estimate"]]
-            before, after = (
-                rms(trial.moments[stage][names].to_numpy() - expected[names].to_numpy())
-                for stage in ("literature", "estimate")
-            )
-            errors[joint] = (before, after)
-        return errors
+        """Per joint, RMS error (N m) of joint moments by the usual way and by the simultaneous estimate."""
+        return truth_of(self.walk, self.fit).moment_errors(self.fit)
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -84,10 +68,16 @@ class Demo:
 
     def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
         """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
-        change = source.table() - self.truth.table()
-        distance = np.linalg.norm(change[:, 1:4], axis=1)
-        mass, com, inertia = (rms(part) for part in (change[:, 0], distance, change[:, 4:7]))
-        return mass, com, inertia
+        return Truth(self.walk.bsp, {}).parameter_errors(source)
+
+
+def truth_of(made: SyntheticTrial, fit: Fit) -> Truth:
+    """What is known of the walk behind a fit of one trial."""
+    (trial,) = fit.trials
+    at = np.searchsorted(made.time, trial.time - 1e-9)
+    loads = inverse_dynamics(made.skeleton, made.bsp, made.motion.cut(at), made.foot_loads[at])
+    columns = [made.skeleton.coordinates.index(name) for name in fit.skeleton.coordinates]
+    return Truth(made.bsp, {trial.name: loads[:, columns]})
 
 
 def run_demo(
@@ -123,7 +113,7 @@ def run_demo(
         for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
             settings = with_settings(wanted, method=method).settings
             fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-            save_fit(fits[-1], results, provenance)
+            save_fit(fits[-1], results, provenance, truth_of(trial, fits[-1]))
         demo = Demo(fits[0], fits[1], trial, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

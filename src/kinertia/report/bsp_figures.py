@@ -9,6 +9,7 @@ import numpy as np
 
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, base_layout, plain, small_multiples
@@ -60,11 +61,11 @@ def estimated_rows(fit: Fit) -> np.ndarray:
     return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
 
 
-def change_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure:
+def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentParameters | None = None) -> Figure:
     """Change of these parameters by the estimate, in kg, mm and kg m2: a panel per parameter, a row per segment.
 
     With 95 % intervals of prior and estimate, where there are any (not after two-level). Segments that are held are
-    left out.
+    left out. `truth`: of a synthetic person, as diamonds.
     """
     posterior, start = fit.posterior, start_of(fit)
     shown, rows = _rows(fit)
@@ -72,7 +73,13 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure:
     for k in columns:
         unit, factor = read_in(k)
         scale = np.full(len(shown), 1 / factor)
-        panels.append(Panel(f"{NAMES[k]} ({unit})", _traces(fit, shown, k, scale), (), rows))
+        traces = _traces(fit, shown, k, scale)
+        if truth is not None:
+            away = (truth.table() - fit.literature.table())[shown, k]
+            texts = [f"{plain(segment_name(fit.estimate.segments[i]))}: truth" for i in shown]
+            look = {"symbol": "diamond-open", "size": 10, "color": style.BLACK, "line": {"width": 1.5}}
+            traces.append(_dots(away / scale, np.arange(len(shown)), texts) | {"marker": look, "name": "truth"})
+        panels.append(Panel(f"{NAMES[k]} ({unit})", traces, (), rows))
     bars = "without error bars" if posterior is None else "with 95 % intervals before and after"
     alt = f"Change against {start.of} by the estimate, {bars}: {', '.join(NAMES[k] for k in columns)}."
     return small_multiples(panels, alt, {"nticks": 5}, row_px=230, left_px=112, linked=False)

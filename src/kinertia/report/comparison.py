@@ -7,7 +7,7 @@ the first result is what the others are compared with.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -110,6 +110,21 @@ def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
         "first_value": [one.first for *_, one in rows],
         "other_value": [one.other for *_, one in rows],
         **{key: [getattr(one, key) for *_, one in rows] for key in ("change", "sd", "changed")},
+    }
+
+
+def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
+    """What `kinertia compare --json` prints: remarks, and every parameter against the first result; SI units."""
+    (first_name, first), *others = fits.items()
+    return {
+        "first": first_name,
+        "remarks": remarks(fits),
+        "against_first": {
+            name: [
+                {**asdict(one), "change": one.change, "changed": bool(one.changed)} for one in differences(first, other)
+            ]
+            for name, other in others
+        },
     }
 
 

@@ -31,6 +31,7 @@ from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.report.truth import Truth
 from kinertia.report.wording import asymmetry_sentences
 from kinertia.trial.rms import rms, rms_length
 
@@ -39,11 +40,11 @@ _PARTS = (slice(0, 3), slice(3, 6))
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
 
-def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None) -> Path:
+def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None, truth: Truth | None = None) -> Path:
     """Write all result files of a fit into a folder, which is made if need be; returns the folder.
 
     With one trial its files stand in the folder itself, with several in a sub-folder per trial. The report names
-    command and files where `provenance` tells them.
+    command and files where `provenance` tells them, and shows the truth of a synthetic person.
 
     Raises:
         FileError: the folder cannot be written to.
@@ -51,7 +52,7 @@ def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None)
     with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         write_fit(fit, provenance, work / FIT_FILE)
-        (work / "report.html").write_text(render(fit, provenance), encoding="utf-8")
+        (work / "report.html").write_text(render(fit, provenance, truth=truth), encoding="utf-8")
         write_columns(work / "bsp.csv", fit.bsp_columns())
         _write_cycles(fit, work)
         _write_model(fit, work)

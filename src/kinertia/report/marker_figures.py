@@ -8,7 +8,7 @@ from kinertia.estimation.result import TrialFit
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import base_layout, plain
-from kinertia.trial.data import runs
+from kinertia.trial.data import Markers, runs
 
 _ROW_PX = 17
 _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}
@@ -62,33 +62,43 @@ def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
         return result
 
 
-def gap_figure(trial: TrialFit) -> Figure | None:
-    """When each marker of the model was not seen, over the whole trial; None where all always were."""
-    kinematics = trial.kinematics
-    time = kinematics.trial.markers.time
-    hidden = np.asarray(np.isnan(kinematics.trial.markers.select(kinematics.ik.labels).positions).any(axis=2))
+def gap_figure(markers: Markers, window_s: tuple[float, float] | None, name: str) -> Figure | None:
+    """When each marker was not seen, over the whole trial; None where all always were.
+
+    Args:
+        markers: of the model or the marker set.
+        window_s: the frames that a fit uses, on blue ground; None where there are none.
+        name: of the trial.
+    """
+    time, hidden = markers.time, ~markers.seen
     gappy = [k for k in range(hidden.shape[1]) if hidden[:, k].any()]
-    if not gappy:
+    if not gappy or len(time) < 2:
         return None
-    names = [plain(kinematics.ik.labels[k]) for k in gappy]
+    names = [plain(markers.labels[k]) for k in gappy]
     x: list[float | None] = []
     y: list[str | None] = []
     half = 0.5 * float(time[1] - time[0])
-    for name, k in zip(names, gappy, strict=True):
+    for label, k in zip(names, gappy, strict=True):
         for first, last in runs(hidden[:, k]):
             x += [round(float(time[first]) - half, 4), round(float(time[last]) + half, 4), None]
-            y += [name, name, None]
+            y += [label, label, None]
     line = {"type": "scatter", "mode": "lines", "x": x, "y": y, "line": {"width": 9, "color": style.VERMILION}}
-    alt = f"Times at which markers of {trial.name} were not seen: gaps in {len(gappy)} of {hidden.shape[1]} markers."
+    alt = f"Times at which markers of {name} were not seen: gaps in {len(gappy)} of {hidden.shape[1]} markers."
     layout = base_layout(alt)
-    start, end = kinematics.window_s
-    window = {"type": "rect", "xref": "x", "yref": "y domain", "x0": start, "x1": end, "y0": 0, "y1": 1}
+    over = {"type": "rect", "xref": "x", "yref": "y domain", "y0": 0, "y1": 1, "line": {"width": 0}, "layer": "below"}
+    blue = [] if window_s is None else [{**over, "x0": window_s[0], "x1": window_s[1]}]
     layout |= {
         "height": 80 + _ROW_PX * len(names),
         "margin": {"t": 12, "b": 44, "l": 12, "r": 14},
         "xaxis": {"title": {"text": "time (s)"}, "range": [float(time[0]), float(time[-1])], "gridcolor": "#EFEFEF"},
         "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
-        "shapes": [{**window, "fillcolor": style.SKY, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}],
+        "shapes": [{**one, "fillcolor": style.SKY, "opacity": 0.18} for one in blue],
         "showlegend": False,
     }
     return Figure([{**line, "hovertemplate": "%{y}, %{x:.3f} s<extra></extra>"}], layout)
+
+
+def fit_gap_figure(trial: TrialFit) -> Figure | None:
+    """The same of the model's markers in a trial that was fitted."""
+    kinematics = trial.kinematics
+    return gap_figure(kinematics.trial.markers.select(kinematics.ik.labels), kinematics.window_s, trial.name)

@@ -5,13 +5,11 @@ plotly.js is in the page once; its policy (Content-Security-Policy) forbids ever
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
@@ -35,9 +33,10 @@ from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
-from kinertia.report.marker_figures import gap_figure, marker_figure, rms_by_marker
+from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
-from kinertia.report.skeleton_view import packed, scene
+from kinertia.report.scene import view
+from kinertia.report.skeleton_view import scene
 from kinertia.report.time_figures import (
     MOST_EVENTS,
     MOST_FRAMES,
@@ -46,14 +45,15 @@ from kinertia.report.time_figures import (
     moment_figure,
     residual_figure,
 )
+from kinertia.report.truth import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, fixed, read_in, start_of
 from kinertia.trial.data import runs
 from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
-_VIEW_FRAMES = 400
-"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 4.5 MB."""
+VIEW_FRAMES = 300
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
 
 
 def render(
@@ -61,6 +61,7 @@ def render(
     provenance: Provenance | None = None,
     computed_by: Mapping[str, str] | None = None,
     norms: Norms = MappingProxyType({}),
+    truth: Truth | None = None,
 ) -> str:
     """The report of a fit.
 
@@ -69,7 +70,9 @@ def render(
         provenance: files and command; a fit made in Python has none.
         computed_by: the versions that the fit is from, where they are not the present ones.
         norms: of the curves over the gait cycle, as bands behind them.
+        truth: of a synthetic person.
     """
+    true_bsp = None if truth is None else truth.bsp
     shown = fit.trials[:MOST_TRIALS]
     return rendered(
         "report.html.j2",
@@ -85,18 +88,23 @@ def render(
         body={
             "mass": _written(body_figure(fit)),
             "information": _written(body_figure(fit, "information")),
-            "changes": written(change_figure(fit, MASS_AND_COM)),
+            "changes": written(change_figure(fit, MASS_AND_COM, true_bsp)),
         },
         bsp={
             **{
-                name: {"change": written(change_figure(fit, some)), "departure": _written(departure_figure(fit, some))}
+                name: {
+                    "change": written(change_figure(fit, some, true_bsp)),
+                    "departure": _written(departure_figure(fit, some)),
+                }
                 for name, some in (("main", MAIN), ("products", PRODUCTS))
             },
             "rows": bsp_rows(fit),
         },
         information=_written(information_figure(fit)),
         residuals=residual_rows(fit.trials),
-        trials=[_trial(fit, trial, k, len(shown)) for k, trial in enumerate(shown)],
+        truth=None if truth is None else truth_rows(fit, truth),
+        trials=[_trial(fit, trial, k, len(shown), truth) for k, trial in enumerate(shown)],
+        scenes=view([(trial.name, scene(fit, trial, VIEW_FRAMES // len(shown))) for trial in shown]),
         settings=fit.settings.model_dump(),
         subject=fit.subject.model_dump(),
         provenance=provenance,
@@ -127,7 +135,7 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
     }
 
 
-def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
+def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -> dict[str, Any]:
     """Everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
     noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
@@ -140,7 +148,16 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
         "all_frames": len(trial.kinematics.trial.markers.time),
         "residuals": written(residual_figure(trial, frames, start_of(fit))),
         "coordinates": written(coordinate_figure(trial, fit.skeleton, frames)),
-        "moments": written(moment_figure(trial, fit.skeleton, fit.mass_kg, frames, start_of(fit))),
+        "moments": written(
+            moment_figure(
+                trial,
+                fit.skeleton,
+                fit.mass_kg,
+                frames,
+                start_of(fit),
+                None if truth is None else truth.joint_loads[trial.name],
+            )
+        ),
         "bands": trial.joint_load_sd is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
@@ -148,8 +165,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int) -> dict[str, Any]:
             trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
         ),
         "noise": noise,
-        "gaps": _written(gap_figure(trial)),
-        "scene": Markup(json.dumps(packed(scene(fit, trial, _VIEW_FRAMES // count)))),
+        "gaps": _written(fit_gap_figure(trial)),
     }
 
 

@@ -125,12 +125,17 @@ def base_layout(alt: str) -> dict[str, Any]:
 
 
 def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:
-    """Domains of all axes, top margin and height of the figure, for this many columns and entries of the legend."""
+    """Domains of all axes, top margin and height of the figure, for this many columns and entries of the legend.
+
+    Fewer panels than columns fill the width.
+    """
+    legend_rows = math.ceil(legend / _LEGEND_PER_ROW[columns])
+    columns = min(columns, count)
     rows = math.ceil(count / columns)
     inner_px = rows * row_px + (rows - 1) * (_TITLE_PX + _TICKS_PX)
     gap = (left_px + 6) / (_NOMINAL_WIDTH_PX - left_px - _RIGHT_PX)
     width = (1 - (columns - 1) * gap) / columns
-    top_px = _TITLE_PX + _LEGEND_ROW_PX * math.ceil(legend / _LEGEND_PER_ROW[columns])
+    top_px = _TITLE_PX + _LEGEND_ROW_PX * legend_rows
     layout: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": left_px}
     for k in range(count):
         row, column = divmod(k, columns)

@@ -14,7 +14,7 @@ from kinertia.report.bsp_figures import change_figure, departure_figure, informa
 from kinertia.report.cycle_figures import cycle_figure
 from kinertia.report.extras import expect_plotly
 from kinertia.report.figure import Figure
-from kinertia.report.marker_figures import gap_figure, marker_figure
+from kinertia.report.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.skeleton_view import skeleton_figure
 from kinertia.report.time_figures import coordinate_figure, moment_figure, residual_figure
 from kinertia.report.wording import start_of
@@ -77,7 +77,7 @@ class FitPlots:
 
     def gaps(self, trial: str | None = None) -> go.Figure | None:
         """When markers were not seen; None where all always were."""
-        return _plotly_if_any(gap_figure(self._trial(trial)))
+        return _plotly_if_any(fit_gap_figure(self._trial(trial)))
 
     def skeleton(self, trial: str | None = None) -> go.Figure:
         """The skeleton in motion, with markers, centres of mass and ground reactions."""

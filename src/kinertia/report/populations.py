@@ -1,4 +1,4 @@
-"""The study of populations on paper and screen: `populations.json`, `populations.md`, and rows for the terminal."""
+"""The study of populations on paper and screen: a page, `populations.json`, `populations.md`, rows for the terminal."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
+from kinertia.report.result_page import Part, render_parts
+from kinertia.report.row_figures import dot_figure
 from kinertia.studies.populations import RUCKSACK_KG, PopulationAccuracy, RucksackAccuracy
 
 HEADINGS = ("population", "prior", "mass (kg)", "CoM (mm)", "inertia (kg m2)", "moments (N m)", "coverage", "unlike")
@@ -54,16 +57,47 @@ def populations_markdown(accuracies: Sequence[PopulationAccuracy], rucksack: Ruc
     return f"{table}\n\n{accuracies[0].people} people each. {CAPTION}\n\n{rucksack_sentence(rucksack)}\n"
 
 
-def save_populations(
-    accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy, seed: int, folder: str | Path
-) -> None:
-    """Write `populations.json` and `populations.md` into a folder."""
-    content = {
+def render_populations(accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy) -> str:
+    """The page."""
+    figure = dot_figure(
+        [f"{one.title}, {one.prior}" for one in accuracies],
+        {
+            "mass (kg)": {
+                "before": [one.rms_before["mass"] for one in accuracies],
+                "estimate": [one.rms["mass"] for one in accuracies],
+            },
+            "joint moments (N m)": {
+                "before": [one.moments_before_nm for one in accuracies],
+                "estimate": [one.moments_nm for one in accuracies],
+            },
+        },
+        "RMS errors of masses and joint moments in every population, before and after the estimate.",
+    )
+    parts = [
+        Part("Errors against the truth", (CAPTION,), figure, headings=HEADINGS, rows=population_rows(accuracies)),
+        Part("A rucksack", (rucksack_sentence(rucksack),)),
+    ]
+    return render_parts("What does a wrong prior cost?", f"{accuracies[0].people} people of each population.", parts)
+
+
+def populations_summary(
+    accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy, seed: int
+) -> dict[str, Any]:
+    """What `populations.json` says."""
+    return {
         "kinertia": VERSION,
         "seed": seed,
         "populations": [asdict(one) for one in accuracies],
         "rucksack": asdict(rucksack),
     }
+
+
+def save_populations(
+    accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy, seed: int, folder: str | Path
+) -> None:
+    """Write `populations.html`, `populations.json` and `populations.md` into a folder."""
     with complete_folder(folder, "study populations") as work:
-        (work / "populations.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        text = json.dumps(populations_summary(accuracies, rucksack, seed), indent=2)
+        (work / "populations.json").write_text(text + "\n", encoding="utf-8")
         (work / "populations.md").write_text(populations_markdown(accuracies, rucksack), encoding="utf-8")
+        (work / "populations.html").write_text(render_populations(accuracies, rucksack), encoding="utf-8")

@@ -1,10 +1,10 @@
-"""The sensitivity study on paper: `sensitivity.md` with a picture, `sensitivity.json`, `sensitivity.csv`."""
+"""The sensitivity study on paper: a page, `sensitivity.md` with a picture, `sensitivity.json`, `sensitivity.csv`."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ import pandas as pd
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.report.extras import has_matplotlib
+from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.studies.sensitivity import (
     AMPLITUDES,
     CONDITIONS,
@@ -87,6 +88,51 @@ _PICTURE = """
 
 def sensitivity_markdown(sensitivity: Sensitivity) -> str:
     """The answer on a page."""
+    heads, rows = ["parameter", *_COLUMNS], sensitivity_rows(sensitivity)
+    return _PAGE.format(
+        picture=_PICTURE if has_matplotlib() else "",
+        table="\n".join(f"| {' | '.join(cells)} |" for cells in (heads, ["---", *["--:"] * len(_COLUMNS)], *rows)),
+        **_answers(sensitivity),
+    )
+
+
+def sensitivity_rows(sensitivity: Sensitivity) -> list[list[str]]:
+    """One row per parameter: RMS error over the literature's by kind and amplitude of the noise."""
+    return [
+        [name, *(f"{sensitivity.errors[key][i]:.2f}" for key in _COLUMNS)]
+        for i, name in enumerate(sensitivity.parameters)
+    ]
+
+
+def render_sensitivity(sensitivity: Sensitivity) -> str:
+    """The page."""
+    answers = _answers(sensitivity)
+    answer = [
+        f"Not highly sensitive (small error up to twice the noise), with the study's noise: {answers['study']}.",
+        f"Not highly sensitive, with skin motion linear in the joint angles: {answers['artefact']}.",
+        f"Sensitive (small error at a quarter of either noise, not at twice): {answers['sensitive']}.",
+        f"Shown by no condition: {answers['never']} of {answers['count']} parameters ({answers['never_classes']}). For "
+        "these the literature's value stands; their error bars say so.",
+        f"Recording more, mean over all parameters, skin motion: {answers['strides']}.",
+    ]
+    shares = "RMS errors as a share of the literature's on the same people: 1 is no better than the literature."
+    parts = [
+        Part(
+            "The answer",
+            (shares,),
+            listed=answer,
+            picture=drawing(sensitivity_figure(sensitivity)) if has_matplotlib() else "",
+            caption="Parameters down, conditions across.",
+            alt="Map of the errors of every parameter in every condition; the numbers are in sensitivity.csv.",
+        ),
+        Part("Parameters", headings=("parameter", *_COLUMNS), rows=sensitivity_rows(sensitivity)),
+    ]
+    lead = f"{sensitivity.draws} people in each condition, seed {sensitivity.seed}."
+    return render_parts("Which body segment parameters survive noisy kinematics?", lead, parts)
+
+
+def _answers(sensitivity: Sensitivity) -> dict[str, Any]:
+    """What the page says in words."""
     quarter, twice = (
         np.max([sensitivity.errors[f"{kind} x {amplitude:g}"] for kind in KINDS], axis=0)
         for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
@@ -98,23 +144,17 @@ def sensitivity_markdown(sensitivity: Sensitivity) -> str:
         for what, members in (("masses", SHOWN[:1]), ("CoM coordinates", SHOWN[1:4]), ("moments of inertia", SHOWN[4:]))
     }
     strides = [f"strides {count}: {sensitivity.errors[_of_strides(count)].mean():.2f}" for count in STRIDES]
-    heads = ["parameter", *_COLUMNS]
-    rows = [heads, ["---", *["--:"] * len(_COLUMNS)]]
-    for i, name in enumerate(sensitivity.parameters):
-        rows.append([name, *(f"{sensitivity.errors[key][i]:.2f}" for key in _COLUMNS)])
-    return _PAGE.format(
-        picture=_PICTURE if has_matplotlib() else "",
-        draws=sensitivity.draws,
-        percent=100.0 / np.sqrt(2.0 * sensitivity.draws),
-        count=len(sensitivity.parameters),
-        study=", ".join(sensitivity.insensitive("study")) or "none",
-        artefact=", ".join(sensitivity.insensitive("artefact")) or "none",
-        sensitive=", ".join(sensitive) or "none",
-        never=len(never),
-        never_classes=", ".join(f"{what}: {count}" for what, count in by_class.items() if count),
-        strides="; ".join([*strides, f"{WITH_SQUATS}: {sensitivity.errors[WITH_SQUATS].mean():.2f}"]),
-        table="\n".join(f"| {' | '.join(cells)} |" for cells in rows),
-    )
+    return {
+        "draws": sensitivity.draws,
+        "percent": 100.0 / np.sqrt(2.0 * sensitivity.draws),
+        "count": len(sensitivity.parameters),
+        "study": ", ".join(sensitivity.insensitive("study")) or "none",
+        "artefact": ", ".join(sensitivity.insensitive("artefact")) or "none",
+        "sensitive": ", ".join(sensitive) or "none",
+        "never": len(never),
+        "never_classes": ", ".join(f"{what}: {count}" for what, count in by_class.items() if count),
+        "strides": "; ".join([*strides, f"{WITH_SQUATS}: {sensitivity.errors[WITH_SQUATS].mean():.2f}"]),
+    }
 
 
 def _of_strides(count: int) -> str:
@@ -123,7 +163,20 @@ def _of_strides(count: int) -> str:
 
 def save_sensitivity(sensitivity: Sensitivity, folder: str | Path) -> Path:
     """Write the files into a folder; returns the folder."""
-    content = {
+    with complete_folder(folder, "sensitivity") as work:
+        text = json.dumps(sensitivity_summary(sensitivity), indent=1)
+        (work / "sensitivity.json").write_text(text + "\n", encoding="utf-8")
+        (work / "sensitivity.md").write_text(sensitivity_markdown(sensitivity), encoding="utf-8")
+        (work / "sensitivity.html").write_text(render_sensitivity(sensitivity), encoding="utf-8")
+        sensitivity_frame(sensitivity).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")
+        if has_matplotlib():
+            sensitivity_figure(sensitivity).savefig(work / "sensitivity.png", dpi=110)
+    return Path(folder)
+
+
+def sensitivity_summary(sensitivity: Sensitivity) -> dict[str, Any]:
+    """What `sensitivity.json` says."""
+    return {
         "kinertia": VERSION,
         "seed": sensitivity.seed,
         "draws": sensitivity.draws,
@@ -134,10 +187,3 @@ def save_sensitivity(sensitivity: Sensitivity, folder: str | Path) -> Path:
             for key, values in sensitivity.errors.items()
         },
     }
-    with complete_folder(folder, "sensitivity") as work:
-        (work / "sensitivity.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-        (work / "sensitivity.md").write_text(sensitivity_markdown(sensitivity), encoding="utf-8")
-        sensitivity_frame(sensitivity).to_csv(work / "sensitivity.csv", index=False, lineterminator="\n")
-        if has_matplotlib():
-            sensitivity_figure(sensitivity).savefig(work / "sensitivity.png", dpi=110)
-    return Path(folder)

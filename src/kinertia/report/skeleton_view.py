@@ -1,12 +1,7 @@
-"""The skeleton walking: what stands where in every frame, for the report's own canvas and as a plotly figure.
-
-`templates/skeleton_view.js` plays it: one small drawing of lines and dots needs no 3-D library and stays smooth.
-"""
+"""The skeleton walking, for the report's own 3-D view and as a plotly figure."""
 
 from __future__ import annotations
 
-import base64
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +14,7 @@ from kinertia.report import style
 from kinertia.report.bsp_figures import segment_name
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import base_layout, plain
+from kinertia.report.scene import Scene, plate_corners
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
 
@@ -27,35 +23,6 @@ _PLOTLY_FRAMES = 60
 _ARROW_M_PER_N = 0.001
 _BALL_M_PER_KG = 0.03
 """Radius of the ball that stands for one kilogram; it grows with the cube root of the mass."""
-_HIDDEN_MM = -32768
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Points in ground axes (m) over n frames.
-
-    Attributes:
-        time: (n,) s.
-        bones: (b, 2) indices into `points` of the ends of every line.
-        points: (n, p, 3) joint centres and segment ends.
-        measured, modelled: (n, m, 3) markers; NaN where not seen.
-        com: (n, s, 3) centres of mass, of segments with mass.
-        sides: (b,) "r", "l" or "" for every line.
-        com_radius_m: (s,) by mass.
-        com_names: (s,) segment and mass, in words.
-        arrows: (n, f, 2, 3) centre of pressure and tip of the ground reaction under each foot; NaN without load.
-    """
-
-    time: np.ndarray
-    bones: np.ndarray
-    sides: tuple[str, ...]
-    points: np.ndarray
-    measured: np.ndarray
-    modelled: np.ndarray
-    com: np.ndarray
-    com_radius_m: np.ndarray
-    com_names: tuple[str, ...]
-    arrows: np.ndarray
 
 
 def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
@@ -66,18 +33,23 @@ def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
     pose = skeleton.pose(trial.motion.q[chosen])
     bones, sides, points = _bones(skeleton, pose.rotation, pose.translation)
     frames = trial.kinematics.frames[chosen]
-    com, radius, names = _centres(skeleton, fit.estimate, pose.rotation, pose.translation)
+    measured = trial.kinematics.trial.markers.select(skeleton.labels).positions[frames]
+    bodies = [skeleton.segments.index(name) for name in fit.estimate.segments]
+    rotation, translation = pose.rotation[:, bodies], pose.translation[:, bodies]
     return Scene(
         time=trial.time[chosen],
+        centre=points[:, 0],
         bones=bones,
         sides=sides,
         points=points,
-        measured=trial.kinematics.trial.markers.select(skeleton.labels).positions[frames],
+        measured=measured,
         modelled=skeleton.marker_positions(pose),
-        com=com,
-        com_radius_m=radius,
-        com_names=names,
+        com=_centres(fit.estimate, rotation, translation),
+        com_before=_centres(fit.literature, rotation, translation),
+        com_sides=tuple(_side(name) for name in fit.estimate.segments),
+        ellipsoids=semi_axes(fit.estimate) @ rotation.swapaxes(-1, -2),
         arrows=_arrows(trial.kinematics)[chosen],
+        plates=plate_corners(trial.kinematics.trial.loads.corners),
     )
 
 
@@ -102,8 +74,7 @@ def _bones(
         points.append((rotation[:, i] @ end + translation[:, i])[:, None])
         bones.append((i, len(index) + len(points) - 2))
         named.append(segment)
-    sides = tuple(name[-1] if name.endswith(("_r", "_l")) else "" for name in named)
-    return np.array(bones), sides, np.concatenate(points, axis=1)
+    return np.array(bones), tuple(map(_side, named)), np.concatenate(points, axis=1)
 
 
 def last_marker(skeleton: Skeleton, i: int) -> np.ndarray | None:
@@ -116,13 +87,29 @@ def last_marker(skeleton: Skeleton, i: int) -> np.ndarray | None:
     return end
 
 
-def _centres(
-    skeleton: Skeleton, bsp: BodySegmentParameters, rotation: np.ndarray, translation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    rows = [skeleton.segments.index(name) for name in bsp.segments]
-    at = (rotation[:, rows] @ bsp.com_m[:, :, None])[..., 0] + translation[:, rows]
-    names = tuple(f"{segment_name(n)}: {m:.2f} kg" for n, m in zip(bsp.segments, bsp.mass_kg, strict=True))
-    return at, _BALL_M_PER_KG * np.cbrt(np.maximum(bsp.mass_kg, 0.0)), names
+def _side(segment: str) -> str:
+    return segment[-1] if segment.endswith(("_r", "_l")) else ""
+
+
+def _centres(bsp: BodySegmentParameters, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
+    """(n, s, 3) m, centres of mass of segments posed by rotation (n, s, 3, 3) and translation (n, s, 3)."""
+    result: np.ndarray = (rotation @ bsp.com_m[:, :, None])[..., 0] + translation
+    return result
+
+
+def semi_axes(bsp: BodySegmentParameters) -> np.ndarray:
+    """(s, 3, 3) m, semi-axes (rows, in segment axes) of the uniform ellipsoids with each segment's mass and inertia.
+
+    With principal moments I the square of a semi-axis is 5/(2 m) (I_j + I_k - I_i). NaN for a segment without mass, and
+    for one whose inertia no body can have.
+    """
+    moments, axes = np.linalg.eigh(bsp.inertia_kgm2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        squares = 2.5 / bsp.mass_kg[:, None] * (moments.sum(axis=1, keepdims=True) - 2 * moments)
+        possible = (bsp.mass_kg > 0) & (squares > 0).all(axis=1)
+        lengths = np.where(possible[:, None], np.sqrt(squares), np.nan)
+    result: np.ndarray = lengths[:, :, None] * axes.swapaxes(1, 2)
+    return result
 
 
 def _arrows(kinematics: Kinematics) -> np.ndarray:
@@ -131,26 +118,6 @@ def _arrows(kinematics: Kinematics) -> np.ndarray:
     loaded = force[..., 1:2] > LOAD_THRESHOLD_N
     at = np.where(loaded, centre_of_pressure(kinematics.foot_loads), np.nan)
     return np.stack([at, at + _ARROW_M_PER_N * force], axis=2)
-
-
-def packed(shown: Scene) -> dict[str, Any]:
-    """The scene as the page carries it: whole millimetres from a place near the person, 16 bits each, base64."""
-    place = np.round(np.nanmean(shown.points, axis=(0, 1)) * [1, 0, 1], 3)
-    parts = {"points": shown.points, "measured": shown.measured, "modelled": shown.modelled, "com": shown.com}
-    parts["arrows"] = shown.arrows.reshape(len(shown.time), -1, 3)
-    return {
-        "time": [round(float(t), 4) for t in shown.time],
-        "bones": shown.bones.tolist(),
-        "colours": [style.SIDES[side][1] for side in shown.sides],
-        "radius_mm": [round(1e3 * float(r), 1) for r in shown.com_radius_m],
-        "count": {name: values.shape[1] for name, values in parts.items()},
-        "data": {name: _millimetres(values - place) for name, values in parts.items()},
-    }
-
-
-def _millimetres(positions: np.ndarray) -> str:
-    whole = np.where(np.isfinite(positions), np.clip(np.round(1e3 * positions), -32767, 32767), _HIDDEN_MM)
-    return base64.b64encode(whole.astype("<i2").tobytes()).decode("ascii")
 
 
 def skeleton_figure(fit: Fit, trial: TrialFit) -> Figure:
@@ -177,22 +144,24 @@ def skeleton_figure(fit: Fit, trial: TrialFit) -> Figure:
         "sliders": [{"steps": steps, "currentvalue": {"prefix": "time (s): "}, "pad": {"b": 40}}],
         "updatemenus": [{"type": "buttons", "buttons": [play, pause], "direction": "left", "y": 0, "yanchor": "top"}],
     }
-    frames = [{"name": str(k), "data": _traces(shown, k)} for k in range(len(shown.time))]
-    return Figure(_traces(shown, 0), layout, frames)
+    frames = [{"name": str(k), "data": _traces(shown, fit.estimate, k)} for k in range(len(shown.time))]
+    return Figure(_traces(shown, fit.estimate, 0), layout, frames)
 
 
 def _at_once(duration_ms: float) -> dict[str, Any]:
     return {"mode": "immediate", "frame": {"duration": duration_ms, "redraw": True}, "transition": {"duration": 0}}
 
 
-def _traces(shown: Scene, k: int) -> list[dict[str, Any]]:
+def _traces(shown: Scene, bsp: BodySegmentParameters, k: int) -> list[dict[str, Any]]:
     """Plotly's z is our up, its y our right."""
     lines = np.full((len(shown.bones), 3, 3), np.nan)
     lines[:, :2] = shown.points[k][shown.bones]
     sides = np.array(shown.sides)
     arrows = np.full((shown.arrows.shape[1], 3, 3), np.nan)
     arrows[:, :2] = shown.arrows[k]
-    balls = {"size": (300 * shown.com_radius_m).tolist(), "color": style.ORANGE, "opacity": 0.75, "line": {"width": 0}}
+    radius = 300 * _BALL_M_PER_KG * np.cbrt(np.maximum(bsp.mass_kg, 0.0))
+    names = [f"{segment_name(name)}: {mass:.2f} kg" for name, mass in zip(bsp.segments, bsp.mass_kg, strict=True)]
+    balls = {"size": radius.tolist(), "color": style.ORANGE, "opacity": 0.75, "line": {"width": 0}}
     return [
         *(
             _trace(lines[sides == side], word or "trunk", mode="lines", line={"color": colour, "width": 5})
@@ -206,7 +175,7 @@ def _traces(shown: Scene, k: int) -> list[dict[str, Any]]:
             "centres of mass",
             mode="markers",
             marker=balls,
-            text=[plain(name) for name in shown.com_names],
+            text=[plain(name) for name in names],
         ),
     ]
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.report.extras import has_matplotlib
-from kinertia.report.rendering import rendered
+from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
 from kinertia.trial.rms import rms
 
@@ -102,28 +100,34 @@ def table1_figure(table: Table1) -> Figure:
     return figure
 
 
+def render_table1(table: Table1) -> str:
+    """The page."""
+    note = "RMS / max. First row: mean over the draws; then their standard deviation; then the published value."
+    picture = drawing(table1_figure(table)) if has_matplotlib() else ""
+    alt = (
+        "Root mean square error of mass, centre of mass and moments of inertia per segment, at the start and under "
+        "each condition; the numbers are in table1.json."
+    )
+    start = "Start: every parameter off by up to 50 %. The scale is logarithmic."
+    parts = [
+        Part("Errors against the truth", (note,), headings=("error", *CONDITIONS.values()), rows=table1_rows(table))
+    ]
+    parts += [Part("Error per segment", picture=picture, caption=start, alt=alt)] if picture else []
+    draws = f"{len(table.draws)} draw{'s' if len(table.draws) > 1 else ''}"
+    return render_parts("Table 1 repeated", f"{draws} of start and noise, seed {table.seed}, {table.trial}.", parts)
+
+
+def table1_summary(table: Table1) -> dict[str, Any]:
+    """What `table1.json` says."""
+    return {"kinertia": VERSION, **table1_json(table)}
+
+
 def save_table1(table: Table1, folder: str | Path) -> Path:
     """Write `table1.json`, `table1.csv`, `report.html` and, with matplotlib, `table1.png` into a folder; returns it."""
-    figure, svg = table1_figure(table) if has_matplotlib() else None, io.StringIO()
-    if figure is not None:
-        figure.savefig(svg, format="svg", metadata={"Date": None})
-    picture = svg.getvalue()
-    page = rendered(
-        "table1.html.j2",
-        title="Table 1 repeated",
-        draws=len(table.draws),
-        seed=table.seed,
-        trial=table.trial,
-        headings=list(CONDITIONS.values()),
-        rows=table1_rows(table),
-        picture=Markup(picture[max(picture.find("<svg"), 0) :]),
-    )
     with complete_folder(folder, "table1") as work:
-        (work / "table1.json").write_text(
-            json.dumps({"kinertia": VERSION, **table1_json(table)}, indent=1) + "\n", encoding="utf-8"
-        )
+        (work / "table1.json").write_text(json.dumps(table1_summary(table), indent=1) + "\n", encoding="utf-8")
         table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")
-        (work / "report.html").write_text(page, encoding="utf-8")
-        if figure is not None:
-            figure.savefig(work / "table1.png", dpi=150)
+        (work / "report.html").write_text(render_table1(table), encoding="utf-8")
+        if has_matplotlib():
+            table1_figure(table).savefig(work / "table1.png", dpi=150)
     return Path(folder)

@@ -12,6 +12,7 @@ import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.report.extras import has_matplotlib
+from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.report.table1 import QUANTITIES, short
 from kinertia.studies.table1 import PUBLISHED, Errors, Table1
 from kinertia.studies.table1_variants import CLASSES, LONG, LONG_GROUND, NOISY, distance, helped, stopped_by
@@ -107,12 +108,33 @@ def _along(paths: Sequence[np.ndarray], columns: slice) -> np.ndarray:
     return mean
 
 
+def render_variants(tables: Mapping[str, Table1]) -> str:
+    """The page."""
+    caption = (
+        "RMS error of inertia, mass and CoM along the iterations. Dashed: without correction; solid: with. Marks: the "
+        "cost changes by less than 1e-2 (triangle), 1e-4 (square), 1e-6 (circle) from one iteration to the next."
+    )
+    parts = [
+        Part(
+            "Errors against the truth",
+            ("RMS error without / with correction, both with noise: mean over the draws. First the published values.",),
+            picture=drawing(variants_figure(tables)) if has_matplotlib() else "",
+            caption=caption,
+            alt="Errors along the iterations with moments about the pelvis and about the ground, and as published.",
+            headings=HEADINGS,
+            rows=variants_rows(tables),
+        )
+    ]
+    return render_parts("Table 1, one thing changed at a time", "Every draw is in variants.csv.", parts)
+
+
 def save_variants(tables: Mapping[str, Table1], folder: str | Path) -> Path:
-    """Write `variants.csv`, `variants.md` and, with matplotlib, `variants.png` into a folder; returns it."""
+    """Write `variants.html`, `variants.csv`, `variants.md` and, with matplotlib, `variants.png` into a folder."""
     table = [list(HEADINGS), ["---"] * len(HEADINGS), *variants_rows(tables)]
     with complete_folder(folder, "variants") as work:
         variants_frame(tables).to_csv(work / "variants.csv", index=False, lineterminator="\n")
         (work / "variants.md").write_text("".join(f"| {' | '.join(row)} |\n" for row in table), encoding="utf-8")
+        (work / "variants.html").write_text(render_variants(tables), encoding="utf-8")
         if has_matplotlib():
             variants_figure(tables).savefig(work / "variants.png", dpi=150)
     return Path(folder)

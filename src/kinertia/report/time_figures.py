@@ -111,9 +111,17 @@ def motion_change(trial: TrialFit) -> np.ndarray:
 
 
 def moment_figure(
-    trial: TrialFit, skeleton: Skeleton, mass_kg: float, most_frames: int = MOST_FRAMES, start: Start = LITERATURE
+    trial: TrialFit,
+    skeleton: Skeleton,
+    mass_kg: float,
+    most_frames: int = MOST_FRAMES,
+    start: Start = LITERATURE,
+    truth: np.ndarray | None = None,
 ) -> Figure:
-    """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band."""
+    """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band.
+
+    `truth` (w, c) N m: of a synthetic person, dashed.
+    """
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
     sd = trial.joint_load_sd
     panels = []
@@ -124,6 +132,11 @@ def moment_figure(
         for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
             name = stage_name(stage, start)
             traces += _sides(one, name, trial.time, trial.joint_loads[stage] / mass_kg, thin, line)
+        if truth is not None:
+            dashed = {"color": style.BLACK, "dash": "dash", "width": 1.4}
+            traces += [
+                {**curve, "name": "truth"} for curve in _sides(one, "truth", trial.time, truth / mass_kg, thin, dashed)
+            ]
         unit = "N m/kg" if one.rotational else "N/kg"
         title = f"{one.title.split(',')[0].removesuffix(' +')} moment ({unit})"
         panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))

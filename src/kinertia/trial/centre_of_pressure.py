@@ -6,14 +6,19 @@ import numpy as np
 
 from kinertia.trial.data import LOAD_THRESHOLD_N
 
+FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
+"""Below this a centre of pressure is too noisy to be judged."""
 
-def centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
-    """(..., 3) m, where on the ground (y = 0) a wrench (..., 6) acts with no moment but a vertical one.
 
-    A wrench without vertical force has none: the origin stands for it.
+def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
+    """(..., 3) m, where at this height (0: the ground) a wrench (..., 6) acts with no moment but a vertical one.
+
+    A wrench without vertical force has none: the point above the origin stands for it.
     """
     upward = np.where(wrench[..., 1] == 0.0, np.inf, wrench[..., 1])
-    return np.stack([wrench[..., 5] / upward, np.zeros_like(upward), -wrench[..., 3] / upward], axis=-1)
+    x = (wrench[..., 5] + height_m * wrench[..., 0]) / upward
+    z = (height_m * wrench[..., 2] - wrench[..., 3]) / upward
+    return np.stack([x, np.full_like(x, height_m), z], axis=-1)
 
 
 def held_centre_of_pressure(wrench: np.ndarray) -> np.ndarray:

@@ -227,6 +227,7 @@ class FootLoads:
         noise_n: deviation of the vertical force of the noisiest plate while nobody stands on it, N.
         together: (k,) True where both feet stand on one plate, whose load goes to one of them; left out where they
             never do.
+        corners: (p, 4, 3) m of every plate, or None where the files do not tell.
 
     Examples:
         >>> loads = fit.trials[0].kinematics.trial.loads  # right foot, left foot
@@ -241,6 +242,7 @@ class FootLoads:
     on_plate: npt.NDArray[np.int_] | None = None
     noise_n: float = 0.0
     together: BoolArray | None = None
+    corners: FloatArray | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), 2, 3)
@@ -261,7 +263,8 @@ class FootLoads:
 
     def rotated(self, rotation: FloatArray) -> FootLoads:
         """The same loads in axes turned by `rotation` (3, 3): new = rotation @ old."""
-        return replace(self, force=self.force @ rotation.T, moment=self.moment @ rotation.T)
+        corners = None if self.corners is None else self.corners @ rotation.T
+        return replace(self, force=self.force @ rotation.T, moment=self.moment @ rotation.T, corners=corners)
 
 
 @dataclass(frozen=True, eq=False)

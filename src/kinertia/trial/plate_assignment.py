@@ -138,7 +138,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     noise_n = max(plates.noise_n or (0.0,))
     held = _held(plates.time, on_plate)
     both = together if together.any() else None
-    return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both), tuple(notes)
+    return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both, plates.corners), tuple(notes)
 
 
 def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:

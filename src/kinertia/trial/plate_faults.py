@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 
-_FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
 _LONGEST_ARM_M = 0.15
 """Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
 _STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
@@ -32,8 +31,8 @@ def loads_trouble(plates: PlateLoads) -> str:
     if trouble := _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
         return trouble
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
-    arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > _FIRM_LOAD_N]
-    arms /= plates.force[..., 1][plates.force[..., 1] > _FIRM_LOAD_N]
+    arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
+    arms /= plates.force[..., 1][plates.force[..., 1] > FIRM_LOAD_N]
     typical = float(np.median(arms)) if arms.size else 0.0
     if typical > _LONGEST_ARM_M:
         return (

@@ -1,0 +1,80 @@
+"""Take the pictures of the pages: reports with numbers on what the text explains, and figures for papers.
+
+    python docs/tools/pictures.py [DEMO]
+
+DEMO is a folder that `kinertia demo -o DEMO` has written; left out, the demo runs first. Needs Chromium.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from playwright.sync_api import Page, sync_playwright
+
+import kinertia
+
+FOLDER = Path(__file__).resolve().parents[1] / "figures"
+WALK = Path(kinertia.__file__).parent / "cli" / "measured_walk"
+PAGES = {
+    "report": ("report.html", "#verdict", [".headline", ".uses", "#body-mass", "#changes"], 1160),
+    "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 1130),
+    "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
+    "check": ("check.html", "#recording2", [".checks", "#recording2-forces", "#recording2-pressure"], 1400),
+}
+"""Picture: page, the part of it, what is numbered there, and the height from its top in px."""
+GALLERY = ("moments", "angles", "bsp")
+
+_NUMBERED = """([part, marked]) => {
+    const place = document.querySelector(part).getBoundingClientRect();
+    marked.forEach((selector, k) => {
+        const element = document.querySelector(part + " " + selector) ?? document.querySelector(selector);
+        const box = element.getBoundingClientRect();
+        const badge = document.body.appendChild(document.createElement("div"));
+        badge.textContent = k + 1;
+        badge.style = `position:absolute;left:${box.left + scrollX - 30}px;top:${box.top + scrollY}px;width:26px;`
+            + "height:26px;border-radius:50%;background:#D55E00;color:#fff;font:bold 15px/26px sans-serif;"
+            + "text-align:center;z-index:9";
+    });
+    scrollTo(0, place.top + scrollY - 10);
+}"""
+
+_UNDRAWN = (
+    "[...document.querySelectorAll('.plot:not([data-drawn])')].some(plot => !plot.closest('details:not([open])'))"
+)
+
+
+def main() -> None:
+    """Write all pictures."""
+    with TemporaryDirectory() as made:
+        demo = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(made) / "demo"
+        if len(sys.argv) < 2:
+            subprocess.run(["kinertia", "demo", "-o", demo, "--quiet"], check=True)
+        check = Path(made) / "check"
+        recorded = [WALK / "static.c3d", WALK / "walk.c3d"]
+        subprocess.run(["kinertia", "check", *recorded, "--mass", "41.5", "-o", check, "--quiet"], check=False)
+        with sync_playwright() as engine:
+            browser = engine.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+            for name, (page, part, marked, height) in PAGES.items():
+                opened = browser.new_page(viewport={"width": 1180, "height": height})
+                opened.goto(((demo if page == "report.html" else check) / page).as_uri())
+                take(opened, part, marked, FOLDER / f"{name}.png")
+            browser.close()
+        fit = kinertia.load_fit(demo)
+        for name in GALLERY:
+            fit.figure(name, FOLDER / f"gallery-{name}.svg")
+
+
+def take(page: Page, part: str, marked: list[str], path: Path) -> None:
+    """A picture of what is in the window, from the top of a part on, with numbers on what is marked."""
+    while page.evaluate(_UNDRAWN):
+        page.wait_for_timeout(200)
+    page.evaluate(_NUMBERED, [part, marked])
+    page.wait_for_timeout(300)
+    page.screenshot(path=path)
+
+
+if __name__ == "__main__":
+    main()

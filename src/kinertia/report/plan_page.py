@@ -1,0 +1,91 @@
+"""What `kinertia plan` says: rows for the terminal, `plan.csv`, `plan.json` and a page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import VERSION
+from kinertia.report.result_page import Part, render_parts
+from kinertia.report.row_figures import bar_figure, dot_figure
+from kinertia.studies.plan import Plan
+
+PLAN_HEADINGS = ("recorded", "measured", "informed", "assumed", "mass", "CoM", "Ixx Iyy Izz")
+PLAN_CAPTION = (
+    "How many of the parameters each recording would leave measured, informed, assumed (the literature's); and the "
+    "error bars over those of the literature, mean by class. Below the single recordings: the best two and three "
+    "together."
+)
+_CLASSES = {"mass": slice(0, 1), "CoM": slice(1, 4), "Ixx Iyy Izz": slice(4, 7)}
+
+
+def _shares(planned: Plan, names: tuple[str, ...]) -> dict[str, float]:
+    """Deviation over that of the literature, mean by class."""
+    ratio = planned.sd[names] / planned.prior_sd
+    return {what: float(ratio[:, columns].mean()) for what, columns in _CLASSES.items()}
+
+
+def plan_rows(planned: Plan) -> list[list[str]]:
+    """One row per recording or set of recordings, under `PLAN_HEADINGS`."""
+    return [
+        [
+            " + ".join(names),
+            *(str(count) for count in planned.counts(names).values()),
+            *(f"{share:.2f}" for share in _shares(planned, names).values()),
+        ]
+        for names in planned.sd
+    ]
+
+
+def plan_summary(planned: Plan) -> dict[str, Any]:
+    """What `plan.json` says."""
+    return {
+        "kinertia": VERSION,
+        "recordings": {" + ".join(names): planned.counts(names) for names in planned.sd},
+        "sd_over_literature": {" + ".join(names): _shares(planned, names) for names in planned.sd},
+    }
+
+
+def render_plan(planned: Plan) -> str:
+    """The page."""
+    names = [" + ".join(chosen) for chosen in planned.sd]
+    counts = [planned.counts(chosen) for chosen in planned.sd]
+    words = {"measured": "measured", "informed": "informed", "assumed": "assumed (the literature's)"}
+    bars = bar_figure(
+        names,
+        {title: [one[word] for one in counts] for word, title in words.items()},
+        "How many parameters each recording would leave measured, informed and assumed.",
+        "body segment parameters",
+    )
+    shares = [_shares(planned, chosen) for chosen in planned.sd]
+    dots = dot_figure(
+        names,
+        {what: {"error bar over the literature's": [one[what] for one in shares]} for what in _CLASSES},
+        "Predicted error bars over those of the literature, mean by class, for each recording.",
+    )
+    parts = [
+        Part("What each recording would tell", (PLAN_CAPTION,), bars, headings=PLAN_HEADINGS, rows=plan_rows(planned)),
+        Part(
+            "Error bars",
+            ("1 is no better than the literature; 0.5 halves its error bar.",),
+            dots,
+            "The predicted error bar of every single parameter is in plan.csv.",
+        ),
+    ]
+    return render_parts("What to record", "Predicted from the motions alone; nothing was estimated.", parts)
+
+
+def save_plan(planned: Plan, folder: str | Path) -> Path:
+    """Write `plan.html`, `plan.csv` and `plan.json` into a folder; returns the folder.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    with complete_folder(folder, "plan") as work:
+        planned.table.to_csv(work / "plan.csv", index=False, lineterminator="\n")
+        text = json.dumps(plan_summary(planned), indent=2)
+        (work / "plan.json").write_text(text + "\n", encoding="utf-8")
+        (work / "plan.html").write_text(render_plan(planned), encoding="utf-8")
+    return Path(folder)

@@ -1,0 +1,62 @@
+"""The page of a command that compares or studies: one template for all of them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from kinertia.report.figure import Figure, written
+from kinertia.report.rendering import rendered
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of a page.
+
+    Attributes:
+        title: its heading.
+        text: paragraphs above everything else.
+        figure: drawn by plotly.
+        caption: under the figure or the picture.
+        picture: an SVG document, where there is no figure; see `drawing`.
+        alt: the picture for those who cannot see it.
+        headings, rows: of a table; the first cell names the row.
+        listed: sentences below.
+    """
+
+    title: str
+    text: Sequence[str] = ()
+    figure: Figure | None = None
+    caption: str = ""
+    picture: str = ""
+    alt: str = ""
+    headings: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    listed: Sequence[str] = ()
+
+
+def render_parts(title: str, lead: str, parts: Sequence[Part]) -> str:
+    """The page as text; `lead` is the paragraph below its title."""
+    drawn = [
+        {
+            "part": part,
+            "figure": None if part.figure is None else written(part.figure),
+            "picture": Markup(part.picture[max(part.picture.find("<svg"), 0) :]),
+        }
+        for part in parts
+    ]
+    return rendered("result.html.j2", title=title, lead=lead, parts=drawn)
+
+
+def drawing(picture: Picture) -> str:
+    """A matplotlib figure as an SVG document."""
+    buffer = io.StringIO()
+    picture.savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue()

@@ -1,0 +1,69 @@
+"""A synthetic person's truth beside the estimate: what was wrong before, and what is wrong after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.result import Fit
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.studies.joint_accuracy import JOINTS
+from kinertia.trial.rms import rms
+
+_PARAMETERS = (("mass (kg)", 1.0, 2), ("centre of mass (mm)", 1e3, 0), ("moments of inertia (kg m2)", 1.0, 4))
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What is known of a synthetic person.
+
+    Attributes:
+        bsp: segments in the order of the fit's.
+        joint_loads: trial -> (w, c) N m and N in the frames and coordinates of the fit.
+    """
+
+    bsp: BodySegmentParameters
+    joint_loads: Mapping[str, np.ndarray]
+
+    def parameter_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
+        """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2)."""
+        change = source.table() - self.bsp.table()
+        distance = np.linalg.norm(change[:, 1:4], axis=1)
+        mass, com, inertia = (rms(part) for part in (change[:, 0], distance, change[:, 4:7]))
+        return mass, com, inertia
+
+    def moment_errors(self, fit: Fit) -> dict[str, tuple[float, float]]:
+        """Per joint, RMS error (N m) over all trials of joint moments by the usual way and by the estimate.
+
+        The usual way: measured motion, literature BSPs, forces as measured.
+        """
+        errors = {}
+        for joint, begins in JOINTS.items():
+            columns = [k for k, name in enumerate(fit.skeleton.coordinates) if name.startswith(begins)]
+            before, after = (
+                rms(
+                    np.concatenate([trial.joint_loads[stage] - self.joint_loads[trial.name] for trial in fit.trials])[
+                        :, columns
+                    ]
+                )
+                for stage in ("literature", "estimate")
+            )
+            errors[joint] = (before, after)
+        return errors
+
+
+def truth_rows(fit: Fit, truth: Truth) -> dict[str, list[tuple[str, str, str]]]:
+    """RMS errors in words for the page: what, before, after; of the parameters, and of the joint moments."""
+    pairs = zip(*(truth.parameter_errors(bsp) for bsp in (fit.literature, fit.estimate)), strict=True)
+    parameters = [
+        (name, f"{factor * before:.{digits}f}", f"{factor * after:.{digits}f}")
+        for (name, factor, digits), (before, after) in zip(_PARAMETERS, pairs, strict=True)
+    ]
+    moments: Any = truth.moment_errors(fit).items()
+    return {
+        "parameters": parameters,
+        "moments": [(joint, f"{before:.2f}", f"{after:.2f}") for joint, (before, after) in moments],
+    }

@@ -1,0 +1,54 @@
+"""Headless Chromium, which opens a page as a user does, from a file."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (pip install -e '.[test]')")
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+PATIENCE_MS = 30_000
+
+
+class Opened:
+    """A report in a tab, with what it said and asked for."""
+
+    def __init__(self, browser, path, viewport=None, scheme="light"):
+        self.page = browser.new_page(viewport=viewport or DESKTOP, color_scheme=scheme)
+        self.errors, self.requests = [], []
+        self.page.on(
+            "console", lambda message: message.type in ("error", "warning") and self.errors.append(message.text)
+        )
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
+        playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
+
+    def picture(self, locator):
+        """Pixels (h, w, 3), 0 to 1."""
+        from matplotlib.image import imread  # takes longer to load than most tests
+
+        return imread(io.BytesIO(locator.screenshot()), format="png")[..., :3]
+
+
+def ink(pixels):
+    """Share of the pixels that are not white."""
+    return float((pixels.min(axis=2) < 0.9).mean())
+
+
+def colour(pixels):
+    """Share of the pixels that are neither white, grey nor black: lines and markers, not axes and letters."""
+    return float((np.ptp(pixels, axis=2) > 0.25).mean())
