@@ -196,18 +196,6 @@ def test_the_table_gives_the_entries_back():
     assert with_uses(content, uses) == content
 
 
-def test_texts_and_keys_of_any_kind_are_written_as_toml():
-    from kinertia.io.subject_text import subject_text
-
-    content = {
-        "subject": {"name": 'A "b" \\ \x7f é\n', "mass_kg": 70, "odd key": [1.5, "x"], "flag": True},
-        "trial": [{"markers": "w.trc", "inline": {"a b": 1}}],
-        "segment": {"thigh_r": {"mass_kg": "8.9 +- 0.4"}},
-        "loose": 3,
-    }
-    assert tomllib.loads(subject_text(content, "heading")) == content
-
-
 def test_the_form_has_every_entry_of_the_person():
     shown = {field.key: field for field in fields({"subject": {"sex": "f", "age_years": 9.0}})}
     assert set(shown) == set(Subject.model_fields)
