@@ -12,6 +12,7 @@ import typer
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.file_lock import sole_use
+from kinertia.report.cohort_page import write_cohort_page
 from kinertia.report.cohort_person import fit_person
 from kinertia.report.cohort_tables import write_tables
 from kinertia.studies.cohort_cluster import (
@@ -81,6 +82,7 @@ def cohort(
             records = _fitted(everybody, output.resolve(), scheduler)
             outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
             write_tables(output, outcomes, csv)
+            write_cohort_page(output)
         _report(outcomes, output)
         raise typer.Exit(int(any(record.status for record in outcomes)))
     everybody = _standing(people, output)
