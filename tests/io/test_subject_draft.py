@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -176,3 +177,27 @@ def test_init_without_recordings(tmp_path):
         init_subject(tmp_path)
     with pytest.raises(FileError, match="no such folder"):
         init_subject(tmp_path / "nowhere")
+
+
+def test_the_only_model_takes_the_place_of_a_static_trial_that_no_name_tells(tmp_path, measured_walk):
+    for name in ("first.c3d", "second.c3d"):
+        shutil.copyfile(measured_walk / "static.c3d", tmp_path / name)
+    (tmp_path / "scaled.osim").touch()
+    content = tomllib.loads(init_subject(tmp_path))
+    assert content["model"] == {"osim": "scaled.osim"}
+    assert [trial["markers"] for trial in content["trial"]] == ["first.c3d", "second.c3d"]
+    (tmp_path / "generic.osim").touch()
+    assert "osim" not in tomllib.loads(init_subject(tmp_path))["model"], "which of two is not for us to say"
+    (tmp_path / "generic.osim").unlink()
+    (tmp_path / "first.c3d").rename(tmp_path / "static.c3d")
+    assert tomllib.loads(init_subject(tmp_path))["model"] == {"static": "static.c3d"}
+
+
+def test_forces_nearby_are_looked_for_unless_told_not_to(tmp_path):
+    folder = tmp_path / "Anna"
+    folder.mkdir()
+    (folder / "walk.trc").write_text("PathFileType\n")
+    (tmp_path / "forces").mkdir()
+    (tmp_path / "forces" / "walk.mot").write_text("ground_force_vx ground_force_vy\n")
+    assert tomllib.loads(init_subject(folder))["trial"][0]["forces"] == "../forces/walk.mot"
+    assert "forces" not in tomllib.loads(init_subject(folder, nearby=False))["trial"][0]

@@ -82,9 +82,7 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
         if path.is_dir():
             raise FileError(path, "is a folder; give the files in it, or its subject file (kinertia init drafts one)")
         if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
-            known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
-            hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
-            raise FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
+            raise unknown_kind(path)
     marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
     forces = [path for path in files if path not in marked]
     pairs = _matched(marked, forces)
@@ -101,6 +99,13 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
             )
         wanted[having[0]] = replace(wanted[having[0]], loads=loads)
     return tuple(wanted)
+
+
+def unknown_kind(path: Path) -> FileError:
+    """The error of a file that is none of those that can be checked."""
+    known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
+    hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
+    return FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
 
 
 def check_files(

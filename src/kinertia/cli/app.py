@@ -39,6 +39,7 @@ kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
 kinertia instruments A.toml B.toml   plates and clock, from a whole session
 kinertia cohort STUDY -o out  fit hundreds of people, resumable, one table
+kinertia app                  all of it on a page in your browser
 kinertia warm-up              compile now what the first fit would compile
 
 Every command says more with --help, and has an example there.
@@ -81,6 +82,7 @@ _MODULES = {
     "cohort": "cohort",
     "population": "population",
     "study": "study",
+    "app": "app_command",
     "warm-up": "warm_up",
 }
 """Module of every command, which has its name there (with underscores); in the order of `kinertia --help`."""

@@ -10,7 +10,7 @@ import typer
 
 from kinertia.cli.terminal import be_quiet
 from kinertia.io.output_folder import check_folder, expect_own_folder
-from kinertia.settings import sex_of
+from kinertia.settings import number_of, sex_of
 
 
 def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ()) -> None:
@@ -31,9 +31,9 @@ def number(text: str) -> float:
         BadParameter: it is none.
     """
     try:
-        return float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
-    except ValueError:
-        raise typer.BadParameter(f"'{text}' is not a number; write it like 72.6") from None
+        return number_of(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 def sex(text: str) -> str:

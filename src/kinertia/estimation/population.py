@@ -66,11 +66,11 @@ def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
         said.append("no numbers that could be checked: young adults' values with deviations half as large again")
     sentences = [f"population: {population} ({why}), of whom the tables are not: {one}; {HELP}" for one in said]
     notes, warnings = (sentences, []) if stated is not None else ([], sentences)
-    short = subject.age_years is None and stated is None and (subject.height_m or _SHORT_M) < _SHORT_M
-    if short:
+    height_m = subject.height_m
+    if subject.age_years is None and stated is None and height_m is not None and height_m < _SHORT_M:
         warnings.append(
-            f"height {subject.height_m:g} m: the tables are of adults; give age_years (or population) under [subject] "
-            "if this is a child"
+            f"height {height_m:g} m: the tables are of adults; give age_years (or population) under [subject] if "
+            "this is a child"
         )
     return PopulationPrior(prior, tuple(notes), tuple(warnings))
 

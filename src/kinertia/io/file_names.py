@@ -32,6 +32,11 @@ def same_name_key(name: str) -> str:
     return unicodedata.normalize("NFC", name).casefold()
 
 
+def last_part(written: str) -> str:
+    """The name at the end of a path as any system writes it, without folders and drive."""
+    return re.split(r"[\\/:]", written)[-1]
+
+
 def path_from(folder: Path, written: str) -> Path:
     """A path as it stands in a file, counted from a folder; backslashes are separators unless a file has them."""
     path = folder / _at_home(written)

@@ -10,6 +10,7 @@ import difflib
 from collections.abc import Iterator, Mapping, Sequence
 
 from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.io.toml_lines import quoted
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, folded, share_worn
 
 _NEAR = 0.85
@@ -18,27 +19,43 @@ _NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand",
 
 def draft_marker_set(labels: Sequence[str], name: str) -> str:
     """The text of a marker set (TOML) for these labels; landmarks and labels that are not known are in comments."""
+    heading = (
+        "# Drafted from the labels: check every line, complete those marked FILL IN, and name the file with --markers\n"
+        "# or under [model] markers."
+    )
+    return marker_set_text(name, *known_places(labels), {}, labels, heading)
+
+
+def known_places(labels: Sequence[str]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+    """Landmarks and segments with those of the labels that are known by their names."""
     landmarks = _placed(labels, dict(_names("landmarks", labels)), single=True)
-    segments = _placed(labels, dict(_names("segments", labels)), single=False)
-    lines = [
-        "# Drafted from the labels: check every line, complete those marked FILL IN, and name the file with --markers",
-        "# or under [model] markers.",
-        f'name = "{name}"',
-        "",
-        "[landmarks]",
-    ]
+    return landmarks, _placed(labels, dict(_names("segments", labels)), single=False)
+
+
+def marker_set_text(
+    name: str,
+    landmarks: Mapping[str, Sequence[str]],
+    segments: Mapping[str, Sequence[str]],
+    widths: Mapping[str, str],
+    labels: Sequence[str],
+    heading: str,
+) -> str:
+    """The text of a marker set (TOML); what it lacks of these labels, and of what Kinertia knows, is in comments."""
+    lines = [heading, f"name = {quoted(name)}", "", "[landmarks]"]
     for landmark in LANDMARKS:
         own = landmarks.get(landmark)
         if own:
-            lines.append(f"{landmark} = {_quoted(own)}")
+            lines.append(f"{landmark} = {_listed(own)}")
         elif landmark in _NEEDED:
             lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
     lines += ["", "[segments]"]
     for segment in SEGMENTS:
-        if segment in segments:
-            lines.append(f"{segment} = {_quoted(segments[segment])}")
+        if own := segments.get(segment):
+            lines.append(f"{segment} = {_listed(own)}")
         else:
             lines.append(f"# {segment} = []  # FILL IN")
+    if widths:
+        lines += ["", "[widths]", *(f"{joint} = {quoted(width)}" for joint, width in widths.items())]
     placed = {label for own in segments.values() for label in own}
     rest = [label for label in labels if label not in placed]
     if rest:
@@ -46,8 +63,8 @@ def draft_marker_set(labels: Sequence[str], name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _quoted(labels: Sequence[str]) -> str:
-    return "[" + ", ".join('"' + label.replace("\\", "\\\\").replace('"', '\\"') + '"' for label in labels) + "]"
+def _listed(labels: Sequence[str]) -> str:
+    return "[" + ", ".join(map(quoted, labels)) + "]"
 
 
 def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -14,6 +14,7 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
 from kinertia.io.subject_file import Model, TrialFiles
+from kinertia.io.subject_text import entry_line
 from kinertia.settings import Settings, Subject, Table
 
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
@@ -22,12 +23,13 @@ NO_FORCES = "# No forces were found for"
 """How the line begins that says so of a trial."""
 
 
-def init_subject(folder: str | Path) -> str:
+def init_subject(folder: str | Path, nearby: bool = True) -> str:
     """Draft a subject file for the recordings in a folder (not its subfolders); writes nothing.
 
     The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads go
     with the trial whose name is most like theirs, and are looked for in the folders in it and beside it where the
-    folder itself has none; mass and height come from a C3D file that holds them. What stays unknown is a commented
+    folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The only OpenSim
+    model of a folder takes the place of a static trial that no name tells. What stays unknown is a commented
     line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names begin like another
     static trial's are left out and named in a comment.
 
@@ -51,10 +53,15 @@ def init_subject(folder: str | Path) -> str:
         raise FileError(
             folder, f"holds no file of markers ({', '.join(MARKER_FILES)}); give the folder that holds the recordings"
         )
-    static, trials = _static_and_trials(captures)
+    models = [file for file in files if file.suffix.lower() == ".osim"]
+    by_model = len(models) == 1 and not any(STATIC_NAME.search(file.stem) for file in captures)
+    static, trials = (None, captures) if by_model else _static_and_trials(captures)
     others = [file.name for file in c3d + trc if file not in (static, *trials)]
     alone = [trial for trial in trials if not _brings_forces(trial)]
-    forces, loads = (_here_or_near(folder, files, holds) for holds in (_holds_forces, _holds_loads))
+    forces, loads = (
+        _here_or_near(folder, files, holds) if nearby else [file for file in files if holds(file)]
+        for holds in (holds_forces, holds_loads)
+    )
     chosen = matched_by_name(alone, forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
@@ -62,8 +69,12 @@ def init_subject(folder: str | Path) -> str:
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
     guessed = static is not None and not STATIC_NAME.search(static.stem)
     note = " (the shortest recording)" if guessed else ""
-    text += ["", "[model]", _entry(Model, "static", static and static.name, "static.trc", note)]
-    text += ["# " + _entry(Model, "markers", "plug-in-gait")]
+    text += ["", "[model]"]
+    if by_model:
+        text += [_entry(Model, "osim", models[0].name)]
+    else:
+        text += [_entry(Model, "static", static and static.name, "static.trc", note)]
+        text += ["# " + _entry(Model, "markers", "plug-in-gait")]
     for trial in trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
         if trial in chosen:
@@ -81,10 +92,9 @@ def init_subject(folder: str | Path) -> str:
 
 def _entry(table: type[Table], key: str, value: object, example: object = None, note: str = "") -> str:
     """`key = value  # what it is`; without a value a commented example to fill in."""
-    about = f"{table.model_fields[key].description}{note}"
     if value is None:
-        return f"# {key} = {json.dumps(example)}  # FILL IN: {about}"
-    return f"{key} = {json.dumps(value, ensure_ascii=False)}  # {about}"
+        return f"# {key} = {json.dumps(example)}  # FILL IN: {table.model_fields[key].description}{note}"
+    return entry_line(table, key, value, note)
 
 
 def _subject_lines(c3d: Sequence[Path]) -> list[str]:
@@ -181,11 +191,12 @@ def _relative(file: Path, folder: Path) -> str:
     return Path(os.path.relpath(file, folder)).as_posix()
 
 
-def _holds_loads(file: Path) -> bool:
+def holds_loads(file: Path) -> bool:
+    """Whether it is ExternalLoads."""
     return file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)
 
 
-def _holds_forces(file: Path) -> bool:
+def holds_forces(file: Path) -> bool:
     """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
     motion = file.suffix.lower() in (".mot", ".sto") and not STATIC_NAME.search(file.stem)
     return motion and re.search(r"_v[xyz]\b", _head(file)) is not None

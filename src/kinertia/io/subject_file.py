@@ -306,7 +306,7 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
     return changed
 
 
-_TABLES: dict[str, type[Table]] = dict(
+TABLES: dict[str, type[Table]] = dict(
     subject=Subject,
     model=Model,
     trial=TrialFiles,
@@ -316,6 +316,7 @@ _TABLES: dict[str, type[Table]] = dict(
     segment=KnownSegment,
     attached=Attached,
 )
+"""Of a subject file, by their names there."""
 
 
 def _sentence(detail: Any) -> str:
@@ -324,7 +325,7 @@ def _sentence(detail: Any) -> str:
     table, kind = str(holder[0] if holder else key), detail["type"]
     inside = ".".join(part for part in holder if isinstance(part, str))
     if kind == "extra_forbidden":
-        known = list(_TABLES[table].model_fields) if holder else list(_TABLES)
+        known = list(TABLES[table].model_fields) if holder else list(TABLES)
         near = difflib.get_close_matches(str(key), known, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
         return f"unknown key '{key}'{f' in [{inside}]' if holder else ''}; {hint}"
@@ -339,7 +340,7 @@ def _sentence(detail: Any) -> str:
         return f"there is no heading {heading} with its entries below; add it"
     if kind == "missing":
         heading = f"[[{table}]]" if table == "attached" else f"[{table}]"
-        return f"{heading} lacks '{key}' ({_TABLES[table].model_fields[key].description}); add it"
+        return f"{heading} lacks '{key}' ({TABLES[table].model_fields[key].description}); add it"
     problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
     if kind == "value_error":
         problem = str(detail["ctx"]["error"])

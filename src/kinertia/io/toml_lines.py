@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from dataclasses import dataclass
@@ -76,6 +77,11 @@ def parse_toml(text: str, path: Path) -> TomlFile:
         if comma := re.search(r"=\s*([-+]?\d+),(\d+)\s*(#|$)", text.splitlines()[line - 1] if number else ""):
             hint = f"; a number has a decimal point, not a comma: {comma[1]}.{comma[2]}"
         raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
+
+
+def quoted(text: str) -> str:
+    """A text as TOML has it, in quotes: JSON's escapes are TOML's, which wants one more letter escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def find_lines(text: str) -> dict[Location, int]:

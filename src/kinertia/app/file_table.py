@@ -1,0 +1,201 @@
+"""What the files of a person are, as a table to correct: a row per file, and what it is used as.
+
+The table is another face of the subject file: `file_table` makes it of the entries, `with_uses` entries of it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from kinertia.errors import SettingsError
+from kinertia.io.file_names import last_part
+from kinertia.io.marker_set_file import preset_names
+from kinertia.io.qualisys import is_plate_file
+from kinertia.io.subject_draft import holds_forces, holds_loads, is_capture
+from kinertia.io.subject_file import TABLES
+
+Content = dict[str, Any]
+"""Entries of a subject file, as `tomllib` reads them."""
+NOT_USED = ""
+_MODEL_FILES = ("static", "osim", "markers")
+
+
+@dataclass(frozen=True)
+class FileRow:
+    """One file.
+
+    Attributes:
+        name: of the file.
+        kind: what is in it, in words.
+        use: which of `choices` it is used as.
+        choices: values and their words.
+        size: bytes.
+    """
+
+    name: str
+    kind: str
+    use: str
+    choices: tuple[tuple[str, str], ...]
+    size: int
+
+
+def file_table(files: Sequence[Path], content: Content) -> list[FileRow]:
+    """A row per file; uses as the entries of the subject file have them."""
+    captures = [file for file in files if is_capture(file)]
+    uses = uses_of(content)
+    rows = []
+    for file in files:
+        kind, choices = _kind(file, file in captures, captures)
+        use = uses.get(file.name, NOT_USED)
+        known = use if use in dict(choices) else NOT_USED
+        rows.append(FileRow(file.name, kind, known, choices, file.stat().st_size))
+    return rows
+
+
+def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """What a file holds, and what it can be used as."""
+    suffix = file.suffix.lower()
+    unused = (NOT_USED, "not used")
+    if is_plate_file(file):
+        return "force plate (Qualisys), read with its markers", ()
+    if capture:
+        what = "markers and force plates (C3D)" if suffix == ".c3d" else f"markers ({suffix[1:].upper()})"
+        return what, (("static", "static trial"), ("trial", "walk or other motion"), unused)
+    if holds_forces(file):
+        return "forces", (*((f"forces:{one.name}", f"forces of {one.name}") for one in captures), unused)
+    if holds_loads(file):
+        named = ((f"loads:{one.name}", f"explains the forces of {one.name}") for one in captures)
+        return "what the columns of forces are (ExternalLoads)", (*named, unused)
+    if suffix == ".osim":
+        return "OpenSim model", (("osim", "model, in place of a static trial"), unused)
+    if suffix == ".toml" and "landmarks" in _toml(file):
+        return "marker set", (("markers", "marker set"), unused)
+    if suffix == ".csv" and "information" in _first_line(file):
+        return "body segment parameters of an earlier fit", (("bsp", "what the estimate starts from"), unused)
+    if suffix in (".toml", ".csv"):
+        return "used only where the text of the subject file names it", ()
+    return "nothing that Kinertia reads", ()
+
+
+def uses_of(content: Content) -> dict[str, str]:
+    """Use by file name."""
+    model, uses = _table(content, "model"), {}
+    for key in _MODEL_FILES:
+        if isinstance(model.get(key), str):
+            uses[model[key]] = key
+    if isinstance(bsp := _table(content, "prior").get("bsp"), str):
+        uses[bsp] = "bsp"
+    for trial in _trials(content):
+        markers = str(trial.get("markers", ""))
+        uses[markers] = "trial"
+        uses |= {str(trial[key]): f"{key}:{markers}" for key in ("forces", "loads") if key in trial}
+    return uses
+
+
+def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
+    """The entries with the files used like this; what else they say of a trial stays with it.
+
+    A model takes the place of the static trial and its marker set.
+
+    Raises:
+        SettingsError: two files are used as what there is one of.
+    """
+    by_use: dict[str, list[str]] = {}
+    for name, use in uses.items():
+        by_use.setdefault(use, []).append(name)
+    for use, names in by_use.items():
+        if len(names) > 1 and use not in ("trial", NOT_USED):
+            what, _, trial_name = use.partition(":")
+            of = f" of {trial_name}" if trial_name else ""
+            raise SettingsError(f"{' and '.join(names)} are both used as {what}{of}; choose one of them")
+    model = {key: value for key, value in _table(content, "model").items() if key not in ("static", "osim")}
+    if model.get("markers") not in preset_names():
+        model.pop("markers", None)
+    model |= {key: own[0] for key in _MODEL_FILES if (own := by_use.get(key))}
+    if "osim" in model:
+        model = {key: value for key, value in model.items() if key not in ("static", "markers", "length_unit")}
+    else:
+        model.pop("calibrate", None)
+    known = {str(trial.get("markers")): trial for trial in _trials(content)}
+    trials = []
+    for markers in sorted(by_use.get("trial", ()), key=lambda name: [*known, name].index(name)):
+        trial = {"markers": markers, **known.get(markers, {})}
+        for key in ("forces", "loads"):
+            trial.pop(key, None)
+            if own := by_use.get(f"{key}:{markers}"):
+                trial[key] = own[0]
+        trials.append(trial)
+    changed = {**content, "model": model, "trial": trials}
+    if not trials:
+        del changed["trial"]
+    prior = {key: value for key, value in _table(content, "prior").items() if key != "bsp"}
+    if bsp := by_use.get("bsp"):
+        prior["bsp"] = bsp[0]
+    return {**changed, "prior": prior} if prior else {key: changed[key] for key in changed if key != "prior"}
+
+
+def with_new_files(content: Content, draft: Content, present: Iterable[str], seen: Iterable[str]) -> Content:
+    """The entries after files were added or removed: those of files that are gone go, new files are used as drafted."""
+    here, new = set(present), set(present) - set(seen)
+    drafted = uses_of(draft)
+    uses = {name: use for name, use in uses_of(content).items() if name in here}
+    single = {use for use in uses.values() if use in ("static", "osim", "markers", "bsp")}
+    if single & {"static", "osim"}:
+        single |= {"static", "osim"}
+    for name, use in drafted.items():
+        if name in new and name in here and use not in single:
+            uses[name] = use
+    return with_uses({**draft, **content}, uses)
+
+
+def within_folder(content: Content) -> Content:
+    """The entries with every file by its name only: all are in the person's folder, none is looked for elsewhere."""
+    changed = dict(content)
+    for name, table in TABLES.items():
+        keys = [key for key, field in table.model_fields.items() if _names_a_file(field.annotation)]
+        if isinstance(entries := content.get(name), Mapping):
+            changed[name] = _by_names_only(entries, keys)
+        elif isinstance(entries, list):
+            changed[name] = [_by_names_only(one, keys) if isinstance(one, Mapping) else one for one in entries]
+    return changed
+
+
+def _by_names_only(entries: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    return {
+        key: last_part(value) if key in keys and isinstance(value, str) else value for key, value in entries.items()
+    }
+
+
+def _names_a_file(annotation: object) -> bool:
+    return annotation is Path or any(map(_names_a_file, get_args(annotation)))
+
+
+def is_subject_file(file: Path) -> bool:
+    """Whether a TOML file says who walked."""
+    return file.suffix.lower() == ".toml" and bool({"subject", "trial"} & set(_toml(file)))
+
+
+def _toml(file: Path) -> Content:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+
+
+def _first_line(file: Path) -> str:
+    with file.open(encoding="utf-8", errors="replace") as stream:
+        return stream.readline(1000)
+
+
+def _table(content: Content, name: str) -> Mapping[str, Any]:
+    value = content.get(name)
+    return value if isinstance(value, Mapping) else {}
+
+
+def _trials(content: Content) -> list[Mapping[str, Any]]:
+    value = content.get("trial")
+    return [one for one in value if isinstance(one, Mapping)] if isinstance(value, list) else []

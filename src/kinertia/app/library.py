@@ -1,0 +1,188 @@
+"""The library: a folder of the user's with a folder for every person, which the command line reads as well.
+
+    Kinertia/
+        Anna/
+            subject.toml, static.c3d, walk1.c3d, ...    what `kinertia fit` takes
+            check/check.html                            what `kinertia check` wrote
+            results/                                    what `kinertia fit` wrote
+
+Nothing is known of a person but what is in the folder: no index could contradict it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from kinertia.errors import FileError, KinertiaError
+from kinertia.io.file_lock import sole_use
+from kinertia.io.file_names import fits_everywhere, same_folder
+from kinertia.io.output_folder import check_folder, write_then_rename
+from kinertia.io.provenance import sha256
+from kinertia.io.subject_file import read_subject
+from kinertia.io.working_folder import sweep
+from kinertia.studies.cohort_record import inputs_of
+
+SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
+_RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
+_STARTED, _INTERRUPTED = "started", "interrupted"
+_LONGEST_NAME = 80
+_NOTING = threading.Lock()
+"""Check, fit and page note what they know of a person at the same time."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """One person's folder; the name of the folder is theirs."""
+
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        """What the person is called in the library."""
+        return self.folder.name
+
+    @property
+    def subject(self) -> Path:
+        """The subject file, which need not be there yet."""
+        return self.folder / SUBJECT
+
+    @property
+    def check(self) -> Path:
+        """Folder of check.html."""
+        return self.folder / "check"
+
+    @property
+    def results(self) -> Path:
+        """Folder of the results of the fit."""
+        return self.folder / "results"
+
+    @property
+    def fitted(self) -> bool:
+        """Whether there are results."""
+        return (self.results / SUMMARY).is_file()
+
+    def files(self) -> list[Path]:
+        """What was dropped: everything but the subject file."""
+        return sorted(
+            path
+            for path in self.folder.iterdir()
+            if path.is_file() and path.name != SUBJECT and not path.name.startswith(".")
+        )
+
+    def changed(self) -> float:
+        """When files or results changed last, seconds since 1970."""
+        return max((self.folder / _RECORD).stat().st_mtime, self.folder.stat().st_mtime)
+
+    @cached_property
+    def inputs(self) -> str:
+        """SHA-256 of the subject file's entries and the content of its files; empty where they cannot be read."""
+        try:
+            return inputs_of(read_subject(self.subject))
+        except (KinertiaError, OSError):
+            return ""
+
+    def outcome(self, kind: str) -> dict[str, Any]:
+        """What the last check or fit left beside what it wrote; empty where there is none, or of other results."""
+        outcome = _json(getattr(self, kind) / OUTCOME)
+        summary = self.results / SUMMARY
+        if kind == "results" and (not summary.is_file() or outcome.get("summary") != sha256(summary)):
+            return {}
+        return outcome
+
+    def notes(self) -> dict[str, Any]:
+        """What else is remembered: how the last check and fit ended that left nothing, and which files were seen."""
+        return _json(self.folder / _RECORD)
+
+    def note(self, **values: Any) -> None:
+        """Remember this as well."""
+        with _NOTING:
+            write_then_rename(self.folder / _RECORD, json.dumps({**self.notes(), **values}, indent=1) + "\n")
+
+
+class Library:
+    """All people of a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make the folder if need be.
+
+        Raises:
+            FileError: it cannot be written to.
+        """
+        self.folder = folder.absolute()
+        check_folder(self.folder / "person")
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Nobody else changes it during the block; what an earlier process did not finish is noted as interrupted.
+
+        Raises:
+            FileError: another process has it open.
+        """
+        with sole_use(self.folder / _LOCK, f"the library {self.folder}"):
+            sweep(self.folder)
+            for person in self.people():
+                sweep(person.folder)
+                ended = [kind for kind, how in person.notes().items() if how == {"how": _STARTED}]
+                if ended:
+                    person.note(**{kind: {"how": _INTERRUPTED} for kind in ended})
+            yield
+
+    def people(self) -> list[Person]:
+        """Everybody, who changed last first."""
+        found = [Person(path) for path in self.folder.iterdir() if (path / _RECORD).is_file() and not path.is_symlink()]
+        return sorted(found, key=Person.changed, reverse=True)
+
+    def person(self, name: str) -> Person | None:
+        """Who is called that; names are compared, so that none leads out of the library."""
+        return next((person for person in self.people() if person.name == name), None)
+
+    def add(self, wanted: str) -> Person:
+        """A new person of this name, or of one like it that is free."""
+        cleaned = "".join(letter if letter.isalnum() or letter in " -_.,()" else " " for letter in wanted)
+        cleaned = " ".join(cleaned.split())[:_LONGEST_NAME].strip(" .")
+        base = cleaned if fits_everywhere(cleaned) else "Person"
+        taken, name, number = [path.name for path in self.folder.iterdir()], base, 1
+        while any(same_folder(name, other) for other in taken):
+            number += 1
+            name = f"{base} {number}"
+        person = Person(self.folder / name)
+        person.folder.mkdir()
+        person.note()
+        return person
+
+    def delete(self, person: Person) -> None:
+        """Remove a person's files and results; whoever looks finds all of it or nothing.
+
+        Raises:
+            FileError: a file is open in another program.
+        """
+        aside = self.folder / f".deleted {person.name}"
+        try:
+            os.rename(person.folder, aside)
+            shutil.rmtree(aside)
+        except OSError as error:
+            problem = f"cannot be deleted ({error.strerror}); close the program that has a file of it open"
+            raise FileError(person.folder, problem) from error
+
+
+def started() -> Mapping[str, str]:
+    """The note of a check or fit that has begun."""
+    return {"how": _STARTED}
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}

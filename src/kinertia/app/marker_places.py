@@ -1,0 +1,172 @@
+"""Which marker is where on the body: as the marker set has it, to correct, and saved as a set of the person's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinertia.app.entries import entries, write
+from kinertia.app.library import Person
+from kinertia.checks.marker_set_match import match_labels
+from kinertia.errors import FileError, KinertiaError, SettingsError
+from kinertia.io.marker_set_draft import known_places, marker_set_text
+from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.io.osim.reader import read_osim
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.recording import read_recording
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, MarkerSet
+from kinertia.model.model_markers import markers_of_model
+from kinertia.trial.data import FloatArray, Markers
+
+FILE = "markers.toml"
+"""The person's own marker set."""
+_HEADING = "# Written by kinertia app; name it under [model] markers or with --markers."
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerPlaces:
+    """The markers of one recording and their places.
+
+    Attributes:
+        file: name of the recording.
+        labels: of the recording.
+        positions: (m, 3) m, in ground axes, of the frame in which most are seen; NaN where not seen.
+        set_name: of the marker set, or of the nearest preset.
+        fits: whether the set is the recording's.
+        of_model: whether it is the markers of an OpenSim model, which nobody assigns.
+        segments, landmarks: of every label that has one.
+        missing: labels of the set that the recording lacks, each with those that look like it.
+    """
+
+    file: str
+    labels: tuple[str, ...]
+    positions: FloatArray
+    set_name: str
+    fits: bool
+    of_model: bool
+    segments: Mapping[str, str]
+    landmarks: Mapping[str, str]
+    missing: Mapping[str, Sequence[str]]
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Labels without a segment."""
+        return tuple(label for label in self.labels if label not in self.segments)
+
+
+def marker_places(person: Person) -> MarkerPlaces:
+    """The markers of the static trial, or of the first other one.
+
+    Raises:
+        KinertiaError: there is no recording, or it cannot be read.
+    """
+    content = entries(person)
+    model = _table(content.get("model"))
+    path, unit = _recording(person, content)
+    markers = read_recording(path, length_unit=unit).without_empty_markers().markers
+    wanted = _named_set(person, model)
+    match, used = match_labels(markers.labels, wanted)
+    if used is not None:
+        places = {name: dict(_owners(own)) for name, own in (("s", used.segments), ("l", used.landmarks))}
+    else:
+        landmarks, segments = known_places(markers.labels)
+        places = {"s": dict(_owners(segments)), "l": dict(_owners(landmarks))}
+    here = set(markers.labels)
+    return MarkerPlaces(
+        path.name,
+        markers.labels,
+        _fullest_frame(markers),
+        match.name,
+        match.fits,
+        match.of_model,
+        {label: place for label, place in places["s"].items() if label in here},
+        {label: place for label, place in places["l"].items() if label in here},
+        match.missing,
+    )
+
+
+def save_places(person: Person, segments: Mapping[str, str], landmarks: Mapping[str, str]) -> None:
+    """Write the person's own marker set, and name it in the subject file.
+
+    Args:
+        person: whose.
+        segments, landmarks: of every label that has one.
+
+    Raises:
+        KinertiaError: they make no marker set; then nothing is changed.
+    """
+    places = marker_places(person)
+    if places.of_model:
+        raise SettingsError("the markers of an OpenSim model are assigned in its file")
+    before = _named_set(person, _table(entries(person).get("model")))
+    if before is None and places.fits:
+        before = match_labels(places.labels, None)[1]
+    text = marker_set_text(
+        person.name,
+        _grouped(landmarks, places.labels, LANDMARKS),
+        _grouped(segments, places.labels, SEGMENTS),
+        {} if before is None else before.widths,
+        places.labels,
+        _HEADING,
+    )
+    path = person.folder / FILE
+    earlier = path.read_text(encoding="utf-8") if path.is_file() else None
+    write_then_rename(path, text)
+    try:
+        read_marker_set(path)
+    except KinertiaError:
+        if earlier is None:
+            path.unlink()
+        else:
+            write_then_rename(path, earlier)
+        raise
+    content = entries(person)
+    write(person, {**content, "model": {**_table(content.get("model")), "markers": FILE}})
+    person.note(seen=[path.name for path in person.files()])
+
+
+def _grouped(places: Mapping[str, str], labels: Sequence[str], known: Sequence[str]) -> dict[str, list[str]]:
+    """Labels by their place, in the order of the recording."""
+    grouped: dict[str, list[str]] = {}
+    for label in labels:
+        if places.get(label) in known:
+            grouped.setdefault(places[label], []).append(label)
+    return grouped
+
+
+def _owners(places: Mapping[str, Sequence[str]]) -> list[tuple[str, str]]:
+    return [(label, place) for place, labels in places.items() for label in labels]
+
+
+def _named_set(person: Person, model: Mapping[str, Any]) -> MarkerSet | None:
+    """The set that the subject file names, or that its model has."""
+    if "osim" in model:
+        return markers_of_model(read_osim(person.folder / model["osim"]))
+    named = model.get("markers")
+    if named is None:
+        return None
+    return read_marker_set(named if named in preset_names() else person.folder / named)
+
+
+def _recording(person: Person, content: Mapping[str, Any]) -> tuple[Path, str | None]:
+    model, trials = _table(content.get("model")), content.get("trial")
+    if "static" in model:
+        return person.folder / model["static"], model.get("length_unit")
+    for trial in trials if isinstance(trials, list) else ():
+        if "markers" in trial:
+            return person.folder / trial["markers"], trial.get("length_unit")
+    raise FileError(person.folder, "no recording is named static trial or walk yet; choose one in the table of files")
+
+
+def _fullest_frame(markers: Markers) -> FloatArray:
+    seen = np.isfinite(markers.positions).all(axis=2)
+    positions: FloatArray = markers.positions[int(np.argmax(seen.sum(axis=1)))]
+    return positions
+
+
+def _table(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}

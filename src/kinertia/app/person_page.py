@@ -1,0 +1,167 @@
+"""The page of one person: what their files are, who they are, what the check found, and the results."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+
+from kinertia.app.entries import USE, entries, fields, trouble
+from kinertia.app.file_table import file_table
+from kinertia.app.jobs import KINDS, Job, Jobs
+from kinertia.app.library import Person
+from kinertia.app.responses import page
+from kinertia.app.uploads import LIMITS
+from kinertia.errors import KinertiaError
+
+_ENDED = {
+    "cancelled": "Cancelled.",
+    "interrupted": "Interrupted: Kinertia was closed before it was done. Start it again.",
+}
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One person in the list.
+
+    Attributes:
+        name: of the person.
+        level: "pass", "caution" or "fail" of the results; empty without.
+        sentence: where they stand, in words.
+        when: of the last change.
+        fitted: whether there are results.
+    """
+
+    name: str
+    level: str
+    sentence: str
+    when: str
+    fitted: bool
+
+
+def standing(person: Person, jobs: Jobs) -> Standing:
+    """Where a person stands."""
+    outcome = person.outcome("results") if person.fitted else {}
+    sentence, notes = outcome.get("headline", ""), person.notes()
+    job = jobs.of(person, "fit") or jobs.of(person, "check")
+    if job is not None:
+        what = "Fit" if job.kind == "fit" else "Check"
+        sentence = f"{what}: {_stage(job, jobs)}"
+    elif not sentence:
+        how = notes.get("fit", {})
+        sentence = "No results yet."
+        if how:
+            sentence = _ENDED.get(how.get("how", ""), how.get("message", sentence))
+    when = time.strftime("%Y-%m-%d %H:%M", time.localtime(outcome.get("ended", person.changed())))
+    return Standing(person.name, outcome.get("level", ""), sentence, when, person.fitted)
+
+
+def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
+    """How far the person's check and fit are; null for what neither waits nor is at work."""
+    told: dict[str, Any] = {}
+    for kind in KINDS:
+        job = jobs.of(person, kind)
+        told[kind] = None if job is None else {"stage": _stage(job, jobs), "share": job.share, "left": _left(job)}
+    return told
+
+
+def _stage(job: Job, jobs: Jobs) -> str:
+    if job.kind == "fit" and jobs.compiling:
+        return "compiling, once on a computer: about half a minute"
+    before = jobs.place(job)
+    if job.stage or not before:
+        return job.stage or "starting"
+    return f"waiting for {before} other{'s' if before > 1 else ''}"
+
+
+def _left(job: Job) -> str:
+    """The time left of the stage, in words; empty as long as nobody knows."""
+    seconds = job.seconds_left()
+    if seconds is None:
+        return ""
+    return f"about {seconds:.0f} s left" if seconds < 90 else f"about {seconds / 60:.0f} min left"
+
+
+def person_page(
+    request: Request,
+    person: Person,
+    jobs: Jobs,
+    problem: str = "",
+    typed: Mapping[str, str] | None = None,
+    said: str = "",
+) -> HTMLResponse:
+    """The page.
+
+    Args:
+        request: which asked for it.
+        person: whose page.
+        jobs: what waits or is at work.
+        problem: of what was just typed, which is shown again.
+        typed: the form's fields.
+        said: what was just done.
+    """
+    content: Mapping[str, Any] = {}
+    broken = ""
+    try:
+        content = entries(person)
+    except KinertiaError as error:
+        broken = str(error)
+    rows = file_table(person.files(), dict(content))
+    notes = person.notes()
+    found = trouble(person) if person.subject.is_file() else notes.get("draft", "")
+    checked, results = person.outcome("check"), person.outcome("results")
+    return page(
+        request,
+        "person.html.j2",
+        422 if problem else 200,
+        person=person,
+        rows=rows,
+        use=USE,
+        uses={row.name: (typed or {}).get(USE + row.name, row.use) for row in rows},
+        fields=fields(dict(content), typed),
+        text=person.subject.read_text(encoding="utf-8", errors="replace") if person.subject.is_file() else "",
+        broken=broken,
+        problem=problem,
+        trouble=found,
+        draft=notes.get("draft", "") if person.files() else "",
+        said=said,
+        saved=notes.get("saved", False),
+        jobs=progress(person, jobs),
+        ended={kind: _how(notes, kind) for kind in KINDS},
+        check=checked,
+        check_page=(person.check / "check.html").is_file(),
+        check_old=bool(checked) and checked.get("inputs") != person.inputs,
+        counts=_counts(checked),
+        results=results if person.fitted else {},
+        fitted=person.fitted,
+        results_old=bool(results) and results.get("inputs") != person.inputs,
+        result_files=_result_files(person),
+        limits=LIMITS,
+    )
+
+
+def _how(notes: Mapping[str, Any], kind: str) -> dict[str, str]:
+    """How the last one ended that left nothing: level and sentence."""
+    ended = notes.get(kind, {})
+    how = ended.get("how", "")
+    if how == "failed":
+        return {"level": "fail", "sentence": ended.get("message", "")}
+    return {"level": "caution", "sentence": _ENDED[how]} if how in _ENDED else {}
+
+
+def _counts(checked: Mapping[str, Any]) -> dict[str, int]:
+    levels = [verdict["level"] for found in checked.get("findings", ()) for verdict in found["verdicts"]]
+    counts = {level: levels.count(level) for level in ("fail", "caution", "pass")}
+    counts["fail"] += len(checked.get("mistakes", ()))
+    return counts
+
+
+def _result_files(person: Person) -> list[str]:
+    if not person.fitted:
+        return []
+    paths = (path.relative_to(person.results) for path in person.results.rglob("*") if path.is_file())
+    return sorted(path.as_posix() for path in paths if not path.name.startswith(".") and path.name != "outcome.json")

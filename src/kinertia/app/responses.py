@@ -1,0 +1,126 @@
+"""Answers: pages from templates, files of results, and what a form said."""
+
+from __future__ import annotations
+
+import mimetypes
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+from urllib.parse import parse_qsl, quote
+
+import jinja2
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response, StreamingResponse
+
+from kinertia.app.guard import RESULT_POLICY
+from kinertia.app.library import Person
+from kinertia.errors import FileError
+from kinertia.io.provenance import VERSION
+
+_LARGEST_FORM = 1_000_000
+_PIECE = 1 << 20
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("kinertia.app"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["in_address"] = lambda name: quote(name, safe="")
+    environment.filters["megabytes"] = lambda size: f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"
+    return environment
+
+
+def page(request: Request, template: str, status: int = 200, **content: Any) -> HTMLResponse:
+    """A page; `root` in it is where the application's addresses begin."""
+    root = request.scope["root_path"]
+    text = _environment().get_template(template).render(root=root, version=VERSION, **content)
+    return HTMLResponse(text.encode("utf-8", errors="replace"), status)
+
+
+def to(request: Request, *parts: str) -> RedirectResponse:
+    """On to another page, as after a form."""
+    return RedirectResponse("/".join([request.scope["root_path"], *(quote(part, safe="") for part in parts)]), 303)
+
+
+async def form(request: Request) -> dict[str, str]:
+    """Fields of a form by their names, the last of each.
+
+    Raises:
+        HTTPException: it is larger than any form of ours.
+    """
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > _LARGEST_FORM:
+            raise HTTPException(413, "too large for a form")
+    return dict(parse_qsl(body.decode("utf-8", errors="replace"), keep_blank_values=True))
+
+
+def result_file(folder: Path, name: str) -> Response:
+    """A file of results: pages to look at, in a frame that reaches nothing, the rest to save.
+
+    Raises:
+        HTTPException: no such file in the folder.
+    """
+    within = folder.resolve()
+    path = (within / name).resolve()
+    inside = path.is_relative_to(within) and path.is_file()
+    if not inside or any(part.startswith(".") for part in path.relative_to(within).parts):
+        raise HTTPException(404, "no such file")
+    headers = {"content-security-policy": RESULT_POLICY}
+    if path.suffix == ".html":
+        return FileResponse(path, media_type="text/html", headers=headers)
+    kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+    return FileResponse(path, media_type=kind, filename=path.name, headers=headers)
+
+
+def archive(person: Person) -> Response:
+    """Results and subject file as a zip."""
+    file = cast(BinaryIO, tempfile.SpooledTemporaryFile(50_000_000))  # noqa: SIM115 - closed when it was sent
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
+        for path in sorted(person.results.rglob("*")):
+            if path.is_file() and not path.name.startswith("."):
+                packed.write(path, f"{person.name}/{path.relative_to(person.results).as_posix()}")
+    size = file.tell()
+    file.seek(0)
+
+    def pieces() -> Iterator[bytes]:
+        with file:
+            while piece := file.read(_PIECE):
+                yield piece
+
+    name = quote(f"{person.name}.zip", safe="")
+    headers = {"content-disposition": f"attachment; filename*=utf-8''{name}", "content-length": str(size)}
+    return StreamingResponse(pieces(), media_type="application/zip", headers=headers)
+
+
+def expect(person: Person | None) -> Person:
+    """The person.
+
+    Raises:
+        HTTPException: there is none of that name.
+    """
+    if person is None:
+        raise HTTPException(404, "nobody of this name is in the library")
+    return person
+
+
+def chosen_folder(text: str) -> Path:
+    """A folder that a user typed.
+
+    Raises:
+        FileError: it is no absolute path.
+    """
+    path = Path(text.strip().strip('"')).expanduser()
+    if not path.is_absolute():
+        raise FileError(text.strip() or "folder", "give the whole path of the folder, from the drive or / on")
+    return path

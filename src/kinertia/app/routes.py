@@ -1,0 +1,311 @@
+"""Which address does what. Everything is a page, a form or a file; the state is in the library's folders."""
+
+from __future__ import annotations
+
+import shutil
+import traceback
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.routing import BaseRoute, Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from kinertia.app.entries import recognise, trouble, write_form, write_text
+from kinertia.app.guard import RESULT_POLICY
+from kinertia.app.jobs import KINDS, Jobs
+from kinertia.app.library import Library, Person
+from kinertia.app.marker_routes import marker_routes
+from kinertia.app.person_page import person_page, progress, standing
+from kinertia.app.responses import archive, chosen_folder, expect, form, page, result_file, to
+from kinertia.app.uploads import ENDINGS, LIMITS, receive
+from kinertia.errors import KinertiaError
+from kinertia.io.output_folder import check_folder, complete_folder, expect_own_folder
+
+Action = Callable[[Request], Awaitable[Response]]
+_STATIC = Path(__file__).with_name("static")
+
+
+def application(library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> Starlette:
+    """The pages of a library; `stop` ends the server, `example` is a folder to try it with."""
+    actions = _Actions(library, jobs, stop, example)
+    routes: list[BaseRoute] = [
+        Route("/", actions.home),
+        Route("/people", actions.add, methods=["POST"]),
+        Route("/example", actions.add_example, methods=["POST"]),
+        Route("/compare", actions.compare),
+        Route("/compare/page", actions.compared),
+        Route("/stop", actions.end, methods=["POST"]),
+        Route("/people/{name}", actions.person),
+        Route("/people/{name}/files", actions.upload, methods=["POST"]),
+        Route("/people/{name}/recognise", actions.recognised, methods=["POST"]),
+        Route("/people/{name}/remove", actions.remove, methods=["POST"]),
+        Route("/people/{name}/entries", actions.entries, methods=["POST"]),
+        Route("/people/{name}/text", actions.text, methods=["POST"]),
+        Route("/people/{name}/delete", actions.delete, methods=["POST"]),
+        Route("/people/{name}/progress", actions.progress),
+        Route("/people/{name}/subject.toml", actions.subject_file),
+        Route("/people/{name}/results.zip", actions.zipped),
+        Route("/people/{name}/copy", actions.copy, methods=["POST"]),
+        Route("/people/{name}/check/{file:path}", actions.check_file),
+        Route("/people/{name}/results/{file:path}", actions.file),
+        *marker_routes(library, jobs),
+        Route("/people/{name}/{kind}", actions.start, methods=["POST"]),
+        Route("/people/{name}/{kind}/cancel", actions.cancel, methods=["POST"]),
+        Mount("/static", StaticFiles(directory=_STATIC)),
+    ]
+    handlers = {HTTPException: _not_found, KinertiaError: _trouble, OSError: _no_file, Exception: _failed}
+    return Starlette(routes=routes, exception_handlers=handlers)
+
+
+class _Actions:
+    """What the addresses do."""
+
+    def __init__(self, library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> None:
+        self._library = library
+        self._jobs = jobs
+        self._stop = stop
+        self._example = example
+
+    async def home(self, request: Request) -> Response:
+        """Everybody in the library, and a place to drop files for somebody new."""
+        people = [standing(person, self._jobs) for person in self._library.people()]
+        return page(
+            request,
+            "home.html.j2",
+            people=people,
+            folder=self._library.folder,
+            limits=LIMITS,
+            example=self._example is not None,
+        )
+
+    async def add(self, request: Request) -> Response:
+        """Somebody new: goes to their page, or tells a script its address."""
+        person = self._library.add((await form(request)).get("name", ""))
+        answer = to(request, "people", person.name)
+        wants_json = "application/json" in request.headers.get("accept", "")
+        return JSONResponse({"address": answer.headers["location"]}) if wants_json else answer
+
+    async def add_example(self, request: Request) -> Response:
+        """The measured walk that comes with Kinertia, ready to be checked and fitted."""
+        if self._example is None:
+            raise HTTPException(404, "there is no example")
+        person = self._library.add("Example")
+        for path in self._example.iterdir():
+            if path.suffix.lower() in ENDINGS:
+                shutil.copyfile(path, person.folder / path.name)
+        await run_in_threadpool(recognise, person)
+        self._jobs.add(person, "check")
+        return to(request, "people", person.name)
+
+    async def person(self, request: Request) -> Response:
+        """One person: files, entries, check, results."""
+        return await run_in_threadpool(person_page, request, self._person(request), self._jobs)
+
+    async def upload(self, request: Request) -> Response:
+        """One dropped file, as the body of the request; answers with what is wrong with it, if anything is."""
+        person = self._idle(request)
+        try:
+            path = await receive(person, request.query_params.get("name", ""), request.stream())
+        except KinertiaError as error:
+            return JSONResponse({"problem": str(error)}, 422, {"connection": "close"})
+        return JSONResponse({"name": path.name})
+
+    async def recognised(self, request: Request) -> Response:
+        """After files were dropped: the draft of the subject file; its troubles are on the person's page."""
+        person = self._idle(request)
+        await run_in_threadpool(_recognised, person)
+        return to(request, "people", person.name)
+
+    async def remove(self, request: Request) -> Response:
+        """Remove one file."""
+        person = self._idle(request)
+        name = (await form(request)).get("file")
+        for path in person.files():
+            if path.name == name:
+                path.unlink()
+        await run_in_threadpool(_recognised, person)
+        return to(request, "people", person.name)
+
+    async def entries(self, request: Request) -> Response:
+        """Save the form, and check the files if nothing is wrong with it."""
+        person = self._idle(request)
+        given = await form(request)
+        try:
+            write_form(person, given)
+        except KinertiaError as error:
+            return await run_in_threadpool(person_page, request, person, self._jobs, str(error), given)
+        return self._checked(request, person)
+
+    async def text(self, request: Request) -> Response:
+        """Save the subject file as it was typed, and check the files if nothing is wrong with it."""
+        person = self._idle(request)
+        try:
+            write_text(person, (await form(request)).get("text", ""))
+        except KinertiaError as error:
+            return await run_in_threadpool(person_page, request, person, self._jobs, str(error))
+        return self._checked(request, person)
+
+    async def start(self, request: Request) -> Response:
+        """Let the person wait for a check or a fit."""
+        person, kind = self._person(request), self._kind(request)
+        if not trouble(person):
+            self._jobs.add(person, kind)
+        return to(request, "people", person.name)
+
+    async def cancel(self, request: Request) -> Response:
+        """Give up a check or a fit."""
+        person, kind = self._person(request), self._kind(request)
+        await run_in_threadpool(self._jobs.cancel, person, kind)
+        return to(request, "people", person.name)
+
+    async def progress(self, request: Request) -> Response:
+        """How far the person's check and fit are."""
+        return JSONResponse(progress(self._person(request), self._jobs))
+
+    async def delete(self, request: Request) -> Response:
+        """Remove the person with files and results; a fit at work is given up."""
+        person = self._person(request)
+        for kind in KINDS:
+            await run_in_threadpool(self._jobs.cancel, person, kind)
+        await run_in_threadpool(self._library.delete, person)
+        return to(request, "")
+
+    async def subject_file(self, request: Request) -> Response:
+        """The subject file, to save."""
+        return result_file(self._person(request).folder, "subject.toml")
+
+    async def check_file(self, request: Request) -> Response:
+        """A file that `check` wrote."""
+        return result_file(self._person(request).check, request.path_params["file"])
+
+    async def file(self, request: Request) -> Response:
+        """A file of the results."""
+        return result_file(self._person(request).results, request.path_params["file"])
+
+    async def zipped(self, request: Request) -> Response:
+        """All results."""
+        person = self._person(request)
+        if not person.fitted:
+            raise HTTPException(404, "there are no results yet")
+        return await run_in_threadpool(archive, person)
+
+    async def copy(self, request: Request) -> Response:
+        """Write the results into a folder that the user names."""
+        person = self._person(request)
+        try:
+            folder = chosen_folder((await form(request)).get("folder", ""))
+            await run_in_threadpool(_copied, person, folder)
+        except KinertiaError as error:
+            return await run_in_threadpool(person_page, request, person, self._jobs, str(error))
+        return await run_in_threadpool(person_page, request, person, self._jobs, said=f"The results are in {folder}.")
+
+    async def compare(self, request: Request) -> Response:
+        """The comparison of chosen results, in the page."""
+        from kinertia.report.comparison import MOST_FITS
+
+        chosen = self._chosen(request)
+        problem = "" if 2 <= len(chosen) <= MOST_FITS else f"Choose 2 to {MOST_FITS} people with results."
+        return page(request, "compare.html.j2", people=chosen, problem=problem, query=request.url.query)
+
+    async def compared(self, request: Request) -> Response:
+        """What `kinertia compare` writes of them."""
+        from kinertia.report.comparison import MOST_FITS, render_comparison
+        from kinertia.report.saved_fit import load_fit
+
+        chosen = self._chosen(request)
+        if not 2 <= len(chosen) <= MOST_FITS:
+            raise HTTPException(404, "nothing to compare")
+
+        def made() -> str:
+            return render_comparison({person.name: load_fit(person.results) for person in chosen})
+
+        return HTMLResponse(await run_in_threadpool(made), headers={"content-security-policy": RESULT_POLICY})
+
+    async def end(self, request: Request) -> Response:
+        """Stop the server."""
+        self._stop()
+        return page(request, "ended.html.j2")
+
+    def _person(self, request: Request) -> Person:
+        return expect(self._library.person(request.path_params["name"]))
+
+    def _idle(self, request: Request) -> Person:
+        person = self._person(request)
+        if self._jobs.busy(person):
+            raise HTTPException(409, "wait for the check or fit of this person, or cancel it, before changing anything")
+        return person
+
+    def _kind(self, request: Request) -> str:
+        kind: str = request.path_params["kind"]
+        if kind not in KINDS:
+            raise HTTPException(404, "no such action")
+        return kind
+
+    def _chosen(self, request: Request) -> list[Person]:
+        names = dict.fromkeys(request.query_params.getlist("person"))
+        people = [self._library.person(name) for name in names]
+        return [person for person in people if person is not None and person.fitted]
+
+    def _checked(self, request: Request, person: Person) -> Response:
+        person.note(saved=True)
+        if not trouble(person):
+            self._jobs.add(person, "check")
+        return to(request, "people", person.name)
+
+
+def _recognised(person: Person) -> None:
+    """As far as it goes; the person's page says what is wrong."""
+    try:
+        recognise(person)
+        person.note(draft="")
+    except KinertiaError as error:
+        person.note(draft=str(error))
+
+
+def _copied(person: Person, folder: Path) -> None:
+    """The results in another folder, complete or not at all."""
+    check_folder(folder)
+    expect_own_folder(folder)
+    with complete_folder(folder, "fit") as work:
+        shutil.copytree(person.results, work, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)
+
+
+async def _not_found(request: Request, error: Exception) -> Response:
+    """What is not there, in a page; scripts get it as JSON."""
+    assert isinstance(error, HTTPException)
+    return _told(request, error.detail, error.status_code)
+
+
+async def _trouble(request: Request, error: Exception) -> Response:
+    return _told(request, str(error), 422)
+
+
+async def _no_file(request: Request, error: Exception) -> Response:
+    """A full disk, a folder that may not be written to."""
+    assert isinstance(error, OSError)
+    where = "" if error.filename is None else f"{error.filename}: "
+    sentence = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
+    return _told(request, sentence, 500)
+
+
+async def _failed(request: Request, error: Exception) -> Response:
+    """Kinertia's own failure; the terminal has all of it."""
+    problem = traceback.format_exception_only(error)[-1].strip()
+    sentence = (
+        f"Kinertia failed, which it should not on any input ({problem}); "
+        "please send what its terminal shows to its developers"
+    )
+    return _told(request, sentence, 500)
+
+
+def _told(request: Request, sentence: str, status: int) -> Response:
+    if "application/json" in request.headers.get("accept", ""):
+        return JSONResponse({"problem": sentence}, status)
+    content: dict[str, Any] = {"sentence": sentence}
+    return page(request, "trouble.html.j2", status, **content)

@@ -1,0 +1,102 @@
+"""The server behind `kinertia app`: on 127.0.0.1, for one browser, with a token in its address."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import uvicorn
+
+from kinertia.app.guard import Guard
+from kinertia.app.jobs import Jobs
+from kinertia.app.library import Library
+from kinertia.app.routes import application
+from kinertia.errors import SettingsError
+
+_PATIENCE_S = 3
+"""What requests have to end in when the server stops."""
+
+
+class Server:
+    """Serves a library of people and their results until `stop`.
+
+    Attributes:
+        address: what to open in the browser; nothing answers without its token.
+    """
+
+    def __init__(
+        self, library: Library, port: int = 0, example: Path | None = None, warm_up: Sequence[str] = ()
+    ) -> None:
+        """Take the port, but answer nothing yet.
+
+        Args:
+            library: people and their results.
+            port: of 127.0.0.1; 0 takes a free one.
+            example: folder with a subject file to try it with.
+            warm_up: command that compiles what the first fit would compile.
+
+        Raises:
+            SettingsError: the port is another program's.
+        """
+        self._socket = _listening(port)
+        port = self._socket.getsockname()[1]
+        token = secrets.token_urlsafe(24)
+        self.address = f"http://127.0.0.1:{port}/{token}/"
+        self._jobs = Jobs(warm_up)
+        app = application(library, self._jobs, self.stop, example)
+        config = uvicorn.Config(
+            Guard(app, token, port),
+            ws="none",
+            http="h11",
+            loop="asyncio",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            timeout_graceful_shutdown=_PATIENCE_S,
+        )
+        self._server = uvicorn.Server(config)
+
+    def run(self) -> None:
+        """Answer until `stop` or Ctrl-C; fits that are still at work are given up then."""
+        with self._jobs.at_work():
+            self._server.run(sockets=[self._socket])
+
+    def stop(self) -> None:
+        """End soon; may be called from any thread."""
+        self._server.should_exit = True
+
+    @contextmanager
+    def in_background(self) -> Iterator[str]:
+        """Answers during the block; yields the address."""
+        thread = threading.Thread(target=self.run, daemon=True)
+        thread.start()
+        while not self._server.started and thread.is_alive():
+            time.sleep(0.01)
+        try:
+            yield self.address
+        finally:
+            self.stop()
+            thread.join()
+
+
+def _listening(port: int) -> socket.socket:
+    taken = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    if sys.platform == "win32":  # where SO_REUSEADDR lets another program listen, too
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+    else:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        taken.bind(("127.0.0.1", port))
+        taken.listen()  # a browser that is opened before `run` waits
+    except (OSError, OverflowError) as error:
+        taken.close()
+        problem = f"--port {port}: cannot be had ({error}); give another, or none for one that is free"
+        raise SettingsError(problem) from error
+    return taken

@@ -1,0 +1,164 @@
+"use strict";
+// Dropped files go to the library one by one; progress is asked for once a second. Everything else is forms and links.
+(() => {
+  const PAUSE_MS = 700;
+
+  // the files below a dropped folder or file, with their paths
+  async function filesOf(entry) {
+    if (entry.isFile) return [await new Promise((take, fail) => entry.file(take, fail))];
+    const reader = entry.createReader();
+    const files = [];
+    for (;;) {
+      const some = await new Promise((take, fail) => reader.readEntries(take, fail));
+      if (!some.length) return files;
+      for (const one of some) files.push(...(await filesOf(one)));
+    }
+  }
+
+  class Drop {
+    constructor(root) {
+      this.root = root;
+      this.status = root.querySelector("[role=status]");
+      this.problems = root.querySelector(".problems");
+      for (const name of ["dragenter", "dragover"]) root.addEventListener(name, (event) => this.over(event, true));
+      for (const name of ["dragleave", "drop"]) root.addEventListener(name, (event) => this.over(event, false));
+      root.addEventListener("drop", (event) => this.dropped(event.dataTransfer));
+      root.querySelectorAll("[data-files]").forEach((input) =>
+        input.addEventListener("change", () => this.take([...input.files], folderOf(input.files))));
+    }
+
+    over(event, on) {
+      event.preventDefault();
+      this.root.classList.toggle("over", on);
+    }
+
+    async dropped(data) {
+      const entries = [...data.items].map((item) => item.webkitGetAsEntry && item.webkitGetAsEntry()).filter(Boolean);
+      if (!entries.length) return this.take([...data.files], "");
+      const files = [];
+      for (const entry of entries) files.push(...(await filesOf(entry)));
+      const folder = entries.length === 1 && entries[0].isDirectory ? entries[0].name : "";
+      return this.take(files, folder);
+    }
+
+    async take(files, folder) {
+      this.problems.textContent = "";
+      const chosen = files.filter((file) => !file.name.startsWith("."));
+      if (!chosen.length) return this.problem("No files in it.");
+      try {
+        const person = this.root.dataset.person || (await this.newPerson(folder || stem(chosen)));
+        const address = `${this.root.dataset.root}/people/${encodeURIComponent(person)}`;
+        const taken = await this.send(chosen, address);
+        if (taken) this.status.textContent = "Looking at the files";
+        await this.post(`${address}/recognise`);
+        // what was refused can be read before the page goes on
+        if (!this.problems.childElementCount) location.assign(address);
+        else this.goOn(address, taken);
+      } catch (error) {
+        this.problem(error.message === "Failed to fetch" ? "Kinertia does not answer: is it still running?" : error.message);
+        this.status.textContent = "";
+      }
+      return undefined;
+    }
+
+    async newPerson(name) {
+      const answer = await this.post(`${this.root.dataset.root}/people`, new URLSearchParams({ name }));
+      return decodeURIComponent((await answer.json()).address.split("/").pop());
+    }
+
+    // how many were taken; the same name from two folders is taken once
+    async send(files, address) {
+      const names = new Set();
+      let taken = 0;
+      for (const [k, file] of files.entries()) {
+        this.status.textContent = `Copying ${k + 1} of ${files.length}: ${file.name}`;
+        const name = file.name.toLowerCase();
+        if (names.has(name)) {
+          this.problem(`${file.name}: another file of this name is in the folder; it was left out, rename one of them`);
+          continue;
+        }
+        names.add(name);
+        const largest = 1e6 * Number(this.root.dataset.largestMb);
+        if (file.size > largest) {
+          this.problem(`${file.name}: not taken: larger than ${this.root.dataset.largestMb} MB, the most of one file`);
+          continue;
+        }
+        const answer = await fetch(`${address}/files?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file, headers: { accept: "application/json" } });
+        if (answer.ok) taken += 1;
+        else this.problem((await answer.json()).problem);
+      }
+      return taken;
+    }
+
+    async post(address, body) {
+      const answer = await fetch(address, { method: "POST", body, headers: { accept: "application/json" } });
+      if (!answer.ok) throw new Error((await answer.json()).problem);
+      return answer;
+    }
+
+    problem(sentence) {
+      const item = document.createElement("li");
+      item.textContent = sentence;
+      this.problems.append(item);
+    }
+
+    goOn(address, taken) {
+      this.status.textContent = `${taken} file${taken === 1 ? "" : "s"} taken. `;
+      const link = document.createElement("a");
+      link.className = "button";
+      link.href = address;
+      link.textContent = "Go on";
+      this.status.append(link);
+      link.focus();
+    }
+  }
+
+  function folderOf(files) {
+    return files.length ? (files[0].webkitRelativePath || "").split("/")[0] : "";
+  }
+
+  function stem(files) {
+    const subject = files.length === 1 ? files[0].name : "";
+    return subject.replace(/\.[^.]*$/, "");
+  }
+
+  // asks how far it is; when it is done the page is loaded again
+  class Working {
+    constructor(root) {
+      this.root = root;
+      this.ask();
+    }
+
+    async ask() {
+      try {
+        const answer = await fetch(this.root.dataset.progress, { headers: { accept: "application/json" } });
+        if (answer.status === 404) return location.reload();
+        const job = (await answer.json())[this.root.dataset.kind];
+        if (!job) return this.done();
+        this.show(job);
+      } catch {
+        this.root.querySelector("[data-left]").textContent = "Kinertia does not answer: is it still running?";
+      }
+      return setTimeout(() => this.ask(), PAUSE_MS);
+    }
+
+    done() {
+      if (this.root.dataset.kind === "fit") location.hash = "results";
+      location.reload();
+    }
+
+    show(job) {
+      const stage = this.root.querySelector("[data-stage]");
+      if (stage.textContent !== job.stage) stage.textContent = job.stage;
+      const bar = this.root.querySelector("progress");
+      if (job.share > 0) bar.value = job.share;
+      else bar.removeAttribute("value");
+      this.root.querySelector("[data-left]").textContent = job.left;
+    }
+  }
+
+  document.querySelectorAll("[data-drop]").forEach((root) => new Drop(root));
+  document.querySelectorAll("[data-progress]").forEach((root) => new Working(root));
+  // a file that misses the place for it must not take the page away
+  for (const name of ["dragover", "drop"]) window.addEventListener(name, (event) => event.preventDefault());
+})();

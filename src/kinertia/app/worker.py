@@ -1,0 +1,96 @@
+"""A check or a fit of one person, in a process of its own: `python -m kinertia.app.worker fit FOLDER`.
+
+A crash does not take the page down, and whoever cancels ends the process. It says on standard output how far it is, a
+line of JSON each: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file or entry was at fault.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from kinertia.app.library import OUTCOME, SUBJECT, SUMMARY, Person
+from kinertia.errors import KinertiaError
+from kinertia.io.output_folder import complete_folder
+from kinertia.io.provenance import command_line, sha256
+from kinertia.io.subject_file import read_subject
+
+Progress = Callable[[str, float], None]
+
+
+def check(person: Person, progress: Progress) -> None:
+    """What `kinertia check` does with the subject file: check.html, and its findings for the page."""
+    from kinertia.checks.files import check_files, files_of_subject
+    from kinertia.report.check_page import save_check_page
+    from kinertia.trial.telling_movements import missing_movements
+
+    recordings, mistakes = check_files(
+        files_of_subject(read_subject(person.subject)), lambda share: progress("reading", share)
+    )
+    findings = [
+        {"title": title, "verdicts": [verdict._asdict() for verdict in found.verdicts]} for title, found in recordings
+    ]
+    advice = missing_movements(found.telling for _, found in recordings if found.plates)
+    with complete_folder(person.check, "app") as work:
+        save_check_page(recordings, (), mistakes, work)
+        _write(work, {"inputs": person.inputs, "findings": findings, "mistakes": mistakes, "advice": advice})
+
+
+def fit(person: Person, progress: Progress) -> None:
+    """What `kinertia fit` does with the subject file: the results, and the subject file that they are of."""
+    from kinertia.estimation.from_files import fit_subject
+    from kinertia.io.provenance import provenance_of
+    from kinertia.report.files import save_fit
+    from kinertia.report.headline import words
+
+    begun = time.time()
+    wanted = read_subject(person.subject)
+    result = fit_subject(wanted, progress)
+    progress("writing the results", 0.0)
+    told = words(result)
+    command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
+    with complete_folder(person.results, "app") as work:
+        save_fit(result, work, provenance_of(wanted, command))
+        (work / SUBJECT).write_bytes(person.subject.read_bytes())
+        ended = time.time()
+        _write(
+            work,
+            {
+                "inputs": person.inputs,
+                "summary": sha256(work / SUMMARY),
+                "level": told.level,
+                "headline": told.headline,
+                "ended": ended,
+                "seconds": round(ended - begun, 1),
+            },
+        )
+
+
+def _write(folder: Path, outcome: Mapping[str, Any]) -> None:
+    (folder / OUTCOME).write_text(json.dumps(outcome, indent=1) + "\n", encoding="utf-8")
+
+
+def _said(stream: TextIO, **values: object) -> None:
+    stream.write(json.dumps(values) + "\n")
+    stream.flush()
+
+
+def main(kind: str, folder: str) -> int:
+    """Do it; exit status 2 for an error in the person's files or entries."""
+    page, sys.stdout = sys.stdout, sys.stderr  # for nobody else's words
+    try:
+        {"check": check, "fit": fit}[kind](
+            Person(Path(folder)), lambda stage, share: _said(page, stage=stage, share=share)
+        )
+    except KinertiaError as error:
+        _said(page, error=str(error))
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(*sys.argv[1:]))

@@ -1,0 +1,59 @@
+"""`kinertia app`: the same in the browser, on this computer only."""
+
+from __future__ import annotations
+
+import sys
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kinertia.cli.measured_demo import FILES
+from kinertia.cli.terminal import out
+from kinertia.errors import KinertiaError
+
+_WARM_UP = (sys.executable, "-c", "from kinertia.cli.start import main; main()", "warm-up", "--quiet")
+"""`kinertia warm-up` in a process of its own."""
+_HOW = 'pip install "kinertia[app]"'
+
+
+def app(
+    folder: Annotated[
+        Path | None, typer.Option(help="Library of people and their results; Kinertia in your own folder if left out.")
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only show the address.")] = False,
+) -> None:
+    """Drop files on a page in the browser, check them, fit, read the report.
+
+    The page is served on this computer to this computer only, at an address
+    with a secret part; nothing is sent anywhere. What it keeps is in a folder
+    of yours, in the form that the other commands take. It ends with Ctrl-C or
+    the button on the page. Needs pip install "kinertia[app]".
+
+    [bold]Examples[/]
+
+    kinertia app
+
+    kinertia app --folder D:/gait --no-browser
+    """
+    try:
+        from kinertia.app.library import Library
+        from kinertia.app.server import Server
+    except ImportError as error:
+        if (error.name or str(error)).partition(".")[0] not in ("starlette", "uvicorn", "anyio"):
+            raise
+        problem = f"kinertia app needs starlette and uvicorn, which are not installed; install them: {_HOW}"
+        raise KinertiaError(problem) from None
+    library = Library(Path.home() / "Kinertia" if folder is None else folder)
+    with library.opened():
+        server = Server(library, port, FILES, _WARM_UP)
+        out.print(f"Kinertia is at {server.address}", soft_wrap=True)
+        out.print(f"library: {library.folder}; Ctrl-C ends it", soft_wrap=True)
+        if not no_browser:
+            webbrowser.open(server.address)
+        with suppress(KeyboardInterrupt):
+            server.run()
+    out.print("ended; everything that was finished is in the library")

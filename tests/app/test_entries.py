@@ -1,0 +1,218 @@
+"""From files to a subject file and back: the draft, the table of files, the form, the text."""
+
+import shutil
+import tomllib
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
+
+from command_line import run
+from kinertia.app.entries import USE, entries, fields, recognise, trouble, write_form, write_text
+from kinertia.app.file_table import file_table, uses_of, with_uses, within_folder
+from kinertia.app.library import Library
+from kinertia.errors import FileError, SettingsError
+from kinertia.io.subject_file import read_subject
+from kinertia.settings import Subject
+
+
+@pytest.fixture
+def person(tmp_path):
+    return Library(tmp_path / "library").add("Anna")
+
+
+def put(person, folder, *names):
+    for name in names:
+        shutil.copyfile(folder / name, person.folder / name)
+
+
+def used(person):
+    return {row.name: row.use for row in file_table(person.files(), entries(person)) if row.use}
+
+
+GAIT2354 = ("subject01_static.trc", "subject01_walk1.trc", "subject01_walk1_grf.mot", "subject01_walk1_grf.xml")
+RAJAGOPAL = ("static_walk_1.trc", "motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")
+
+
+def test_c3d_files_are_recognised_and_what_lacks_is_said_as_by_the_command_line(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    assert used(person) == {"static.c3d": "static", "walk.c3d": "trial"}
+    assert "[subject] lacks 'sex'" in trouble(person)
+    assert trouble(person) in " ".join(run("fit", person.subject, "-o", person.results).err.split())
+    write_form(person, {"sex": "male", "mass_kg": "41,5", "height_m": "1.61"})
+    assert trouble(person) == ""
+    wanted = read_subject(person.subject)
+    assert (wanted.subject.mass_kg, wanted.subject.height_m, wanted.subject.sex) == (41.5, 1.61, "male")
+    assert wanted.subject.name == "Anna"
+
+
+def test_forces_and_loads_go_with_their_walk(person, shared_data):
+    put(person, shared_data / "gait2354", *GAIT2354)
+    recognise(person)
+    walk = "subject01_walk1.trc"
+    assert used(person) == dict(zip(GAIT2354, ("static", "trial", f"forces:{walk}", f"loads:{walk}"), strict=True))
+
+
+def test_a_model_takes_the_place_of_a_static_trial_that_is_not_there(person, shared_data):
+    put(person, shared_data / "rajagopal_walk", *RAJAGOPAL[1:], "scaled.osim")
+    recognise(person)
+    walk = "motion_capture_walk.trc"
+    assert used(person) == {walk: "trial", "grf_walk.mot": f"forces:{walk}", "grf_walk.xml": f"loads:{walk}"} | {
+        "scaled.osim": "osim"
+    }
+    write_form(person, {"mass_kg": "85"})
+    assert trouble(person) == ""
+
+
+def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, shared_data):
+    put(person, shared_data / "rajagopal_walk", *RAJAGOPAL, "scaled.osim")
+    recognise(person)
+    assert used(person)["static_walk_1.trc"] == "static"
+    assert "scaled.osim" not in used(person)
+    write_form(person, {USE + "scaled.osim": "osim", "mass_kg": "85"})
+    assert used(person)["scaled.osim"] == "osim"
+    assert "static_walk_1.trc" not in used(person)
+    assert trouble(person) == ""
+    write_form(person, {USE + "scaled.osim": "", USE + "static_walk_1.trc": "static", "sex": "male"})
+    assert used(person)["static_walk_1.trc"] == "static"
+    assert trouble(person) == ""
+
+
+def test_forces_of_another_person_are_not_taken(tmp_path, shared_data):
+    library = Library(tmp_path)
+    anna, ben = library.add("Anna"), library.add("Ben")
+    put(anna, shared_data / "gait2354", *GAIT2354[:2])
+    put(ben, shared_data / "gait2354", *GAIT2354[2:])
+    recognise(anna)
+    assert used(anna) == {GAIT2354[0]: "static", GAIT2354[1]: "trial"}
+
+
+def test_what_was_corrected_stays_when_files_are_added_or_removed(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    write_form(person, {"sex": "female", "mass_kg": "50", USE + "walk.c3d": "", USE + "static.c3d": "static"})
+    shutil.copyfile(measured_walk / "static.c3d", person.folder / "walk2.c3d")
+    recognise(person)
+    assert used(person) == {"static.c3d": "static", "walk2.c3d": "trial"}
+    assert entries(person)["subject"]["mass_kg"] == 50.0
+    (person.folder / "walk2.c3d").unlink()
+    recognise(person)
+    assert used(person) == {"static.c3d": "static"}
+    assert "trial" in trouble(person)
+
+
+def test_two_files_for_one_use_are_an_error(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    before = person.subject.read_text(encoding="utf-8")
+    with pytest.raises(SettingsError, match=r"static.c3d and walk.c3d are both used as static; choose one"):
+        write_form(person, {USE + "walk.c3d": "static"})
+    assert person.subject.read_text(encoding="utf-8") == before
+
+
+@pytest.mark.parametrize(("mass", "sentence"), [("4150", "mass_kg = 4150"), ("-3", "mass_kg = -3")])
+def test_an_impossible_mass_has_the_command_lines_message(person, measured_walk, mass, sentence):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    write_form(person, {"sex": "male", "mass_kg": mass})
+    assert sentence in trouble(person)
+    assert trouble(person) in " ".join(run("check", person.subject).err.split())
+
+
+def test_what_is_no_number_is_said_and_nothing_is_written(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    before = person.subject.read_text(encoding="utf-8")
+    with pytest.raises(SettingsError, match=r"Body mass \(kg\): 'heavy' is not a number; write it like 72.6"):
+        write_form(person, {"mass_kg": "heavy"})
+    assert person.subject.read_text(encoding="utf-8") == before
+    assert {field.key: field.value for field in fields(entries(person), {"mass_kg": "heavy"})}["mass_kg"] == "heavy"
+
+
+def test_a_subject_file_that_was_dropped_is_used_with_all_its_entries(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    (person.folder / "anna spring.toml").write_text(
+        '[subject]\nsex = "f"\nmass_kg = 50\nknee_width_mm = 100.0\n[model]\nstatic = "C:\\\\lab\\\\static.c3d"\n'
+        '[[trial]]\nname = "second"\nmarkers = "../lab/walk.c3d"\nwindow_s = [2.8, 3.4]\n'
+        '[settings]\ncutoff_hz = 6\n[segment.thigh_r]\nmass_kg = "8.9 +- 0.4"\nsource = "DXA, \\"spring\\""\n',
+        encoding="utf-8",
+    )
+    recognise(person)
+    assert trouble(person) == ""
+    write_form(person, {"sex": "female", "mass_kg": "51", "knee_width_mm": "100"})
+    wanted = read_subject(person.subject)
+    assert wanted.trials[0].markers == (person.folder / "walk.c3d").resolve()
+    assert (wanted.trials[0].name, wanted.trials[0].window_s) == ("second", (2.8, 3.4))
+    assert wanted.settings.cutoff_hz == 6
+    assert wanted.segments["thigh_r"].mass_kg == (8.9, 0.4)
+    assert wanted.segments["thigh_r"].source == 'DXA, "spring"'
+    assert (wanted.subject.mass_kg, wanted.subject.knee_width_mm) == (51.0, 100.0)
+
+
+def test_no_file_outside_the_folder_is_read(person, tmp_path, measured_walk):
+    put(person, measured_walk, "walk.c3d")
+    outside = (tmp_path / "elsewhere.c3d").as_posix()
+    shutil.copyfile(measured_walk / "static.c3d", outside)
+    write_text(person, f'[subject]\nsex="f"\n[model]\nstatic="{outside}"\n[[trial]]\nmarkers="walk.c3d"\n')
+    assert "no such file" in trouble(person)
+    within = within_folder(
+        {
+            "model": {"osim": "C:b.osim", "markers": "/a/set.toml"},
+            "prior": {"bsp": "../bsp.csv", "population": "~/group.toml"},
+            "instruments": {"session": "\\\\server\\s.toml"},
+            "trial": [{"forces": "x/y.mot", "loads": "~/z.xml", "markers": "w.trc"}],
+        }
+    )
+    assert within["model"] == {"osim": "b.osim", "markers": "set.toml"}
+    assert (within["prior"], within["instruments"]) == (
+        {"bsp": "bsp.csv", "population": "group.toml"},
+        {"session": "s.toml"},
+    )
+    assert within["trial"] == [{"forces": "y.mot", "loads": "z.xml", "markers": "w.trc"}]
+
+
+def test_text_that_is_not_toml_changes_nothing(person):
+    write_text(person, '[subject]\r\nsex = "f"\r\n')
+    with pytest.raises(FileError, match="line 2: not valid TOML"):
+        write_text(person, "[subject]\nsex = f\n")
+    assert person.subject.read_text(encoding="utf-8") == '[subject]\nsex = "f"\n'
+
+
+def test_without_recordings_the_command_lines_message_is_raised(person):
+    (person.folder / "notes.csv").write_text("a,b\n")
+    with pytest.raises(FileError, match="holds no file of markers"):
+        recognise(person)
+
+
+def test_the_table_gives_the_entries_back():
+    content = {
+        "subject": {"sex": "male"},
+        "model": {"static": "s.trc", "markers": "plug-in-gait", "length_unit": "mm"},
+        "trial": [{"markers": "w.trc", "forces": "w.mot", "window_s": [1, 2]}, {"markers": "v.trc"}],
+        "prior": {"bsp": "bsp.csv", "masses_kept": True},
+    }
+    uses = {name: use for name, use in uses_of(content).items() if name != "plug-in-gait"}
+    assert with_uses(content, uses) == content
+
+
+def test_the_form_has_every_entry_of_the_person():
+    shown = {field.key: field for field in fields({"subject": {"sex": "f", "age_years": 9.0}})}
+    assert set(shown) == set(Subject.model_fields)
+    assert (shown["sex"].value, shown["sex"].choices) == ("female", ("male", "female"))
+    assert shown["population"].choices == ("adult", "child", "elderly", "obese")
+    assert shown["age_years"].value == "9.0"
+    assert not shown["mass_kg"].choices
+
+
+def test_age_population_and_what_is_attached_reach_the_subject_file(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    text = person.subject.read_text(encoding="utf-8")
+    attached = '[[attached]]\nname = "rucksack"\nsegment = "torso"\nmass_kg = "8.0 +- 0.1"\n'
+    write_text(person, text + attached)
+    write_form(person, {"sex": "male", "mass_kg": "41.5", "age_years": "11,5", "population": "child"})
+    content = entries(person)
+    assert content["attached"] == [{"name": "rucksack", "segment": "torso", "mass_kg": "8.0 +- 0.1"}]
+    wanted = tomllib.loads(person.subject.read_text(encoding="utf-8"))["subject"]
+    assert (wanted["age_years"], wanted["population"]) == (11.5, "child")

@@ -1,0 +1,148 @@
+"""People in line: order, progress, cancelling, crashes. Workers are small programs that do as the real one does."""
+
+import json
+import sys
+import time
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
+
+from kinertia.app import jobs as module
+from kinertia.app.jobs import Jobs
+from kinertia.app.library import Library
+from kinertia.app.person_page import progress
+
+_PATIENCE_S = 30
+
+
+@pytest.fixture
+def library(tmp_path):
+    return Library(tmp_path / "library")
+
+
+@pytest.fixture
+def worker(monkeypatch):
+    """Replaces the worker by a program; `folder` and `say` are defined in it."""
+
+    def replace(program):
+        lead = (
+            "import json, pathlib, sys, time, os\nfolder = pathlib.Path(sys.argv[2])\n"
+            "def say(**told): print(json.dumps(told), flush=True)\n"
+        )
+        monkeypatch.setattr(module, "WORKER", (sys.executable, "-c", lead + program))
+
+    return replace
+
+
+def until(condition):
+    ends = time.monotonic() + _PATIENCE_S
+    while not condition():
+        assert time.monotonic() < ends, "it did not come about"
+        time.sleep(0.02)
+
+
+def test_people_are_done_one_after_the_other(library, worker):
+    worker("(folder.parent / 'order').open('a').write(folder.name + ' '); time.sleep(0.1)")
+    people, jobs = [library.add(name) for name in ("C", "A", "B")], Jobs()
+    for person in people:
+        jobs.add(person, "fit")
+        jobs.add(person, "fit")
+    assert [jobs.place(jobs.of(person, "fit")) for person in people] == [0, 1, 2]
+    assert progress(people[2], jobs)["fit"]["stage"] == "waiting for 2 others"
+    with jobs.at_work():
+        until(lambda: not any(map(jobs.busy, people)))
+    assert (library.folder / "order").read_text().split() == ["C", "A", "B"]
+    assert [person.notes()["fit"] for person in people] == [{}, {}, {}]
+
+
+def test_progress_and_time_left_are_of_the_stage(library, worker):
+    worker("say(stage='estimate', share=0.25)\nwhile not (folder / 'go').exists(): time.sleep(0.02)")
+    person, jobs = library.add("Anna"), Jobs()
+    with jobs.at_work():
+        jobs.add(person, "fit")
+        until(lambda: progress(person, jobs)["fit"]["share"] == 0.25)
+        told = progress(person, jobs)
+        assert told["fit"]["stage"] == "estimate"
+        assert told["fit"]["left"].startswith("about ")
+        assert told["check"] is None
+        (person.folder / "go").touch()
+        until(lambda: not jobs.busy(person))
+
+
+def test_an_error_in_the_files_is_the_persons_note(library, worker):
+    worker("say(error='walk.c3d: no force plate in it'); sys.exit(2)")
+    person, jobs = library.add("Anna"), Jobs()
+    with jobs.at_work():
+        jobs.add(person, "fit")
+        until(lambda: not jobs.busy(person))
+    assert person.notes()["fit"] == {"how": "failed", "message": "walk.c3d: no force plate in it"}
+
+
+def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
+    worker("print('noise')\nif folder.name == 'Anna': os.abort()\nsay(stage='done', share=1.0)")
+    anna, ben, jobs = library.add("Anna"), library.add("Ben"), Jobs()
+    with jobs.at_work():
+        jobs.add(anna, "fit")
+        jobs.add(ben, "fit")
+        until(lambda: not jobs.busy(ben))
+    assert "Kinertia failed" in anna.notes()["fit"]["message"]
+    assert str(anna.folder / "failure.log") in anna.notes()["fit"]["message"]
+    assert ben.notes()["fit"] == {}
+
+
+def test_who_waits_and_who_is_at_work_are_cancelled(library, worker):
+    worker("say(stage='estimate', share=0.1); time.sleep(60)")
+    anna, ben, jobs = library.add("Anna"), library.add("Ben"), Jobs()
+    with jobs.at_work():
+        jobs.add(anna, "fit")
+        jobs.add(ben, "fit")
+        until(lambda: progress(anna, jobs)["fit"]["stage"] == "estimate")
+        process = jobs.of(anna, "fit")._process
+        jobs.cancel(ben, "fit")
+        jobs.cancel(anna, "fit")
+        assert not jobs.busy(anna)
+        assert not jobs.busy(ben)
+        assert process.poll() is not None
+    assert anna.notes()["fit"] == ben.notes()["fit"] == {"how": "cancelled"}
+
+
+def test_what_is_at_work_when_the_server_ends_is_interrupted(library, worker):
+    worker("say(stage='estimate', share=0.1); time.sleep(60)")
+    anna, ben, jobs = library.add("Anna"), library.add("Ben"), Jobs()
+    with jobs.at_work():
+        jobs.add(anna, "fit")
+        jobs.add(ben, "fit")
+        until(lambda: progress(anna, jobs)["fit"]["stage"] == "estimate")
+        process = jobs.of(anna, "fit")._process
+    assert process.poll() is not None
+    assert anna.notes()["fit"] == ben.notes()["fit"] == {"how": "interrupted"}
+
+
+def test_a_check_does_not_wait_for_fits(library, worker):
+    worker("time.sleep(60 if sys.argv[1] == 'fit' else 0)")
+    person, jobs = library.add("Anna"), Jobs()
+    with jobs.at_work():
+        jobs.add(person, "fit")
+        jobs.add(person, "check")
+        until(lambda: jobs.of(person, "check") is None)
+        assert jobs.of(person, "fit") is not None
+
+
+def test_fits_wait_for_what_is_compiled_once_and_its_end_ends_it(library, worker, monkeypatch):
+    monkeypatch.setattr(module, "is_compiled", lambda: False)
+    worker("pass")
+    person = library.add("Anna")
+    jobs = Jobs((sys.executable, "-c", "import time; time.sleep(60)"))
+    with jobs.at_work():
+        jobs.add(person, "fit")
+        until(lambda: jobs.compiling)
+        assert progress(person, jobs)["fit"]["stage"].startswith("compiling, once on a computer")
+    assert not jobs.compiling
+    assert person.notes()["fit"] == {"how": "interrupted"}
+
+
+def test_lines_of_others_are_passed_over():
+    assert module._line("ezc3d says hello") == {}
+    assert module._line("[1]") == {}
+    assert module._line(json.dumps({"stage": "x", "share": 1.0})) == {"stage": "x", "share": 1.0}

@@ -1,0 +1,99 @@
+"""What addresses answer besides pages to look at: comparison, zip, troubles, a person that is busy."""
+
+import io
+import json
+import shutil
+import zipfile
+from urllib.parse import quote
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
+pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
+
+from app_server import running
+from kinertia.app import routes
+from kinertia.app.jobs import Jobs
+
+
+@pytest.fixture
+def app(tmp_path, measured_walk):
+    with running(tmp_path / "library", measured_walk) as served:
+        yield served
+
+
+def with_results(app, name, folder):
+    person = app.library.add(name)
+    shutil.copytree(folder, person.results)
+    return person
+
+
+@pytest.mark.slow
+def test_people_are_compared_as_on_the_command_line(app, measured_demo):
+    for name in ("Anna", "Ben"):
+        with_results(app, name, measured_demo.folder)
+    page = app.ask("/compare?person=Anna&person=Ben")
+    assert page.status == 200
+    assert "Anna, Ben; the first is what the others are compared with" in " ".join(page.text.split())
+    compared = app.ask("/compare/page?person=Anna&person=Ben")
+    assert "Comparison: Anna, Ben" in compared.text
+    assert "sandbox" in compared.headers["content-security-policy"]
+    assert "written by the command line" in app.ask("/people/Anna").text
+
+
+def test_who_has_no_results_is_not_compared(app):
+    app.library.add("Anna")
+    assert "Choose 2 to" in app.ask("/compare?person=Anna&person=Anna").text
+    assert app.ask("/compare/page?person=Anna&person=../Anna").status == 404
+
+
+def test_the_zip_has_all_results_under_the_persons_name(app, tmp_path):
+    (tmp_path / "results" / "walk").mkdir(parents=True)
+    for name in ("fit.json", "subject.toml", "walk/kinematics.mot", ".kinertia.json"):
+        (tmp_path / "results" / name).write_text("{}")
+    with_results(app, "Änne", tmp_path / "results")
+    answer = app.ask(f"/people/{quote('Änne')}/results.zip")
+    assert answer.headers["content-disposition"] == "attachment; filename*=utf-8''%C3%84nne.zip"
+    packed = zipfile.ZipFile(io.BytesIO(answer.body))
+    assert sorted(packed.namelist()) == ["Änne/fit.json", "Änne/subject.toml", "Änne/walk/kinematics.mot"]
+    assert app.ask("/people/nobody/results.zip").status == 404
+
+
+def test_while_a_person_is_busy_nothing_is_changed(app, monkeypatch):
+    person = app.library.add("Anna")
+    monkeypatch.setattr(Jobs, "busy", lambda self, person: True)
+    answer = app.post("/people/Anna/files?name=walk.trc", b"content", Accept="application/json")
+    assert answer.status == 409
+    assert "wait for the check or fit" in json.loads(answer.text)["problem"]
+    for action in ("entries", "text", "remove", "recognise", "markers"):
+        assert app.post(f"/people/Anna/{action}", "text=x").status == 409
+    assert person.files() == []
+
+
+def test_a_failure_of_ours_is_said_and_the_page_goes_on(app, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(routes, "standing", broken)
+    app.library.add("Anna")
+    answer = app.ask("/")
+    assert answer.status == 500
+    assert "Kinertia failed, which it should not on any input (RuntimeError: a bug)" in answer.text
+    assert app.ask("/people/Anna").status == 200
+
+
+def test_a_disk_without_space_is_said(app, monkeypatch):
+    async def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(routes, "receive", full)
+    app.library.add("Anna")
+    answer = app.post("/people/Anna/files?name=walk.trc", b"content", Accept="application/json")
+    assert "No space left on device; check the path, its permissions" in json.loads(answer.text)["problem"]
+
+
+def test_what_cannot_be_fitted_does_not_wait(app):
+    person = app.library.add("Anna")
+    assert app.post("/people/Anna/fit").status == 303
+    assert app.post("/people/Anna/explode").status == 404
+    assert person.notes() == {}
