@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from kinertia.app.library import Library
-from kinertia.app.server import Server
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.server import Server
 
 
 @dataclass(frozen=True)

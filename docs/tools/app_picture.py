@@ -10,9 +10,9 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from kinertia.app.library import Library
-from kinertia.app.server import Server
 from kinertia.cli.measured_demo import FILES
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.server import Server
 
 PICTURE = Path(__file__).resolve().parents[1] / "figures" / "app.png"
 _CHROMIUM = "/usr/bin/chromium"

@@ -17,7 +17,7 @@ PROGRAM = "from kinertia.cli.start import main; main()"
 
 @pytest.mark.parametrize("package", ["starlette", "uvicorn"])
 def test_without_the_extra_it_says_how_to_install_it(without, monkeypatch, tmp_path, package):
-    for name in [name for name in sys.modules if name.startswith(("kinertia.app", package))]:
+    for name in [name for name in sys.modules if name.startswith(("kinertia.cli.web", package))]:
         monkeypatch.delitem(sys.modules, name)
     without(package)
     outcome = run("app", "--folder", tmp_path / "library", "--no-browser")
@@ -61,7 +61,7 @@ def test_it_shows_its_address_and_ends_in_order(tmp_path):
 
 def test_the_browser_is_opened_at_the_address(monkeypatch, tmp_path):
     pytest.importorskip("uvicorn")
-    from kinertia.app.server import Server
+    from kinertia.cli.web.server import Server
 
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)

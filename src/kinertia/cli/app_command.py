@@ -40,8 +40,8 @@ def app(
     kinertia app --folder D:/gait --no-browser
     """
     try:
-        from kinertia.app.library import Library
-        from kinertia.app.server import Server
+        from kinertia.cli.web.library import Library
+        from kinertia.cli.web.server import Server
     except ImportError as error:
         if (error.name or str(error)).partition(".")[0] not in ("starlette", "uvicorn", "anyio"):
             raise

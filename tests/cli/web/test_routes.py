@@ -12,8 +12,8 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 
 from app_server import running
-from kinertia.app import routes
-from kinertia.app.jobs import Jobs
+from kinertia.cli.web import routes
+from kinertia.cli.web.jobs import Jobs
 
 
 @pytest.fixture

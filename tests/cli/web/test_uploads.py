@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from app_server import running
 from command_line import run
-from kinertia.app import uploads
-from kinertia.app.library import Library
-from kinertia.app.uploads import harmless_name, receive
+from kinertia.cli.web import uploads
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.uploads import harmless_name, receive
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere
 

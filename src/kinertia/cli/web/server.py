@@ -13,10 +13,10 @@ from pathlib import Path
 
 import uvicorn
 
-from kinertia.app.guard import Guard
-from kinertia.app.jobs import Jobs
-from kinertia.app.library import Library
-from kinertia.app.routes import application
+from kinertia.cli.web.guard import Guard
+from kinertia.cli.web.jobs import Jobs
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.routes import application
 from kinertia.errors import SettingsError
 
 _PATIENCE_S = 3

@@ -16,14 +16,14 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from kinertia.app.entries import recognise, trouble, write_form, write_text
-from kinertia.app.guard import RESULT_POLICY
-from kinertia.app.jobs import KINDS, Jobs
-from kinertia.app.library import Library, Person
-from kinertia.app.marker_routes import marker_routes
-from kinertia.app.person_page import person_page, progress, standing
-from kinertia.app.responses import archive, chosen_folder, expect, form, page, result_file, to
-from kinertia.app.uploads import ENDINGS, LIMITS, receive
+from kinertia.cli.web.entries import recognise, trouble, write_form, write_text
+from kinertia.cli.web.guard import RESULT_POLICY
+from kinertia.cli.web.jobs import KINDS, Jobs
+from kinertia.cli.web.library import Library, Person
+from kinertia.cli.web.marker_routes import marker_routes
+from kinertia.cli.web.person_page import person_page, progress, standing
+from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, to
+from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import check_folder, complete_folder, expect_own_folder
 

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app_server import running
-from kinertia.app.jobs import Jobs
-from kinertia.app.library import Library, started
-from kinertia.app.person_page import standing
+from kinertia.cli.web.jobs import Jobs
+from kinertia.cli.web.library import Library, started
+from kinertia.cli.web.person_page import standing
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere
 from kinertia.io.provenance import sha256

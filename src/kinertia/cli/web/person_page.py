@@ -10,12 +10,12 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from kinertia.app.entries import USE, entries, fields, trouble
-from kinertia.app.file_table import file_table
-from kinertia.app.jobs import KINDS, Job, Jobs
-from kinertia.app.library import Person
-from kinertia.app.responses import page
-from kinertia.app.uploads import LIMITS
+from kinertia.cli.web.entries import USE, entries, fields, trouble
+from kinertia.cli.web.file_table import file_table
+from kinertia.cli.web.jobs import KINDS, Job, Jobs
+from kinertia.cli.web.library import Person
+from kinertia.cli.web.responses import page
+from kinertia.cli.web.uploads import LIMITS
 from kinertia.errors import KinertiaError
 
 _ENDED = {

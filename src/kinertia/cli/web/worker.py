@@ -1,4 +1,4 @@
-"""A check or a fit of one person, in a process of its own: `python -m kinertia.app.worker fit FOLDER`.
+"""A check or a fit of one person, in a process of its own: `python -m kinertia.cli.web.worker fit FOLDER`.
 
 A crash does not take the page down, and whoever cancels ends the process. It says on standard output how far it is, a
 line of JSON each: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file or entry was at fault.
@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
-from kinertia.app.library import OUTCOME, SUBJECT, SUMMARY, Person
+from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, Person
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import command_line, sha256

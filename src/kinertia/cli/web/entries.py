@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-from kinertia.app.file_table import (
+from kinertia.cli.web.file_table import (
     Content,
     file_table,
     is_subject_file,
@@ -15,7 +15,7 @@ from kinertia.app.file_table import (
     with_uses,
     within_folder,
 )
-from kinertia.app.library import SUBJECT, Person
+from kinertia.cli.web.library import SUBJECT, Person
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject_draft import init_subject

@@ -16,8 +16,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response, StreamingResponse
 
-from kinertia.app.guard import RESULT_POLICY
-from kinertia.app.library import Person
+from kinertia.cli.web.guard import RESULT_POLICY
+from kinertia.cli.web.library import Person
 from kinertia.errors import FileError
 from kinertia.io.provenance import VERSION
 
@@ -28,7 +28,7 @@ _PIECE = 1 << 20
 @cache
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kinertia.app"),
+        loader=jinja2.PackageLoader("kinertia.cli.web"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from kinertia.app.library import Person, started
+from kinertia.cli.web.library import Person, started
 from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit")
 LOG = "failure.log"
-WORKER = (sys.executable, "-m", "kinertia.app.worker")
+WORKER = (sys.executable, "-m", "kinertia.cli.web.worker")
 _PATIENCE_S, _PAUSE_S = 5.0, 0.1
 _NO_WINDOW: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """Windows opens a console for every process otherwise."""

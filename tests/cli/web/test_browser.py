@@ -13,8 +13,8 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_server import running
-from kinertia.app import jobs
 from kinertia.cli.measured_demo import FILES
+from kinertia.cli.web import jobs
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.provenance import sha256
 from kinertia.io.subject_file import read_subject

@@ -9,9 +9,9 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 
 from app_server import running
-from kinertia.app.guard import RESULT_POLICY
-from kinertia.app.library import Library
-from kinertia.app.server import Server
+from kinertia.cli.web.guard import RESULT_POLICY
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.server import Server
 from kinertia.errors import FileError, SettingsError
 
 

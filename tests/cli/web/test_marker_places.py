@@ -10,10 +10,10 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 
 from app_server import running
-from kinertia.app.entries import entries, write
-from kinertia.app.library import Library
-from kinertia.app.marker_places import FILE, marker_places, save_places
-from kinertia.app.marker_routes import in_words
+from kinertia.cli.web.entries import entries, write
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.marker_places import FILE, marker_places, save_places
+from kinertia.cli.web.marker_routes import in_words
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.subject_file import read_subject

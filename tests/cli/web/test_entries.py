@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
 from command_line import run
-from kinertia.app.entries import USE, entries, fields, recognise, trouble, write_form, write_text
-from kinertia.app.file_table import file_table, uses_of, with_uses, within_folder
-from kinertia.app.library import Library
+from kinertia.cli.web.entries import USE, entries, fields, recognise, trouble, write_form, write_text
+from kinertia.cli.web.file_table import file_table, uses_of, with_uses, within_folder
+from kinertia.cli.web.library import Library
 from kinertia.errors import FileError, SettingsError
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Subject

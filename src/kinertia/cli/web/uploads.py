@@ -7,8 +7,8 @@ import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from kinertia.app.library import Person
 from kinertia.checks.files import unknown_kind
+from kinertia.cli.web.library import Person
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere, last_part, same_folder
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES

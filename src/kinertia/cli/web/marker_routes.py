@@ -12,11 +12,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from kinertia.app.entries import trouble
-from kinertia.app.jobs import Jobs
-from kinertia.app.library import Library, Person
-from kinertia.app.marker_places import MarkerPlaces, marker_places, save_places
-from kinertia.app.responses import expect, form, page, to
+from kinertia.cli.web.entries import trouble
+from kinertia.cli.web.jobs import Jobs
+from kinertia.cli.web.library import Library, Person
+from kinertia.cli.web.marker_places import MarkerPlaces, marker_places, save_places
+from kinertia.cli.web.responses import expect, form, page, to
 from kinertia.errors import KinertiaError
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS
 

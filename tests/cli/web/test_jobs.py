@@ -8,10 +8,10 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
-from kinertia.app import jobs as module
-from kinertia.app.jobs import Jobs
-from kinertia.app.library import Library
-from kinertia.app.person_page import progress
+from kinertia.cli.web import jobs as module
+from kinertia.cli.web.jobs import Jobs
+from kinertia.cli.web.library import Library
+from kinertia.cli.web.person_page import progress
 
 _PATIENCE_S = 30
 
