@@ -158,7 +158,10 @@ def test_unknown_key_in_every_table(folder, table):
     table = "segment.thigh_r" if table == "segment" else table
     heading = f"[[{table}]]" if table in ("trial", "attached") else f"[{table}]"
     text = GOOD if heading in GOOD else f"{GOOD}\n{heading}\n"
-    text = text.replace(heading, f"{heading}\nzzz = 1", 1)
+    entry = "zzz = 1"
+    if table == "attached":
+        entry += '\nname = "a"\nsegment = "torso"\nmass_kg = 1\non_scale = true\ncom_mm = [0, 0, 0]'
+    text = text.replace(heading, f"{heading}\n{entry}", 1)
     with pytest.raises(FileError, match=rf"unknown key 'zzz' in \[{table}\]; known: "):
         read(folder, text)
 
@@ -200,7 +203,7 @@ CASES = [
     ("height_m = 1.68", "height_m = 168", 4, "centimetres"),
     ('"static.trc"', '"sttaic.trc"', 7, "did you mean 'static.trc'?"),
     ('"static.trc"', "7", 7, "static = 7: must be a path in quotes"),
-    ('"plug-in-gait"', '"plugin"', 8, "'opencap', 'opencap-mocap', 'plug-in-gait', 'rajagopal', 'rajagopal-run'"),
+    ('"plug-in-gait"', '"plugin"', 8, "'opencap', 'opencap-mocap', 'plug-in-gait', 'plug-in-gait-lower-body'"),
     ('name = "second"', 'name = "walk1"', 18, "trial 'walk1' is there already"),
     ('name = "second"', 'name = ""', 18, "must be a name that a folder can have"),
     ('name = "second"', 'name = "../second"', 18, "must be a name that a folder can have"),

@@ -67,7 +67,7 @@ def test_faults_are_counted_by_walk():
         FaultOutcome("one", "b", "silent"),
         FaultOutcome("other", "b", "not possible"),
     ]
-    page = render_faults(sound, outcomes)
+    page = render_faults(sound, outcomes, sound[:1])
     (figure,) = drawn(page).values()
     assert {trace["name"]: trace["x"] for trace in figure["data"]} == {
         "named": [1, 1],
