@@ -49,7 +49,7 @@ def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
     )
     plain, grouped = (prepare_subject(path) for path in (subject, with_group))
     assert any("learnt from 5 people" in note for note in grouped.notes)
-    assert np.all(grouped.prior.sd <= 1.01 * plain.prior.sd)
+    assert np.all(grouped.prior.sd <= 1.01 * np.sqrt(1.5) * plain.prior.sd)
     assert grouped.prior.sd.min() > 0
     own = recordings(read_subject(subject))[0]
     with_own = (tmp_path / "population.toml").read_text(encoding="utf-8").replace("hash2", own)

@@ -2,9 +2,10 @@
 
 Each person's recordings say little about most parameters; all together they say much about *their* mean and spread. A
 fit's posterior is its prior times what the recordings say; taken apart, the latter of all people is joined with a
-prior of the group: the literature's variance, of which one half is how far a group's mean may be from the tables, and
-the other half how far its people are from their mean. Expectation-maximisation (Dempster, Laird & Rubin 1977, J R Stat
-Soc B 39:1) finds the mean and covariance of the group; where the people say nothing the literature's stays.
+prior of the group: its people are as far from their mean as the literature's are, and their mean is off the tables by
+half of that variance. Expectation-maximisation (Dempster, Laird & Rubin 1977, J R Stat Soc B 39:1) finds the mean and
+covariance of the group. Where the people say nothing, its error bars are wider than the literature's, which are those
+of a person of the tables.
 
 All in relative parameters: distance from the person's own literature values, in the literature's deviations.
 """
@@ -23,8 +24,8 @@ from kinertia.estimation.result import Fit
 from kinertia.io.population_file import PopulationFile
 from kinertia.model.bsp import BodySegmentParameters
 
-BETWEEN_SHARE = 0.5
-"""Of the literature's variance: how far the mean of a group may be from the tables; the rest is within the group."""
+BETWEEN, WITHIN = 0.5, 1.0
+"""Variance of a group's mean about the tables, and of its people about their mean, over the literature's."""
 PSEUDO_PEOPLE = 30.0
 """The literature's spread within a group counts as much as so many people."""
 FEWEST_PEOPLE = 5
@@ -74,8 +75,8 @@ class LearntPrior:
 
     @property
     def learnt(self) -> np.ndarray:
-        """(10 s,) 1 - variance / the literature's: 0 nothing learnt."""
-        result: np.ndarray = 1.0 - np.diag(self.covariance)
+        """(10 s,) 1 - variance / that of a group of which nothing is known: 0 nothing learnt."""
+        result: np.ndarray = 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN)
         return result
 
     @classmethod
@@ -163,14 +164,14 @@ def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None)
     root = np.linalg.cholesky(np.mean([one.correlation for one in people], axis=0))
     seen = _Seen.of(root, people)
     size, count = len(root), len(people)
-    anchor = (1.0 - BETWEEN_SHARE) * np.eye(size)
+    anchor = WITHIN * np.eye(size)
     mean = np.zeros(size) if start is None else np.linalg.solve(root, start.mean)
     within = anchor
     for _ in range(_ITERATIONS):
         posterior = seen.posterior(within)
         estimates = mean + np.einsum("pij,pj->pi", posterior, seen.right - seen.information @ mean)
         # a mean between nothing and the estimates' own, by how far the group's mean may be from the tables
-        new_mean = np.linalg.solve(within / BETWEEN_SHARE + count * np.eye(size), estimates.sum(axis=0))
+        new_mean = np.linalg.solve(within / BETWEEN + count * np.eye(size), estimates.sum(axis=0))
         away = estimates - new_mean
         spread = posterior.sum(axis=0) + away.T @ away
         new_within = (PSEUDO_PEOPLE * anchor + spread) / (PSEUDO_PEOPLE + count)
@@ -178,7 +179,7 @@ def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None)
         mean, within = new_mean, 0.5 * (new_within + new_within.T)
         if change < _SETTLED:
             break
-    of_mean = np.linalg.inv(np.eye(size) / BETWEEN_SHARE + seen.of_mean(within))
+    of_mean = np.linalg.inv(np.eye(size) / BETWEEN + seen.of_mean(within))
     of_group, whole = (root @ part @ root.T for part in (of_mean, within + of_mean))
     return LearntPrior(segments, root @ mean, np.sqrt(np.diag(of_group)), 0.5 * (whole + whole.T), count)
 

@@ -219,6 +219,8 @@ def read_subject(path: str | Path) -> SubjectFile:
     except ValidationError as error:
         # a trial with an error in it does not count, so that pydantic also finds too few trials
         errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
+        # a key that is not known explains one that is missing
+        errors = [one for one in errors if one["type"] == "extra_forbidden"] or errors
         line, sentence = min((document.line(one["loc"]) or document.last_line, _sentence(one)) for one in errors)
         raise FileError(path, sentence, line) from None
     if lack := _incomplete(result):
