@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.studies.joint_accuracy import JOINTS
+from kinertia.model.joint_names import JOINTS
 from kinertia.trial.rms import rms
 
 _PARAMETERS = (("mass (kg)", 1.0, 2), ("centre of mass (mm)", 1e3, 0), ("moments of inertia (kg m2)", 1.0, 4))

@@ -24,9 +24,9 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.model.joint_names import JOINTS
 from kinertia.model.skeleton import Skeleton
 from kinertia.studies.joint_accuracy import (
-    JOINTS,
     WITHIN,
     Before,
     JointAccuracy,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.joint_names import JOINTS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
@@ -15,18 +16,6 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial
 
-JOINTS = {
-    "hip flexion": ("hip_flexion",),
-    "hip adduction": ("hip_adduction",),
-    "hip rotation": ("hip_rotation",),
-    "knee": ("knee",),
-    "ankle": ("ankle", "subtalar"),
-    "lumbar extension": ("lumbar_extension",),
-    "lumbar bending": ("lumbar_bending",),
-    "lumbar rotation": ("lumbar_rotation",),
-    "arms": ("arm", "elbow"),
-}
-"""How the coordinates of each joint, left and right, begin."""
 USUAL_HZ = (6.0, 10.0, 12.0)
 """Cutoffs of the coordinates in the usual pipeline: OpenSim's own and two more."""
 WITHIN = 1.959964
