@@ -124,9 +124,8 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     feet = foot_labels(marker_set, recording.markers)
     span = (float(recording.markers.time[0]), float(recording.markers.time[-1]))
     trial = build_trial(recording, feet, span)
-    seconds["calibration"], (model, skeleton, *_) = best(
-        min(runs, 2), lambda: calibrate(_model(static, marker_set, one.subject), [trial], one.subject)
-    )
+    model = _model(static, marker_set, one.subject)
+    seconds["calibration"], (skeleton, _) = best(min(runs, 2), lambda: calibrate(model, [trial], one.subject))
     seconds["inverse kinematics"], ik = best(runs, lambda: solve_ik(skeleton, trial.markers))
     seconds["smoothing"], spline = best(runs, lambda: smooth(ik.time, ik.q, "gcv"))
     motion = Motion(*(spline(ik.time, order) for order in range(3)))
