@@ -31,6 +31,7 @@ def subject_with(folder, measured_walk, entries):
     return path
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_it_shows(session):
     path, outcome = session
     assert outcome.status == 0, outcome.err

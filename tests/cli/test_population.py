@@ -32,6 +32,7 @@ def cohort(fit, tmp_path):
     return tmp_path / "out"
 
 
+@pytest.mark.slow
 def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
     _, folder, _ = demo_command
     outcome = run("population", cohort, "--without", "p3", "-o", tmp_path / "population.toml")

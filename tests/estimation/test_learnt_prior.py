@@ -36,6 +36,7 @@ def estimate(person, mean, covariance):
     return posterior @ (person.right + inverse @ mean), np.sqrt(np.diag(posterior))
 
 
+@pytest.mark.slow
 def test_left_out_people_are_estimated_better_and_their_error_bars_hold():
     errors, within, of_means = [], [], []
     for seed in range(6):
@@ -62,6 +63,7 @@ def test_where_people_say_nothing_the_mean_stays_and_bars_grow():
     assert np.abs(learnt.learnt).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_start_elsewhere_ends_at_the_same():
     _, _, people = group(np.random.default_rng(1), 40)
     one, other = learn(people), learn(people, start=learn(people[1:]))

@@ -131,6 +131,7 @@ def test_page_of_the_benchmark(fit_with_model):
             assert f"- {title}: {warning}." in page
 
 
+@pytest.mark.slow
 def test_the_built_in_model_is_written_as_a_model_too(opensim, fit_of):
     fit = fit_of("pig_a")
     loaded = opensim.Model(str(fit.folder / "model.osim"))

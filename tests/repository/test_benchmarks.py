@@ -84,6 +84,7 @@ def test_a_minute_takes_little_more_memory_than_a_walk():
     assert f"| 1 min | 6000 | 100 | {minute.before_mb:.0f} |" in document([minute])
 
 
+@pytest.mark.slow
 def test_page_of_field_trials(fit_of):
     summary = fit_of("gait2354").summary
     outcome = {"command": "fit", "status": 1, "seconds": 12.3, "said": "", "fit": summary}

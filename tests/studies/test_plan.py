@@ -51,6 +51,7 @@ def test_prediction_is_what_a_fit_then_reports(prior, trials, planned, chosen):
     assert planned.counts(chosen)["measured"] == pytest.approx((reported > 0.75).sum(), abs=3)
 
 
+@pytest.mark.slow
 def test_a_walk_shows_more_than_squats_and_both_more_than_one(planned):
     walked, squatted, both = (planned.information(names).mean() for names in (("walk",), ("squat",), ("walk", "squat")))
     assert squatted < walked < both

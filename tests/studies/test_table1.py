@@ -60,6 +60,7 @@ def test_every_parameter_is_found_without_noise(trial):
         assert_exact(draw.errors[condition], PUBLISHED[condition])
 
 
+@pytest.mark.slow
 @in_one_process()
 @mock.patch("kinertia.studies.table1.CONDITIONS", NOISY)
 @mock.patch.multiple("kinertia.estimation.two_level", _FREE_EVALUATIONS=20, _MAX_EVALUATIONS=5)

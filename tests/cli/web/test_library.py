@@ -44,6 +44,7 @@ def test_names_are_made_those_of_folders(library, wanted, name):
     assert person.folder.parent == library.folder
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(st.text(max_size=100))
 def test_any_name_makes_a_folder_in_the_library(tmp_path_factory, wanted):
