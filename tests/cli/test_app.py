@@ -58,6 +58,7 @@ def test_every_command_has_an_example_and_every_example_can_be_parsed(command):
         assert option in known
 
 
+@pytest.mark.slow
 def test_installed_command():
     done = subprocess.run([sys.executable, "-c", "from kinertia.cli.app import main; main()", "fit", "no.toml"],
                           capture_output=True, text=True, check=False)  # fmt: skip

@@ -39,6 +39,7 @@ def test_a_check_loads_no_pictures_or_studies(measured_walk, tmp_path):
     assert not loaded & {*SLOW, *SYNTHETIC, "kinertia.cli.fit"}
 
 
+@pytest.mark.slow
 def test_help_waits_for_nothing_slow():
     """One command after the other in one interpreter, since what one loads stays."""
     loaded = loaded_after(

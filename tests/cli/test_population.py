@@ -60,6 +60,7 @@ def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
     assert "was learnt from these trials, too, which would count twice" in refused.err
 
 
+@pytest.mark.slow
 def test_what_cannot_be_learnt_is_said(cohort, tmp_path):
     assert "5 people" in run("population", cohort, "-o", tmp_path / "x.toml", "--without", "p0").out
     for arguments, words in (

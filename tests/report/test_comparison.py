@@ -66,6 +66,7 @@ def test_moments_are_those_of_cycles(fit):
     np.testing.assert_allclose(traces[0]["y"], knee.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_command(fit, demo_run, tmp_path):
     save_fit(moved(fit, "torso", 0, 3.0), tmp_path / "again")
     outcome = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")

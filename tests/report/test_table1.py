@@ -84,6 +84,7 @@ def test_bad_arguments_end_with_status_2_and_no_folder(tmp_path, arguments, word
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_command_prints_and_writes(table, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     asked = {}

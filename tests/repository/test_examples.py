@@ -7,6 +7,7 @@ import fit_gait2354
 import kinertia
 
 
+@pytest.mark.slow
 def test_step_by_step_example_runs(shared_data, capsys):
     fit = fit_gait2354.main(shared_data / "gait2354", (0.7, 1.1))
     shown = capsys.readouterr().out

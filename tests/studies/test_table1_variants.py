@@ -79,6 +79,7 @@ def test_today_is_table_1():
     assert Setup() == Setup(random_start, Setup().noise, coordinates, 0.1, two_level)
 
 
+@pytest.mark.slow
 def test_every_variant_has_ten_draws_and_the_nearest_fifty(trial, monkeypatch):
     counted = {}
 
