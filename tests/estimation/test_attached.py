@@ -10,6 +10,7 @@ from kinertia.errors import PriorError, SettingsError
 from kinertia.estimation.attached import with_attached
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import ForceMass
+from kinertia.estimation.known_body import with_known_body
 from kinertia.estimation.prepare import Prepared, prepare
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
@@ -19,7 +20,7 @@ from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics, residual
-from kinertia.settings import Attached, Settings, Subject
+from kinertia.settings import Attached, KnownSegment, PriorSettings, Settings, Subject
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.walk import MASS_KG, walk, walking_subject
 
@@ -52,6 +53,16 @@ def test_rows_of_their_own_after_the_body(mass, expected):
     assert after.skeleton.coordinates == before.skeleton.coordinates
     assert "rucksack" in after.notes[-1]
     assert with_attached(after) is after
+
+
+def test_the_literature_stays_where_more_is_known_of_the_body():
+    """What was measured of a segment is in the prior's mean, not in what the literature says."""
+    before = ready(Attached(mass_kg=10.0, **PACK))
+    known = with_known_body(before, PriorSettings(), None, {"thigh_r": KnownSegment(mass_kg="9.9 +- 0.1")})
+    after = with_attached(known)
+    np.testing.assert_array_equal(after.literature.table()[:12], before.literature.table())
+    assert after.literature.segments == after.prior.mean.segments
+    assert after.prior.mean.mass_kg[2] == pytest.approx(9.9, abs=0.1) != after.literature.mass_kg[2]
 
 
 def test_the_inertia_is_that_of_a_block():

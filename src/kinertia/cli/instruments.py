@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Quiet
+from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.terminal import out, plain_table, show_warning, shown_progress
 from kinertia.errors import FileError, SessionError
 from kinertia.estimation.from_files import check_plates, fit_subject
@@ -40,7 +40,7 @@ def instruments(
     for path, each in zip(subjects, wanted, strict=True):
         if each.instruments != wanted[0].instruments:
             raise SessionError(f"{path}: [instruments] differs from that of {subjects[0]}; it is the session's")
-    _check_output(output)
+    own_file(output, read_session, "kinertia instruments")
     people = []
     for each in wanted:
         with shown_progress() as progress:
@@ -60,18 +60,6 @@ def _wanted(path: Path) -> SubjectFile:
     check_plates(wanted)
     own = InstrumentsFiles.model_validate({**wanted.instruments.model_dump(), "session": None})
     return wanted.model_copy(update={"instruments": own})
-
-
-def _check_output(output: Path) -> None:
-    if output.is_dir():
-        raise FileError(output, "a folder; give the name of a file")
-    if not output.absolute().parent.is_dir():
-        raise FileError(output, f"no such folder: {output.absolute().parent}")
-    if output.exists():
-        try:
-            read_session(output)
-        except FileError:
-            raise FileError(output, "not a file that kinertia instruments wrote; give another name with -o") from None
 
 
 def _report(session: SessionInstruments) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from kinertia.cli.terminal import be_quiet
+from kinertia.errors import FileError
 from kinertia.io.output_folder import check_folder, expect_own_folder
 from kinertia.settings import number_of, sex_of
 
@@ -58,3 +59,20 @@ Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Show errors only; the exit status says the rest.")
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every assumption and detail as well.")]
+
+
+def own_file(output: Path, read: Callable[[Path], object], command: str) -> None:
+    """A file that a command may write: a new one, or one of its own, which `read` can read.
+
+    Raises:
+        FileError: a folder, in no folder, or a file of another kind.
+    """
+    if output.is_dir():
+        raise FileError(output, "a folder; give the name of a file")
+    if not output.absolute().parent.is_dir():
+        raise FileError(output, f"no such folder: {output.absolute().parent}")
+    if output.exists():
+        try:
+            read(output)
+        except FileError:
+            raise FileError(output, f"not a file that {command} wrote; give another name with -o") from None

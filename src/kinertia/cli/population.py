@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from kinertia.cli.options import Quiet
+from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
@@ -44,7 +44,7 @@ def population(
 
     kinertia population out --without anna -o for_anna.toml
     """
-    _check_output(output)
+    own_file(output, read_population, "kinertia population")
     people, files = _read(_folders(results), set(without or ()))
     learnt = learn(people)
     names = tuple(person.name for person in people)
@@ -99,18 +99,6 @@ def _read(folders: list[Path], without: set[str]) -> tuple[list[PersonInformatio
     if lost := without - met:
         raise PriorError(f"nobody is called {', '.join(sorted(lost))} here")
     return people, tuple(files)
-
-
-def _check_output(output: Path) -> None:
-    if output.is_dir():
-        raise FileError(output, "a folder; give the name of a file")
-    if not output.absolute().parent.is_dir():
-        raise FileError(output, f"no such folder: {output.absolute().parent}")
-    if output.exists():
-        try:
-            read_population(output)
-        except FileError:
-            raise FileError(output, "not a file that kinertia population wrote; give another name with -o") from None
 
 
 def _report(learnt: LearntPrior) -> None:

@@ -32,19 +32,19 @@ def with_attached(ready: Prepared) -> Prepared:
     Raises:
         PriorError: no such segment, or a name that is taken.
     """
-    welded = {(joint.parent, joint.child) for joint in ready.skeleton.joints if not joint.axes}
-    known_names = ready.prior.mean.segments[-len(ready.attached) :] if ready.attached else ()
-    if tuple(one.name for one in ready.attached) == known_names and all(
-        (one.segment, one.name) in welded for one in ready.attached
-    ):
+    if not ready.attached or ready.prior.weighed is not None:
         return ready
     scale_kg = known(ready.subject.mass_kg)
     skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, scale_kg)
+    # the literature's own body, which need not be the prior's mean, and segments that are held after all others
+    body, own = len(ready.prior.mean.segments), ready.literature
+    names = (*prior.mean.segments, *own.segments[body:])
+    table = np.concatenate([own.table()[:body], prior.mean.table()[body:], own.table()[body:]])
     return replace(
         ready,
         skeleton=skeleton,
         prior=prior,
-        literature=ready.uncertainty.whole(prior.mean),
+        literature=BodySegmentParameters.from_table(names, table),
         notes=(*ready.notes, *(_note(one, scale_kg) for one in ready.attached)),
     )
 

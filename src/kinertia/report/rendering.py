@@ -36,16 +36,21 @@ class _CompiledTemplates(jinja2.FileSystemBytecodeCache):
                 super().dump_bytecode(bucket)
 
 
-@cache
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kinertia.report"),
+def templates_of(package: str) -> jinja2.Environment:
+    """The templates of a package: what they show is escaped, and a name that nobody gave is an error."""
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader(package),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
         bytecode_cache=_CompiledTemplates(str(Path(cache_from_source(__file__)).parent)),
     )
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = templates_of("kinertia.report")
     environment.globals["asset"] = _asset
     environment.filters["fixed"] = fixed
     return environment

@@ -144,7 +144,7 @@ def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
         priors = (adults, own_prior(name, adults))
     trial = walk(person, WALK_S, trapezoid=False)
     laboratory = measured([trial], LABORATORY, of_noise)
-    return tuple(_outcome(trial, *laboratory, prior) for prior in priors)
+    return tuple(_outcome(trial, *laboratory, prior, adults) for prior in priors)
 
 
 def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
@@ -185,14 +185,14 @@ def own_prior(name: str, adults: BspPrior) -> BspPrior:
 
 
 def _outcome(
-    trial: SyntheticTrial, skeleton: Skeleton, recorded: Sequence[Kinematics], prior: BspPrior
+    trial: SyntheticTrial, skeleton: Skeleton, recorded: Sequence[Kinematics], prior: BspPrior, adults: BspPrior
 ) -> PersonOutcome:
     bandwidth = Bandwidth.of(recorded)
     seen: Observations = observe(skeleton, recorded, prior.mass_kg, bandwidth)
     result: SimultaneousResult = estimate_simultaneous(
         skeleton, prior, calibration_prior(skeleton), seen.together, bandwidth.spacing_s
     )
-    information, adults = None, literature_prior(walking_subject().literature)
+    information = None
     if np.array_equal(prior.mean.table(), adults.mean.table()):
         information = person_information("", adults, prior, result.bsp, result.bsp_covariance)
     sd = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)

@@ -20,6 +20,7 @@ from kinertia.cli.web.guard import RESULT_POLICY
 from kinertia.cli.web.library import Person
 from kinertia.errors import FileError
 from kinertia.io.provenance import VERSION
+from kinertia.report.rendering import templates_of
 
 _LARGEST_FORM = 1_000_000
 _PIECE = 1 << 20
@@ -27,13 +28,7 @@ _PIECE = 1 << 20
 
 @cache
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kinertia.cli.web"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
+    environment = templates_of("kinertia.cli.web")
     environment.filters["in_address"] = lambda name: quote(name, safe="")
     environment.filters["megabytes"] = lambda size: f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"
     return environment
