@@ -23,7 +23,9 @@ def loads(right_n: np.ndarray, left_n: np.ndarray) -> np.ndarray:
 def kinematics(wrench: np.ndarray, noise_n: float = 0.0):
     """As far as ground reactions look at a trial."""
     feet = FootLoads(TIME, wrench[..., :3], wrench[..., 3:], noise_n=noise_n)
-    return SimpleNamespace(trial=SimpleNamespace(loads=feet), near_window=np.ones(len(TIME), bool), cutoff_hz=10.0)
+    everywhere = np.ones(len(TIME), bool)
+    trial = SimpleNamespace(loads=feet)
+    return SimpleNamespace(trial=trial, near_window=everywhere, cutoff_hz=10.0, inside=lambda time: everywhere)
 
 
 def step(at_s: float, over_s: float = 0.01) -> np.ndarray:

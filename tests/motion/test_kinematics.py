@@ -109,22 +109,27 @@ def test_a_short_gap_is_bridged(skeleton, trial, motion):
     assert np.abs(kinematics.motion.q[:, knee] - motion.q[kinematics.frames, knee]).max() < np.radians(1.0)
 
 
-@pytest.mark.parametrize(("start", "window"), [(0.6, (0.91, 1.95)), (1.2, (0.05, 1.19))])
-def test_a_long_gap_ends_the_window(skeleton, trial, start, window):
+@pytest.mark.parametrize(
+    ("start", "windows"), [(0.6, [(0.05, 0.59), (0.91, 1.95)]), (1.2, [(0.05, 1.19), (1.51, 1.95)])]
+)
+def test_a_long_gap_ends_a_stretch(skeleton, trial, motion, start, windows):
     gapped = hidden(trial, ["shank_r", "foot_r"], start, start + 0.3)
     kinematics = solve_kinematics(skeleton, gapped, 0.0, 10.0)
-    assert kinematics.window_s == pytest.approx(window)
-    assert any("only the measured stretch with most motion" in note for note in kinematics.notes)
+    np.testing.assert_allclose(kinematics.windows_s, windows, atol=1e-9)
+    assert kinematics.window_s == pytest.approx((0.05, 1.95))
+    of_stretches = [kinematics.time[part][[0, -1]] for part in kinematics.stretches]
+    np.testing.assert_allclose(of_stretches, windows, atol=1e-9)
+    assert not kinematics.inside(np.array([start + 0.1])).any()
+    assert np.abs(kinematics.motion.q - motion.q[kinematics.frames])[:, 3:].max() < np.radians(2.0)
+    assert any("2 measured stretches between 0.050 and 1.950 s are used together" in one for one in kinematics.notes)
 
 
-def test_a_walk_is_taken_rather_than_a_longer_stand(skeleton, trial, motion):
-    """Two stretches: 1.3 s of standing, then 0.6 s of motion."""
-    q = np.where((np.arange(201) < 140)[:, None], motion.q[140], motion.q)
-    positions = skeleton.marker_positions(skeleton.pose(q))
+def test_a_stretch_that_is_too_short_is_left_out(skeleton, trial):
     measured = np.ones(201, dtype=bool)
-    measured[135:145] = False
-    standing_first = replace(trial, markers=replace(trial.markers, positions=positions), measured=measured)
-    assert solve_kinematics(skeleton, standing_first, 0.0, 10.0).window_s == pytest.approx((1.45, 1.95))
+    measured[80:90] = measured[100:105] = False
+    kinematics = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
+    np.testing.assert_allclose(kinematics.windows_s, [(0.05, 0.79), (1.05, 1.95)], atol=1e-9)
+    assert any("10 measured frames are left out: in stretches of less than 11" in one for one in kinematics.notes)
 
 
 def test_the_foot_alone_tells_where_the_shank_is(skeleton, trial):
@@ -136,7 +141,8 @@ def test_frames_without_measured_contact_are_left_out(skeleton, trial):
     measured = np.ones(201, dtype=bool)
     measured[80:90] = False
     kinematics = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
-    assert kinematics.window_s == pytest.approx((0.90, 1.95))
+    np.testing.assert_allclose(kinematics.windows_s, [(0.05, 0.79), (0.90, 1.95)], atol=1e-9)
+    assert not np.isin(np.arange(80, 90), kinematics.frames).any()
 
 
 def test_no_usable_frame_names_trial_and_counts(skeleton, trial):

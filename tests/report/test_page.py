@@ -294,7 +294,7 @@ def prolonged(trial, times):
     solved = replace(ik, time=time, q=again(ik.q, shown), errors_m=again(ik.errors_m, shown))
     return replace(
         trial,
-        kinematics=replace(kinematics, trial=walked, ik=solved, window_s=(0.0, float(time[-1]))),
+        kinematics=replace(kinematics, trial=walked, ik=solved, windows_s=((0.0, float(time[-1])),)),
         motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
         full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},

@@ -64,10 +64,11 @@ def _before(fit: Fit) -> str:
 
 
 def _report_trial(trial: dict[str, Any], before: str) -> None:
-    first, last = trial["window_s"]
+    (first, last), parts = trial["window_s"], len(trial["windows_s"])
+    stretches = f" in {parts} measured stretches" if parts > 1 else ""
     markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
     out.print(
-        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used, {trial['n_dynamic_frames']} of "
+        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used{stretches}, {trial['n_dynamic_frames']} of "
         f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
         f"{markers['final']} (estimate)"
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import partial
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -18,7 +18,7 @@ from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
-from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.kinematics import Kinematics, inside
 from kinertia.motion.smoothing import interpolate
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
 from kinertia.trial.data import FEET, nearest_samples
@@ -29,7 +29,7 @@ Kind = Literal["angle", "moment", "power", "force"]
 UNITS: Mapping[Kind, str] = {"angle": "deg", "moment": "N m/kg", "power": "W/kg", "force": "% body weight"}
 FORCES = ("ground_force_forward", "ground_force_upward", "ground_force_medial")
 _ROOT_COORDINATES = 6
-_ROUNDING_S = 1e-9
+_Interpolation: TypeAlias = Callable[[np.ndarray, np.ndarray], Callable[[np.ndarray], np.ndarray]]
 
 
 class Estimated(Protocol):
@@ -139,20 +139,21 @@ class _Source:
     """A trial's quantities at any time, NaN where they were not measured."""
 
     def __init__(self, trial: Estimated, stage: Stage) -> None:
-        self.kinematics, self.stage, own = trial.kinematics, stage, trial.kinematics.time
-        self.spline = interpolate(own, trial.motion.q) if stage == "estimate" else trial.kinematics.spline
+        self.kinematics, self.stage = trial.kinematics, stage
         self.reactions = trial.reactions if stage == "estimate" else measured_reactions(trial.kinematics)
-        self.loads = make_interp_spline(own, trial.joint_loads[stage], k=3)
+        own, parts = trial.kinematics.time, trial.kinematics.stretches
+        self.motion = [interpolate(own[part], trial.motion.q[part]) for part in parts]
+        self.loads = self._by_stretch(partial(make_interp_spline, k=3), trial.joint_loads[stage])
         spread = trial.joint_load_sd if stage == "estimate" else None
-        self.spread = None if spread is None else make_interp_spline(own, spread, k=1)
+        self.spread = None if spread is None else self._by_stretch(partial(make_interp_spline, k=1), spread)
 
     def angle(self, time: np.ndarray) -> np.ndarray:
         """(n, c) coordinates; those of the usual pipeline wherever inverse kinematics knew them."""
-        return self._kept(time, self.spline)
+        return self._coordinates(time, 0)
 
     def speed(self, time: np.ndarray) -> np.ndarray:
         """(n, c) derivatives of the coordinates."""
-        return self._kept(time, partial(self.spline, derivative=1))
+        return self._coordinates(time, 1)
 
     def moment(self, time: np.ndarray) -> np.ndarray:
         """(n, c) joint loads."""
@@ -164,21 +165,30 @@ class _Source:
 
     def force(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 3) N on right and left foot."""
-        return self._measured(time, lambda at: self.reactions.at(at)[..., :3])
+        return self._measured(time, [lambda at: self.reactions.at(at)[..., :3]] * len(self.kinematics.windows_s))
 
-    def _kept(self, time: np.ndarray, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    def _by_stretch(self, through: _Interpolation, values: np.ndarray) -> list[Callable[[np.ndarray], np.ndarray]]:
+        """Curves through the values (w, ...) of each stretch."""
+        time = self.kinematics.time
+        return [through(time[part], values[part]) for part in self.kinematics.stretches]
+
+    def _coordinates(self, time: np.ndarray, derivative: int) -> np.ndarray:
         if self.stage == "estimate":
-            return self._measured(time, function)
-        ik = self.kinematics.ik
-        within = (time >= self.spline.time[0]) & (time <= self.spline.time[-1])
+            return self._measured(time, [partial(curve, derivative=derivative) for curve in self.motion])
+        ik, spline = self.kinematics.ik, self.kinematics.spline
+        within = (time >= spline.time[0]) & (time <= spline.time[-1])
         known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
-        return np.where(known, function(np.clip(time, self.spline.time[0], self.spline.time[-1])), np.nan)
+        return np.where(known, spline(np.clip(time, spline.time[0], spline.time[-1]), derivative), np.nan)
 
-    def _measured(self, time: np.ndarray, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        first, last = self.kinematics.window_s
-        within = (time >= first - _ROUNDING_S) & (time <= last + _ROUNDING_S)
-        values = function(np.clip(time, first, last))
-        return np.where(within.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
+    def _measured(self, time: np.ndarray, curves: Sequence[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
+        """Values at these times of each stretch's curve; NaN outside."""
+        windows = self.kinematics.windows_s
+        result: np.ndarray = np.full_like(curves[0](np.clip(time, *windows[0])), np.nan)
+        for window, curve in zip(windows, curves, strict=True):
+            here = inside(time, [window])
+            if here.any():
+                result[here] = curve(np.clip(time[here], *window))
+        return result
 
 
 def cycle_columns(

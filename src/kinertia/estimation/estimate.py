@@ -159,8 +159,7 @@ class _Outcome:
 
 
 def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
-    windows = [_window(k) for k in ready.kinematics]
-    cut = [stretches(window) for window in windows]
+    cut = [_stretches(k) for k in ready.kinematics]
     result = estimate_two_level(
         ready.skeleton,
         ready.literature,
@@ -236,16 +235,15 @@ def _trial_fit(
     after: _Estimated,
     seconds: Mapping[str, float],
 ) -> TrialFit:
-    window = _window(k)
-    corrected = joined([correct_pelvis(before, literature, part) for part in stretches(window)])
+    wrench = k.foot_loads.sum(axis=1)
+    corrected = joined([correct_pelvis(before, literature, part) for part in _stretches(k)])
     stages = {
-        "literature": (before, literature, window.motion),
+        "literature": (before, literature, k.motion),
         "corrected": (before, literature, corrected),
     }
     measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
-    spline = interpolate(k.time, after.motion.q)
-    motion = Motion(*(spline(k.time, order) for order in range(3)))
-    narrow = {name: residual(*stage, window.wrench) for name, stage in stages.items()}
+    motion = joined([_as_opensim(k.time[part], after.motion.q[part]) for part in k.stretches])
+    narrow = {name: residual(*stage, wrench) for name, stage in stages.items()}
     narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
     full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
     full["estimate"] = residual(after.skeleton, bsp, motion, delivered.sum(axis=1))
@@ -258,7 +256,7 @@ def _trial_fit(
         residuals=narrow,
         full_residuals=full,
         joint_loads={
-            "literature": inverse_dynamics(before, literature, window.motion, measured),
+            "literature": inverse_dynamics(before, literature, k.motion, measured),
             "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
         joint_load_sd=after.moment_sd,
@@ -270,8 +268,16 @@ def _trial_fit(
     )
 
 
-def _window(kinematics: Kinematics) -> Window:
-    return Window(kinematics.time, kinematics.motion, kinematics.foot_loads.sum(axis=1))
+def _as_opensim(time: np.ndarray, q: np.ndarray) -> Motion:
+    """The motion that OpenSim's tools read from a file of these coordinates (w, c)."""
+    spline = interpolate(time, q)
+    return Motion(*(spline(time, order) for order in range(3)))
+
+
+def _stretches(k: Kinematics) -> list[Window]:
+    """The measured stretches of a trial, in parts over which the pelvis can be corrected."""
+    wrench = k.foot_loads.sum(axis=1)
+    return [part for own in k.stretches for part in stretches(Window(k.time[own], k.motion.cut(own), wrench[own]))]
 
 
 def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -> np.ndarray:

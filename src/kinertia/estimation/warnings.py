@@ -92,7 +92,11 @@ def fit_warnings(
 
 def turning_warnings(skeleton: Skeleton, trials: Sequence[Kinematics]) -> list[str]:
     """Trials whose mean vertical moment over whole strides is not near zero, and why that may be."""
-    means = {k.trial.name: mean_turning(k.trial.loads, k.time, skeleton.root.centre(k.motion.q)) for k in trials}
+    means = {}
+    for k in trials:
+        longest = max(k.stretches, key=lambda part: part.stop - part.start)
+        centre = skeleton.root.centre(k.motion.q[longest])
+        means[k.trial.name] = mean_turning(k.trial.loads, k.time[longest], centre)
     return [f"{name}: {mean.sentence()}" for name, mean in means.items() if mean is not None and mean.contradicts]
 
 

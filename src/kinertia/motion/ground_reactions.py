@@ -136,7 +136,7 @@ def ground_reactions(kinematics: Kinematics, motion_hz: float, wanted: ForceCuto
     if not isinstance(wanted, str):
         loads, near = kinematics.trial.loads, kinematics.near_window
         return replace(measured, wrench=_low_passed(measured.time, loads.wrench[near], wanted), cutoff_hz=wanted)
-    impact = _impact(measured, motion_hz)
+    impact = _impact(measured, motion_hz, kinematics.inside(measured.time))
     return replace(measured, wrench=measured.wrench - (impact if wanted == "auto" else 0.0), impact=impact)
 
 
@@ -144,16 +144,18 @@ def _low_passed(time: np.ndarray, wrench: np.ndarray, cutoff_hz: float) -> np.nd
     return smooth(time, wrench.reshape(len(time), -1), cutoff_hz)(time).reshape(wrench.shape)
 
 
-def _impact(measured: GroundReactions, motion_hz: float) -> np.ndarray:
+def _impact(measured: GroundReactions, motion_hz: float, inside: np.ndarray) -> np.ndarray:
     """(k, 2, 6): what of the sum of both feet's forces is faster than the motion, and more than rigid segments leave.
     Each foot has it in proportion to the power of its own fast forces, at its own centre of pressure.
+
+    The mean vertical force is that of the samples (k,) in which all ground contact is measured.
     """
     force = measured.wrench[..., :3]
     fast = force - _low_passed(measured.time, force, motion_hz)
     step = float(np.median(np.diff(measured.time)))
     power = _around(np.square(fast).sum(axis=-1), step, motion_hz)
     both = fast.sum(axis=1)
-    limit = (IMPACT_SHARE_OF_WEIGHT * force[..., 1].sum(axis=1).mean()) ** 2
+    limit = (IMPACT_SHARE_OF_WEIGHT * force[inside, :, 1].sum(axis=1).mean()) ** 2
     of_both = _around(np.square(both).sum(axis=-1, keepdims=True), step, motion_hz)
     impact = np.maximum(1.0 - limit / np.maximum(of_both, 1e-12), 0.0) * both
     shares = power / np.maximum(power.sum(axis=1, keepdims=True), 1e-12)

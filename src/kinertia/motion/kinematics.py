@@ -7,8 +7,10 @@ walk was 53 N with cutoffs of 10 to 15 Hz, 42 N with 10 for all and 48 N with 12
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -48,8 +50,8 @@ class Kinematics:
         ik: coordinates frame by frame.
         spline: smoothed coordinates over the frames that inverse kinematics solved.
         cutoff_hz: of the coordinates and the ground reactions.
-        window_s: first and last time at which all ground contact is measured and all coordinates are known, with
-            accelerations.
+        windows_s: first and last time of every stretch in which all ground contact is measured and all coordinates are
+            known, with accelerations; in order.
         notes: assumptions made on the way.
     """
 
@@ -58,45 +60,67 @@ class Kinematics:
     ik: InverseKinematics
     spline: SmoothedSpline
     cutoff_hz: float
-    window_s: tuple[float, float]
+    windows_s: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
+
+    @property
+    def window_s(self) -> tuple[float, float]:
+        """First and last time of all stretches."""
+        return self.windows_s[0][0], self.windows_s[-1][1]
+
+    def inside(self, time: np.ndarray) -> np.ndarray:
+        """Which of these times (n,) lie in one of the stretches."""
+        return inside(time, self.windows_s)
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """Indices of the marker frames inside the window."""
-        time = self.trial.markers.time
-        return np.flatnonzero((time >= self.window_s[0] - 1e-9) & (time <= self.window_s[1] + 1e-9))
+        """Indices of the marker frames inside the stretches."""
+        return np.flatnonzero(self.inside(self.trial.markers.time))
 
     @cached_property
     def time(self) -> np.ndarray:
-        """(w,) s, the frames inside the window."""
+        """(w,) s, the frames inside the stretches."""
         result: np.ndarray = self.trial.markers.time[self.frames]
         return result
 
     @cached_property
+    def stretches(self) -> tuple[slice, ...]:
+        """Of the w frames, those of each stretch."""
+        starts = np.searchsorted(self.time, [start - 1e-9 for start, _ in self.windows_s])
+        return tuple(slice(a, b) for a, b in pairwise([*starts.tolist(), len(self.time)]))
+
+    @cached_property
     def motion(self) -> Motion:
-        """Smoothed coordinates and derivatives inside the window."""
+        """Smoothed coordinates and derivatives inside the stretches."""
         return Motion(*(self.spline(self.time, order) for order in range(3)))
 
     @cached_property
     def foot_loads(self) -> np.ndarray:
-        """(w, 2, 6) ground reactions on right and left foot in the window: force, moment about the ground origin."""
+        """(w, 2, 6) ground reactions on right and left foot in the stretches: force, moment about the ground origin."""
         return self.smoothed_loads(self.cutoff_hz)(self.time).reshape(-1, 2, 6)
 
     def smoothed_loads(self, cutoff_hz: float) -> SmoothedSpline:
         """Ground reactions (12: right force and moment, left force and moment) as functions of time.
 
-        Samples up to AROUND_WINDOW_S outside the window count: what a plate saw there may not be all of the ground
-        contact, but is how the load on that plate went on.
+        Samples between the stretches, and up to AROUND_WINDOW_S outside them, count: what a plate saw there may not be
+        all of the ground contact, but is how the load on that plate went on.
         """
         loads, near = self.trial.loads, self.near_window
         return smooth(loads.time[near], loads.wrench[near].reshape(-1, 12), cutoff_hz)
 
     @cached_property
     def near_window(self) -> np.ndarray:
-        """(k,) which samples of the ground reactions are at most AROUND_WINDOW_S outside the window."""
+        """(k,) which samples of the ground reactions lie between first and last, or at most AROUND_WINDOW_S outside."""
         time, (start, end) = self.trial.loads.time, self.window_s
         return (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
+
+
+def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Which of these times (n,) lie in one of the windows (first and last time, s)."""
+    result = np.zeros(np.shape(time), dtype=bool)
+    for first, last in windows_s:
+        result |= (time >= first - 1e-9) & (time <= last + 1e-9)
+    return result
 
 
 def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
@@ -133,10 +157,10 @@ def solve_kinematics(
     """
     ik = solve_ik(skeleton, trial.markers, trial.name)
     solved = np.flatnonzero(np.isfinite(ik.q).any(axis=1))
-    inside = slice(solved[0], solved[-1] + 1)
+    shown = slice(solved[0], solved[-1] + 1)
     try:
-        cutoff = common_cutoff(ik.time[inside], ik.q[inside, :3], trial) if smoothing == "gcv" else Cutoff(smoothing)
-        spline = smooth(ik.time[inside], ik.q[inside], cutoff.hz)
+        cutoff = common_cutoff(ik.time[shown], ik.q[shown, :3], trial) if smoothing == "gcv" else Cutoff(smoothing)
+        spline = smooth(ik.time[shown], ik.q[shown], cutoff.hz)
     except SmoothingError as error:
         raise TrialError(
             trial.name,
@@ -144,18 +168,14 @@ def solve_kinematics(
             f"few to smooth it; fill the gaps of the markers or use a longer trial",
         ) from error
     known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
-    known &= np.abs(ik.time - ik.time[inside].mean()) <= np.ptp(ik.time[inside]) / 2 - _END_PERIODS / cutoff.hz + 1e-9
-    usable = known & trial.measured
-    # one who stands tells little of inertia, however long
-    moving = np.zeros(len(known))
-    moving[inside] = np.square(spline(ik.time[inside], 1)[:, 3:]).sum(axis=1)
-    window, notes = _most_moving(trial, usable, known, moving)
+    known &= np.abs(ik.time - ik.time[shown].mean()) <= np.ptp(ik.time[shown]) / 2 - _END_PERIODS / cutoff.hz + 1e-9
+    windows, notes = _long_enough(trial, known & trial.measured, known)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
         notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
     remarks += [f"{trial.name}: {sentence}" for sentence in _ends_of_ranges(skeleton, ik)]
-    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, window, (*trial.notes, *remarks, *notes))
+    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks, *notes))
 
 
 def _ends_of_ranges(skeleton: Skeleton, ik: InverseKinematics) -> list[str]:
@@ -191,12 +211,12 @@ def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
     return filled
 
 
-def _most_moving(
-    trial: Trial, usable: np.ndarray, known: np.ndarray, moving: np.ndarray
-) -> tuple[tuple[float, float], list[str]]:
-    """The stretch of usable frames (n,) with most of the motion (n,), of those that are long enough."""
+def _long_enough(
+    trial: Trial, usable: np.ndarray, known: np.ndarray
+) -> tuple[tuple[tuple[float, float], ...], list[str]]:
+    """First and last time of the stretches of usable frames (n,) that are long enough, and what is left out."""
     time = trial.markers.time
-    stretches = sorted(runs(usable), key=lambda run: run[0] - run[1])
+    stretches = runs(usable)
     if not stretches:
         raise TrialError(
             trial.name,
@@ -204,21 +224,26 @@ def _most_moving(
             f"visible markers for all coordinates (frames with them: {int(known.sum())}); fill marker gaps or use "
             f"another trial",
         )
-    first, last = stretches[0]
-    enough = [(a, b) for a, b in stretches if b - a + 1 >= FEWEST_FRAMES]
-    if enough:
-        first, last = max(enough, key=lambda run: moving[run[0] : run[1] + 1].sum())
-    if last - first + 1 < FEWEST_FRAMES:
+    used = [(first, last) for first, last in stretches if last - first + 1 >= FEWEST_FRAMES]
+    if not used:
+        first, last = max(stretches, key=lambda run: run[1] - run[0])
         raise TrialError(
             trial.name,
             f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} "
             f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least {FEWEST_FRAMES} are needed",
         )
+    windows = tuple((float(time[first]), float(time[last])) for first, last in used)
     notes = []
-    left_out = int(usable.sum()) - (last - first + 1)
-    if left_out:
+    if len(used) > 1:
+        longest = max(used, key=lambda run: run[1] - run[0])
         notes.append(
-            f"{trial.name}: only the measured stretch with most motion, {time[first]:.3f} to {time[last]:.3f} s, is "
-            f"used; {left_out} frames of {len(stretches) - 1} others are left out"
+            f"{trial.name}: {len(used)} measured stretches between {windows[0][0]:.3f} and {windows[-1][1]:.3f} s are "
+            f"used together, {sum(last - first + 1 for first, last in used)} frames; the longest is from "
+            f"{time[longest[0]]:.3f} to {time[longest[1]]:.3f} s"
         )
-    return (float(time[first]), float(time[last])), notes
+    short = [last - first + 1 for first, last in stretches if (first, last) not in used]
+    if short:
+        notes.append(
+            f"{trial.name}: {sum(short)} measured frames are left out: in stretches of less than {FEWEST_FRAMES}"
+        )
+    return windows, notes

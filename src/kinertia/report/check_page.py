@@ -64,10 +64,9 @@ def render_check(
 def check_figures(check: RecordingCheck) -> dict[str, Any]:
     """What the page draws of a recording: "forces", "pressure", "gaps"; None where there is nothing to draw."""
     labels = [one.label for one in check.markers]
-    window_s = check.windows[0] if check.windows else None
     figures: dict[str, Figure | None] = {
         "forces": force_figure(check),
         "pressure": pressure_figure(check),
-        "gaps": gap_figure(check.recording.markers.select(labels), window_s, check.recording.name),
+        "gaps": gap_figure(check.recording.markers.select(labels), check.windows, check.recording.name),
     }
     return {name: None if one is None else written(one) for name, one in figures.items()}

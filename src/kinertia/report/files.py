@@ -201,6 +201,7 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "n_frames": len(trial.kinematics.trial.markers.time),
         "n_dynamic_frames": len(trial.time),
         "window_s": list(trial.kinematics.window_s),
+        "windows_s": [list(window) for window in trial.kinematics.windows_s],
         "turned_deg": trial.kinematics.turned_deg,
         "cutoff_hz": trial.kinematics.cutoff_hz,
         "motion_hz": trial.motion_hz,

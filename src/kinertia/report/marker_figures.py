@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kinertia.estimation.result import TrialFit
@@ -62,12 +64,12 @@ def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
         return result
 
 
-def gap_figure(markers: Markers, window_s: tuple[float, float] | None, name: str) -> Figure | None:
+def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name: str) -> Figure | None:
     """When each marker was not seen, over the whole trial; None where all always were.
 
     Args:
         markers: of the model or the marker set.
-        window_s: the frames that a fit uses, on blue ground; None where there are none.
+        windows_s: first and last time of the stretches that a fit uses, on blue ground.
         name: of the trial.
     """
     time, hidden = markers.time, ~markers.seen
@@ -86,7 +88,7 @@ def gap_figure(markers: Markers, window_s: tuple[float, float] | None, name: str
     alt = f"Times at which markers of {name} were not seen: gaps in {len(gappy)} of {hidden.shape[1]} markers."
     layout = base_layout(alt)
     over = {"type": "rect", "xref": "x", "yref": "y domain", "y0": 0, "y1": 1, "line": {"width": 0}, "layer": "below"}
-    blue = [] if window_s is None else [{**over, "x0": window_s[0], "x1": window_s[1]}]
+    blue = [{**over, "x0": first, "x1": last} for first, last in windows_s]
     layout |= {
         "height": 80 + _ROW_PX * len(names),
         "margin": {"t": 12, "b": 44, "l": 12, "r": 14},
@@ -101,4 +103,4 @@ def gap_figure(markers: Markers, window_s: tuple[float, float] | None, name: str
 def fit_gap_figure(trial: TrialFit) -> Figure | None:
     """The same of the model's markers in a trial that was fitted."""
     kinematics = trial.kinematics
-    return gap_figure(kinematics.trial.markers.select(kinematics.ik.labels), kinematics.window_s, trial.name)
+    return gap_figure(kinematics.trial.markers.select(kinematics.ik.labels), kinematics.windows_s, trial.name)

@@ -172,15 +172,19 @@ def _sides(
 
 
 def _curve(time: np.ndarray, values: np.ndarray, thin: slice) -> dict[str, Any]:
-    """A line over uniform frames; the times of single frames need not be written."""
-    shown = time[thin]
-    step = float(shown[1] - shown[0]) if len(shown) > 1 else 1.0
+    """A line over frames; the times of single ones need not be written where they are uniform. It breaks at gaps."""
+    shown, y = time[thin], values[thin]
+    step = float(np.median(np.diff(shown))) if len(shown) > 1 else 1.0
+    gaps = np.flatnonzero(np.diff(shown) > 1.5 * step) + 1
+    x: dict[str, Any] = {"x0": round(float(shown[0]), 6), "dx": round(step, 9)}
+    if gaps.size:
+        x = {"x": np.insert(shown, gaps, shown[gaps - 1]).round(6).tolist()}
+        y = np.insert(y.astype(float), gaps, np.nan)
     return {
         "type": "scatter",
         "mode": "lines",
-        "x0": round(float(shown[0]), 6),
-        "dx": round(step, 9),
-        "y": compact(values[thin]),
+        **x,
+        "y": compact(y),
         "hovertemplate": "%{x:.3f} s: %{y:.3g}<extra>%{fullData.name}</extra>",
     }
 
@@ -190,7 +194,7 @@ def _thin(frames: int, most: int) -> slice:
 
 
 def _time_axis(kinematics: Kinematics) -> dict[str, Any]:
-    """The window with a little around it."""
+    """All stretches with a little around them."""
     start, end = kinematics.window_s
     around = _AROUND * (end - start)
     time = kinematics.trial.markers.time
@@ -200,8 +204,9 @@ def _time_axis(kinematics: Kinematics) -> dict[str, Any]:
 
 
 def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]]:
-    """Shades what lies outside the window."""
-    spans = zip((axis["range"][0], kinematics.window_s[1]), (kinematics.window_s[0], axis["range"][1]), strict=True)
+    """Shades what lies outside the stretches."""
+    starts, ends = zip(*kinematics.windows_s, strict=True)
+    spans = zip((axis["range"][0], *ends), (*starts, axis["range"][1]), strict=True)
     return [
         {
             "type": "rect",

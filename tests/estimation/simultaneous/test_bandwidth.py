@@ -17,7 +17,8 @@ def trial(hz: float, amplitude_n: float = 40.0, rate_hz: float = 100.0):
     feet = FootLoads(TIME, force, np.zeros_like(force))
     return SimpleNamespace(
         trial=SimpleNamespace(loads=feet, markers=SimpleNamespace(rate_hz=rate_hz)),
-        window_s=(0.3, 1.7),
+        windows_s=((0.3, 1.7),),
+        inside=lambda time: (time >= 0.3) & (time <= 1.7),
         smoothed_loads=lambda cutoff: smooth(TIME, feet.wrench.reshape(-1, 12), cutoff),
     )
 

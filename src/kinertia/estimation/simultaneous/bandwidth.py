@@ -61,7 +61,7 @@ class Bandwidth:
 def _needed_hz(kinematics: Kinematics) -> float:
     """The narrowest bandwidth that leaves little of the forces, and that the markers can show."""
     loads = kinematics.trial.loads
-    inside = (loads.time >= kinematics.window_s[0]) & (loads.time <= kinematics.window_s[1])
+    inside = kinematics.inside(loads.time)
     force = loads.force[inside].sum(axis=1)
     limit = LEFT_SHARE_OF_WEIGHT * force[:, 1].mean()
     most = kinematics.trial.markers.rate_hz / _FRAMES_PER_CYCLE

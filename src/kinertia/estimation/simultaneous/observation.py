@@ -137,7 +137,7 @@ class _Errors:
     """What inverse kinematics leaves of one trial.
 
     Attributes:
-        time: (n,) s, uniform: the window and its surroundings.
+        time: (n,) s, uniform: the stretches, what is between them, and their surroundings.
         q: (n, c) coordinates; bridged where the root was not seen.
         measured: (n, m, 3) markers, m; NaN where not seen.
         displaced: (m, 3) mean of measured minus model, in the axes of each marker's segment.
@@ -188,7 +188,7 @@ def _observed(
     bandwidth: Bandwidth,
 ) -> tuple[Observation, MarkerNoise]:
     """One trial on its own."""
-    (start, end), time = kinematics.window_s, errors.time
+    time = errors.time
     taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
     noise, effective, alike, products = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
     shown = np.isfinite(errors.displaced).all(axis=1)
@@ -204,7 +204,7 @@ def _observed(
             marker_sd=effective,
             marker_frames=alike,
             q=errors.q,
-            dynamic=(time >= start - 1e-9) & (time <= end + 1e-9),
+            dynamic=kinematics.inside(time),
             ground=_ground(kinematics, time, bandwidth.motion_hz, bandwidth.force),
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
