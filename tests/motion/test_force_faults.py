@@ -9,7 +9,7 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import Markers
+from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.plate_faults import loads_trouble
 from recorded_walks import WALKS
@@ -50,6 +50,28 @@ def sorted_by_foot(walk, marker_set=None):
 
 def test_sound_walks_are_not_doubted(walk):
     assert trouble_of(walk) == ""
+
+
+def on_one_belt(walk):
+    """The walk as a treadmill with one belt would have measured it."""
+    plates = walk.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    return replace(walk, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+
+
+def test_sound_walks_on_one_belt_are_not_doubted(walk):
+    """Of both feet only the sum is known, which is all that moves the body."""
+    belt = sorted_by_foot(on_one_belt(walk))
+    assert max(b - a for a, b in belt.windows()) < 0.7
+    assert belt.carried_windows()[0] == pytest.approx(sorted_by_foot(walk).windows()[0], abs=0.25)
+    assert trouble_of(on_one_belt(walk)) == ""
+
+
+@pytest.mark.parametrize("axis", ["X", "Z"])
+def test_signs_on_one_belt(walk, axis):
+    signs = 1.0 - 2.0 * np.eye(3)["XYZ".index(axis)]
+    trouble = trouble_of(with_force(on_one_belt(walk), lambda force: force * signs))
+    assert trouble.startswith(f"the horizontal force along {axis} has the wrong sign")
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def unit_hint(by_force_kg: float, stated_kg: float) -> str:
 
 
 def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
-    """Body mass by the forces in the longest measured window.
+    """Body mass by the forces in the longest window in which their sum is known.
 
     Args:
         skeleton: which marker is on which segment; nothing else is used of it.
@@ -121,7 +121,7 @@ def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
     Returns:
         None where too few frames, or no markers, show how the body moves.
     """
-    start, end = trial.windows()[0]
+    start, end = trial.carried_windows()[0]
     around, time = trial.markers.cut(start - _AROUND_S, end + _AROUND_S), trial.markers.cut(start, end).time
     place = markers_centre(owners_of(skeleton), around) if len(time) >= _FEWEST_FRAMES else None
     if place is None:

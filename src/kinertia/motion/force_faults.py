@@ -8,7 +8,7 @@ cause is 0.5 and more on sound walks and runs, 0.2 in squats, and trends of pelv
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +23,9 @@ _OPPOSED = -0.4
 _LEAST_CHANGE_M_S = 0.02
 """Velocities that change by less (standard deviation) say nothing about the sign of forces."""
 _LEAST_WINDOW_S = 0.4
-OFFSET_LIMIT_N = 20.0
-"""Horizontal force that no acceleration of the body accounts for, mean over a window."""
+OFFSET_LIMIT_N, _OFFSET_WINDOW_S = 20.0, 1.0
+"""Horizontal force that no acceleration of the body accounts for, mean over a window; over one that is shorter than
+this, pelvis and centre of mass part by as much velocity in less time."""
 _CLEAR, _CLEAR_TURN, _TURNED_DEG = 0.7, 0.35, 60.0
 _VERTICAL_FACTOR, _USUAL_FACTOR = (0.4, 1.8), 0.9
 """On 26 sound trials, from squats to runs, 0.67 to 0.99; at half the true rate it is four times as much."""
@@ -33,16 +34,18 @@ _HORIZONTAL = {"X": 0, "Z": 2}
 
 @dataclass(frozen=True)
 class Agreement:
-    """How forces and markers agree along one horizontal axis, over a window.
+    """How forces and markers agree along one horizontal axis, over all measured windows.
 
     Attributes:
         correlation: of the velocity changes that the forces cause with those of the pelvis and of the markers' centre,
             mean of the two; NaN where nothing hardly moves.
-        offset_n: trend of the difference as a force.
+        offset_n: trend of the difference as a force, the longer windows counting more.
+        limit_n: up to which it is none.
     """
 
     correlation: float
     offset_n: float
+    limit_n: float
 
 
 def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
@@ -53,13 +56,14 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
         trial: in ground axes.
         owners: the segment that each marker is on.
     """
-    both = _velocities(trial, owners)
-    if both is None:
+    parts = _velocities(trial, owners)
+    if not parts:
         return ""
-    if trouble := _time_scale_trouble(both):
+    changes = _Changes.of(parts)
+    if trouble := _time_scale_trouble(changes):
         return trouble
-    angle, strength = _turn(both)
-    agreements = _agreement(both)
+    angle, strength = _turn(changes)
+    agreements = _agreement(parts)
     against = {axis: one.correlation for axis, one in agreements.items() if one.correlation < _OPPOSED}
     # beside an axis that is opposed, one that goes with the markers says that they are not turned
     enough = -_OPPOSED if against else _CLEAR
@@ -81,9 +85,9 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     return f"{cause}: it accelerates the body against what the markers show ({evidence} of the velocities); {remedy}"
 
 
-def _time_scale_trouble(both: _Velocities) -> str:
+def _time_scale_trouble(changes: _Changes) -> str:
     """A vertical velocity that is not what the forces cause by a factor: both are right, and the time is not."""
-    shown, caused = (_without_trend(both.time, values[:, 1]) for values in (both.pelvis, both.caused))
+    shown, caused = changes.pelvis[:, 1], changes.caused[:, 1]
     if min(shown.std(), caused.std()) < _LEAST_CHANGE_M_S:
         return ""
     factor = float((shown * caused).sum() / (shown * shown).sum())
@@ -98,15 +102,12 @@ def _time_scale_trouble(both: _Velocities) -> str:
     )
 
 
-def _turn(both: _Velocities) -> tuple[float, float]:
+def _turn(changes: _Changes) -> tuple[float, float]:
     """The angle (deg) about the vertical by which the forces' velocities are turned from the markers', and how well
     both correlate once it is taken back: of the mean over pelvis and markers' centre.
     """
     # from Z to X is a positive turn about Y
-    caused, *shown = (
-        _without_trend(both.time, part[:, 2]) + 1j * _without_trend(both.time, part[:, 0])
-        for part in (both.caused, both.pelvis, both.centre)
-    )
+    caused, *shown = (part[:, 2] + 1j * part[:, 0] for part in (changes.caused, changes.pelvis, changes.centre))
     sizes = [max(float(np.linalg.norm(caused) * np.linalg.norm(part)), 1e-12) for part in shown]
     turn = sum(complex(np.vdot(part, caused)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
     return float(np.degrees(np.angle(turn))), abs(turn)
@@ -115,7 +116,7 @@ def _turn(both: _Velocities) -> tuple[float, float]:
 def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     """A horizontal force that no motion of the pelvis' markers accounts for; empty where there is none."""
     agreements = agreement(trial, owners)
-    off = {axis: one.offset_n for axis, one in agreements.items() if abs(one.offset_n) > OFFSET_LIMIT_N}
+    off = {axis: one.offset_n for axis, one in agreements.items() if abs(one.offset_n) > one.limit_n}
     if not off:
         return ""
     shown = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off.items())
@@ -126,25 +127,30 @@ def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
 
 
 def agreement(trial: Trial, owners: Mapping[str, str]) -> dict[str, Agreement]:
-    """Forces against markers along X and Z over the longest measured window; empty where that is too short.
+    """Forces against markers along X and Z over the measured windows; empty where these are too short.
 
     Args:
         trial: in ground axes.
         owners: the segment that each marker is on.
     """
-    both = _velocities(trial, owners)
-    return {} if both is None else _agreement(both)
+    parts = _velocities(trial, owners)
+    return _agreement(parts) if parts else {}
 
 
-def _agreement(both: _Velocities) -> dict[str, Agreement]:
+def _agreement(parts: Sequence[_Velocities]) -> dict[str, Agreement]:
+    changes = _Changes.of(parts)
+    spans = np.array([np.ptp(part.time) for part in parts])
+    limit = OFFSET_LIMIT_N * max(1.0, _OFFSET_WINDOW_S / float(spans.max()))
     agreements = {}
     for axis, k in _HORIZONTAL.items():
-        caused, *shown = (_without_trend(both.time, part[:, k]) for part in (both.caused, both.pelvis, both.centre))
+        caused, *shown = (part[:, k] for part in (changes.caused, changes.pelvis, changes.centre))
         still = min(part.std() for part in (caused, *shown)) < _LEAST_CHANGE_M_S
         correlation = np.nan if still else float(np.mean([np.corrcoef(caused, part)[0, 1] for part in shown]))
-        time = both.time - both.time.mean()
-        trend = float(np.polyfit(time, both.caused[:, k] - both.pelvis[:, k], 1)[0])
-        agreements[axis] = Agreement(correlation, both.mass_kg * trend)
+        trends = [
+            part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, k] - part.pelvis[:, k], 1)[0]
+            for part in parts
+        ]
+        agreements[axis] = Agreement(correlation, float(np.average(trends, weights=spans**3)), limit)
     return agreements
 
 
@@ -161,34 +167,55 @@ class _Velocities:
     mass_kg: float
 
 
-def _velocities(trial: Trial, owners: Mapping[str, str]) -> _Velocities | None:
+@dataclass(frozen=True, eq=False)
+class _Changes:
+    """(n, 3) m/s: the same of all windows, one after the other, each without its trend."""
+
+    pelvis: FloatArray
+    centre: FloatArray
+    caused: FloatArray
+
+    @classmethod
+    def of(cls, parts: Sequence[_Velocities]) -> _Changes:
+        """Of these windows."""
+        pelvis, centre, caused = (
+            np.concatenate([_without_trend(part.time, getattr(part, name)) for part in parts])
+            for name in ("pelvis", "centre", "caused")
+        )
+        return cls(pelvis, centre, caused)
+
+
+def _velocities(trial: Trial, owners: Mapping[str, str]) -> list[_Velocities]:
+    """Of every window in which the sum of the forces is known, if it is long enough."""
     worn = [label for label in trial.markers.labels if owners.get(label) == "pelvis"]
     whole = markers_centre(owners, trial.markers)
-    if not worn or whole is None or not trial.measured.any():
-        return None
-    start, end = trial.windows()[0]
+    if not worn or whole is None:
+        return []
     place = trial.markers.select(worn).positions.mean(axis=1)
     seen = np.isfinite(place).all(axis=1)
-    inside = (trial.loads.time >= start - 1e-9) & (trial.loads.time <= end + 1e-9)
-    time = trial.loads.time[inside]
-    if end - start < _LEAST_WINDOW_S or not seen.any() or len(time) < 10:
-        return None
+    if not seen.any():
+        return []
     try:
         pelvis_m, centre_m = (smooth(trial.markers.time[seen], part[seen], _PELVIS_HZ) for part in (place, whole))
     except SmoothingError:
-        return None
-    shown = (time >= trial.markers.time[seen][0]) & (time <= trial.markers.time[seen][-1])
-    time, force = time[shown], trial.loads.force[inside][shown].sum(axis=1)
-    weight = float(force[:, 1].mean()) if len(time) else 0.0
-    if not weight > 0 or len(time) < 10:
-        return None
-    mass_kg = weight / GRAVITY_M_S2
-    impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
-    caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
-    return _Velocities(time, pelvis_m(time, 1), centre_m(time, 1), caused, mass_kg)
+        return []
+    first, last = trial.markers.time[seen][[0, -1]]
+    parts = []
+    for start, end in trial.carried_windows():
+        inside = (trial.loads.time >= max(start, first) - 1e-9) & (trial.loads.time <= min(end, last) + 1e-9)
+        time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
+        if len(time) < 10 or np.ptp(time) < _LEAST_WINDOW_S - 1e-9 or not force[:, 1].mean() > 0:
+            continue
+        mass_kg = float(force[:, 1].mean()) / GRAVITY_M_S2
+        impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
+        caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
+        parts.append(_Velocities(time, pelvis_m(time, 1), centre_m(time, 1), caused, mass_kg))
+    return parts
 
 
 def _without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
-    line = np.polyfit(time - time.mean(), values, 1)
-    result: FloatArray = values - np.polyval(line, time - time.mean())
+    """Values (n, 3) less a line of each column."""
+    after = time - time.mean()
+    slope, level = np.polyfit(after, values, 1)
+    result: FloatArray = values - after[:, None] * slope - level
     return result

@@ -304,6 +304,13 @@ class Trial:
         """First and last time (s) of every contiguous run of measured frames, longest run first."""
         return windows(self.markers.time, self.measured)
 
+    def carried_windows(self) -> list[tuple[float, float]]:
+        """The same of frames in which the sum of all loads is known: also where both feet stand on one plate."""
+        if self.loads.together is None:
+            return self.windows()
+        together = self.loads.together[nearest_samples(self.loads.time, self.markers.time)]
+        return windows(self.markers.time, self.measured | together)
+
     def _repr_html_(self) -> str:
         """What a notebook shows: frames, markers and their gaps, measured windows, notes."""
         return display.html(self)
