@@ -102,6 +102,27 @@ def test_curves_are_thinned_but_not_moved(fit):
     np.testing.assert_allclose(trace.y, trial.residuals["estimate"][::step, 0], rtol=1e-6)
 
 
+def test_curves_break_between_stretches(fit):
+    (trial,) = fit.trials
+    first, last = trial.time[[0, -1]]
+    windows = ((first, trial.time[40]), (trial.time[61], last))
+    kept = np.r_[0:41, 61 : len(trial.time)]
+    parted = replace(
+        trial,
+        kinematics=replace(trial.kinematics, windows_s=windows),
+        residuals={stage: values[kept] for stage, values in trial.residuals.items()},
+        full_residuals={stage: values[kept] for stage, values in trial.full_residuals.items()},
+    )
+    figure = as_plotly(residual_figure(parted))
+    for trace in figure.data:
+        x, y = np.asarray(trace.x, float), np.asarray(trace.y, float)
+        (gap,) = np.flatnonzero(np.isnan(y))
+        np.testing.assert_allclose(np.delete(x, gap), trial.time[kept], atol=1e-6)
+        assert gap == 41
+    shaded = {(shape.x0, shape.x1) for shape in figure.layout.shapes if shape.type == "rect"}
+    assert (trial.time[40], trial.time[61]) in shaded
+
+
 def test_residuals_are_drawn_at_both_bandwidths(fit):
     trial = fit.trials[0]
     drawn = {t.name: t.y for t in as_plotly(residual_figure(trial)).data if t.yaxis == "y"}

@@ -86,6 +86,33 @@ def test_loads_and_motion_cover_the_window(trial, plain):
 
 
 @pytest.mark.slow
+def test_stretches_are_used_together_and_forces_between_them_say_nothing(trial, plain):
+    """Unmeasured from 0.3 to 0.6 s, where a plate loses a third of the weight: with and without."""
+    loads = trial.foot_loads.copy()
+    loads[(trial.time > 0.4) & (trial.time < 0.5)] *= 0.7
+    positions = camera_noise(trial.markers, 0.002, np.random.default_rng(0)).positions
+    markers = replace(trial.markers, positions=positions)
+    windows = ((0.06, 0.3), (0.6, 0.84))
+    prior = literature_prior(walking_subject().literature)
+    outcomes = [
+        fit_simultaneous(trial.skeleton, prior, [replace(kinematics_of(trial, markers, each), windows_s=windows)])
+        for each in (trial.foot_loads, loads)
+    ]
+    for outcome in outcomes:
+        (motion,) = outcome.motions
+        assert len(motion.q) == len(outcome.foot_loads[0]) == 50
+        assert outcome.result.converged
+        assert outcome.warnings == ()
+        within = np.abs(outcome.bsp.table() - trial.bsp.table()) < 3.5 * outcome.posterior.sd
+        assert within.all()
+    sound, lost = outcomes
+    change = np.abs(sound.bsp.table() - lost.bsp.table()) / sound.posterior.sd
+    assert change.max() < 0.3
+    # two stretches tell less than all, and more than nothing
+    shown = np.nansum(sound.posterior.information)
+    assert 0.2 * np.nansum(plain.posterior.information) < shown < np.nansum(plain.posterior.information)
+
+
 def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
     wrong = {"knee_tilt_1_r": 0.12, "knee_tilt_2_r": 0.08}
     off = replace(trial, skeleton=trial.skeleton.lock(wrong))
