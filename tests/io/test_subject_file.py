@@ -192,6 +192,7 @@ CASES = [
     ("cutoff_hz = 6", 'cutoff_hz = "6"', 23, 'must be "gcv" or a positive frequency in Hz'),
     ('force_cutoff_hz = "none"', 'force_cutoff_hz = "raw"', 25, 'must be "auto", "none" or a positive frequency in Hz'),
     ("cutoff_hz = 6", "cutoff_hz = true", 23, 'must be "gcv" or a positive frequency in Hz'),
+    ("window_s = [0.4, 2]", "belt_speed_m_s = 25", 14, "belt_speed_m_s = 25: must be the speed of a treadmill"),
     ("[0.4, 2]", "[2, 0.4]", 14, "window_s = [2, 0.4]: must be [start, end] in seconds"),
     ("[0.4, 2]", "[2]", 14, "must be [start, end] in seconds"),
     ("mass_kg = 61.5", 'mass_kg = "61.5"', 3, "must be a valid number"),

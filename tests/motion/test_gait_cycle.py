@@ -9,6 +9,7 @@ from kinertia.motion.gait_cycle import feet_under_pelvis, strides_of, turning_po
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.motion.spatiotemporal import spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial, runs
 from kinertia.trial.rms import rms
 
@@ -90,6 +91,22 @@ def test_one_who_squats_takes_no_strides(walked, trial):
     feet = feet_under_pelvis(walked.skeleton, kinematics)
     assert np.ptp(feet.ahead(feet.heel["r"])) > 0.15
     assert strides_of(walked.skeleton, kinematics) == ()
+
+
+def test_lengths_on_a_belt_that_speeds_up(walked, trial):
+    """Standing feet tell one speed for all strides; the stated one is each stride's."""
+    time = walked.time
+    belt = Belt(time, 0.6 + 0.5 * time)
+    way = np.array([belt.way_m(0.0, t) for t in time])
+    slid = trial.markers.positions - way[:, None, None] * [1.0, 0.0, 0.0]
+    kinematics = kinematics_of(walked, replace(trial, markers=replace(trial.markers, positions=slid)))
+    strides = strides_of(walked.skeleton, kinematics)
+    feet = feet_under_pelvis(walked.skeleton, kinematics)
+    expected = [float(np.diff(np.interp([s.start_s, s.end_s], time, walked.motion.q[:, 0]))[0]) for s in strides]
+    stated = [one.stride_length_m for one in spatiotemporal(feet, strides, belt)]
+    np.testing.assert_allclose(stated, expected, rtol=0.01)
+    by_feet = [one.stride_length_m for one in spatiotemporal(feet, strides)]
+    assert np.abs(np.array(by_feet) / expected - 1).max() > 0.03
 
 
 @pytest.mark.parametrize("turned", [0.0, 30.0])

@@ -9,6 +9,7 @@ from pathlib import Path
 from kinertia.checks.marker_set_match import common_marker_set
 from kinertia.checks.recording import RecordingCheck, check_recording
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.belt_file import read_belt
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.qualisys import is_plate_file
@@ -30,6 +31,7 @@ class RecordingFiles:
     loads: Path | None = None
     window_s: tuple[float, float] | None = None
     length_unit: str | None = None
+    belt_speed_m_s: float | Path | None = None
 
     @property
     def title(self) -> str:
@@ -59,7 +61,9 @@ def files_of_subject(subject: SubjectFile) -> PersonFiles:
     """What a subject file names."""
     named = subject.model.markers
     trials = [
-        RecordingFiles(trial.markers, trial.forces, trial.loads, trial.window_s, trial.length_unit)
+        RecordingFiles(
+            trial.markers, trial.forces, trial.loads, trial.window_s, trial.length_unit, trial.belt_speed_m_s
+        )
         for trial in subject.trials
     ]
     marker_set = None if named is None else read_marker_set(named)
@@ -156,7 +160,8 @@ def _read(
     for k, one in enumerate(wanted):
         progress(k / len(wanted))
         try:
-            recordings.append((one, read_recording(one.markers, one.forces, one.loads, one.length_unit)))
+            recording = read_recording(one.markers, one.forces, one.loads, one.length_unit)
+            recordings.append((one, replace(recording, belt=read_belt(one.belt_speed_m_s))))
         except KinertiaError as error:
             mistakes.append(str(error))
     return recordings, mistakes

@@ -106,7 +106,7 @@ def cycle_curves(
         return
     source, skeleton = _Source(trial, stage), trial.skeleton
     sides = by_side(skeleton.coordinates)
-    paths = travelled(feet_under_pelvis(skeleton, trial.kinematics), chosen)
+    paths = travelled(feet_under_pelvis(skeleton, trial.kinematics), chosen, trial.kinematics.trial.belt)
     for stride, path in zip(chosen, paths, strict=True):
         time, curve = stride.time, partial(CycleCurve, trial.name, stride)
         angle, speed, moment, spread = source.angle(time), source.speed(time), source.moment(time), source.sd(time)
@@ -217,7 +217,8 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
     """The columns of `Fit.spatiotemporal`, by name."""
     rows: list[dict[str, Any]] = []
     for trial in trials:
-        measures = spatiotemporal(feet_under_pelvis(trial.skeleton, trial.kinematics), trial.strides)
+        feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
+        measures = spatiotemporal(feet, trial.strides, trial.kinematics.trial.belt)
         for stride, one in zip(trial.strides, measures, strict=True):
             place = {"trial": trial.name, "side": stride.side, "stride": stride.number}
             times = {"start_s": stride.start_s, "end_s": stride.end_s, "toe_off_s": stride.toe_off_s}

@@ -17,6 +17,7 @@ from kinertia.model.stature import floor_doubts, stature_doubts
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
+from kinertia.trial.foot_ways import belt_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from kinertia.trial.marker_faults import (
     exchanged_trouble,
@@ -89,6 +90,8 @@ def trial_doubts(
     straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
     computed = [] if marker_set is None else computed_doubts(own, marker_set)
     sentences = [*straight, *jump_doubts(own), *computed, *session]
+    if recording.belt is not None and feet is not None:
+        sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
         sentences += loads_doubts(recording.plates)
         sentences += [] if feet is None else load_places_doubts(recording, feet)

@@ -14,6 +14,7 @@ from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.result import Fit
 from kinertia.estimation.session import with_instruments
+from kinertia.io.belt_file import read_belt
 from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.population_file import read_population
@@ -151,5 +152,6 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
         apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
         if plates is not None and apart:
             plates = replace(plates, names=tuple(f"{name} ({files.name})" for name in plates.names))
-        inputs.append(TrialInput(replace(recording, name=files.name, plates=plates), files.window_s, seconds))
+        recording = replace(recording, name=files.name, plates=plates, belt=read_belt(files.belt_speed_m_s))
+        inputs.append(TrialInput(recording, files.window_s, seconds))
     return inputs

@@ -38,6 +38,7 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     paths = [path for path in (model.static, model.osim, model.markers, *others) if isinstance(path, Path)]
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
+        paths += [trial.belt_speed_m_s] if isinstance(trial.belt_speed_m_s, Path) else []
     names = names_from_common_folder(paths)
     return Provenance(command, {name: sha256(path) for name, path in zip(names, paths, strict=True)})
 

@@ -15,6 +15,7 @@
     forces = "walk1_grf.mot"
     loads = "walk1_grf.xml"        # ExternalLoads: which column of `forces` is what
     window_s = [0.4, 1.9]          # left out: where every foot on the ground is measured
+    belt_speed_m_s = 1.25          # of a treadmill; or "speed.csv": time_s,speed_m_s; left out: by the standing feet
 
     [settings]                     # every one has a default, see `kinertia.settings.Settings`
     cutoff_hz = 6.0
@@ -106,11 +107,20 @@ def _window(value: object) -> tuple[float, float]:
     raise ValueError("must be [start, end] in seconds, the start before the end")
 
 
+def _belt_speed(value: object, info: ValidationInfo) -> float | Path:
+    if isinstance(value, str | Path):
+        return _file(value, info)
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= 15:
+        return float(value)
+    raise ValueError("must be the speed of a treadmill's belt in m/s (up to 15), or a file with it over time")
+
+
 File = Annotated[Path, BeforeValidator(_file)]
 MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 TrialName = Annotated[str, BeforeValidator(_trial_name)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
 LengthUnit = Literal["mm", "cm", "m"]
+BeltSpeed = Annotated[float | Path, BeforeValidator(_belt_speed)]
 
 
 class Model(Table):
@@ -141,6 +151,9 @@ class TrialFiles(Table):
         default=None, description="of a C3D file that says none, or a wrong one: mm, cm or m"
     )
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
+    belt_speed_m_s: BeltSpeed | None = Field(
+        default=None, description="of a treadmill: m/s, or a file with it over time; left out: by standing feet"
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.motion.gait_cycle import FeetUnderPelvis, Stride
+from kinertia.trial.belt import Belt
 
 _FOOT_FLAT = (10.0, 30.0)
 """% of the cycle in which the foot lies flat on the ground, until the heel rises."""
@@ -46,18 +47,27 @@ class Spatiotemporal:
     double_support_percent: float
 
 
-def spatiotemporal(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> tuple[Spatiotemporal, ...]:
+def spatiotemporal(
+    feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None = None
+) -> tuple[Spatiotemporal, ...]:
     """The measures of each of these strides."""
-    return tuple(_measures(feet, *pair) for pair in zip(strides, travelled(feet, strides), strict=True))
+    return tuple(_measures(feet, *pair) for pair in zip(strides, travelled(feet, strides, belt), strict=True))
 
 
-def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
-    """(k, 3) m, horizontal: from heel strike to heel strike of each stride, on a treadmill against the belt."""
-    belt = _belt_velocity(feet, strides)
+def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None = None) -> np.ndarray:
+    """(k, 3) m, horizontal: from heel strike to heel strike of each stride, on a treadmill against the belt.
+
+    Standing feet tell its speed where it is not stated, and always its direction.
+    """
+    by_feet = _belt_velocity(feet, strides)
+    along = by_feet / max(float(np.linalg.norm(by_feet)), 1e-9)
     paths = []
     for stride in strides:
         start, end = (_at(feet, feet.heel[stride.side], time) for time in (stride.start_s, stride.end_s))
-        paths.append((end - start - belt * (stride.end_s - stride.start_s)) * [1.0, 0.0, 1.0])
+        under = by_feet * (stride.end_s - stride.start_s)
+        if belt is not None:
+            under = along * belt.way_m(stride.start_s, stride.end_s)
+        paths.append((end - start - under) * [1.0, 0.0, 1.0])
     return np.array(paths).reshape(-1, 3)
 
 

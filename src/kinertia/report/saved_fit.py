@@ -26,6 +26,7 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.report.truth import Truth
 from kinertia.settings import Settings, Subject
+from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
 
 FIT_FILE = "fit.npz"
@@ -53,7 +54,7 @@ _KINDS = (
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
-    Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads,
+    Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
 

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from kinertia.errors import MarkerSetError
 from kinertia.trial import display
+from kinertia.trial.belt import Belt
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -182,6 +183,7 @@ class Recording:
         length_unit: of the marker file ("mm"); everything here is in m.
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
         virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
+        belt: of the treadmill, where its speed is stated.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -199,6 +201,7 @@ class Recording:
     length_unit: str = "m"
     vertical: str = "+Y"
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
+    belt: Belt | None = None
 
     def without_empty_markers(self) -> Recording:
         """The same without markers that no frame shows, and a note that names them."""
@@ -279,7 +282,7 @@ class Trial:
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
-        virtual_sd_m: as the recording's.
+        virtual_sd_m, belt: as the recording's.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -296,6 +299,7 @@ class Trial:
     measured: BoolArray
     notes: tuple[str, ...] = ()
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
+    belt: Belt | None = None
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

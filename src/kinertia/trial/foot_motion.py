@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.errors import MarkerSetError
+from kinertia.trial.belt import Belt
 from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
 
 _SPEED_SPAN_S = 0.01
@@ -52,13 +53,13 @@ class FootMotion:
         return FootMotion(self.height - level, self.velocity, self.still)
 
 
-def foot_motions(feet: Sequence[Markers], loaded: BoolArray) -> list[FootMotion]:
+def foot_motions(feet: Sequence[Markers], loaded: BoolArray, belt: Belt | None = None) -> list[FootMotion]:
     """Of the markers of both feet, which stand on loaded plates in these frames (n, 2).
 
     Heights are above what a foot may stand on: each marker's own lowest place under load, or, where plates stand at
     several heights, that of the highest of them which it is not below. Velocities are against the ground under the
-    loaded feet: the median of the lowest marker's, zero on a floor, the belt's on a treadmill. A foot that is never
-    loaded takes the other's.
+    loaded feet: the median of the lowest marker's, zero on a floor, the belt's on a treadmill; this only
+    tells the direction of a belt whose speed is stated. A foot that is never loaded takes the other's.
     """
     places = [_short_gaps_filled(markers) for markers in feet]
     moves = [_velocity(markers, place, _SPEED_SPAN_S) for markers, place in zip(feet, places, strict=True)]
@@ -74,6 +75,8 @@ def foot_motions(feet: Sequence[Markers], loaded: BoolArray) -> list[FootMotion]
     steps = _steps(heights, loaded)
     result = []
     for markers, place, height, velocity, of_ground in zip(feet, places, heights, moves, velocities, strict=True):
+        if belt is not None:
+            of_ground = belt.velocity(markers.time, of_ground)[:, None]
         slow = _velocity(markers, place, _STILL_SPAN_S)
         still = _still(markers.time, slow - of_ground) | _still(markers.time, slow)
         result.append(FootMotion(_over(steps, height), velocity - of_ground, still))

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers, runs
 from kinertia.trial.ground_contact import bridged
 
 _LOW = 0.15
 """Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""
 _LEAST_BELT_M_S = 0.3
+_BELT_APART = 0.25
+"""Share by which a stated speed may differ from that of standing feet, which roll."""
 _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 """A foot stands while one of its markers is slower than this share of its own fast speed, within these limits."""
 _LEAST_SWING_M_S = 1.0
@@ -56,18 +59,21 @@ class FootWay:
         return result
 
 
-def foot_ways(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[FootWay, FootWay] | None:
+def foot_ways(
+    markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt | None = None
+) -> tuple[FootWay, FootWay] | None:
     """Right and left foot; None where a foot is hardly seen.
 
     Args:
         markers: of a motion, Y up.
         feet: labels of the markers on each foot, "r" and "l".
+        belt: of the treadmill, where its speed is stated.
     """
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
     if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
         return None
     ways = []
-    for place, velocity in zip(places, _velocities(markers, places), strict=True):
+    for place, velocity in zip(places, _velocities(markers, places, belt), strict=True):
         back, front = _ends(markers.time, place)
         if _swing(velocity, front - back) < 0:
             back, front = front, back
@@ -87,9 +93,37 @@ def _seen(place: FloatArray) -> BoolArray:
     return np.asarray(np.isfinite(place).all(axis=2))
 
 
-def _velocities(markers: Markers, places: Sequence[FloatArray]) -> list[FloatArray]:
+def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | None) -> list[FloatArray]:
     """(n, m, 3) m/s of every marker of each foot against the ground."""
     velocities = [np.gradient(place, markers.time, axis=0) for place in places]
+    belt = _belt(places, velocities)
+    if stated is not None:
+        return [velocity - stated.velocity(markers.time, belt)[:, None] for velocity in velocities]
+    if np.linalg.norm(belt) < _LEAST_BELT_M_S:
+        belt = np.zeros(3)
+    return [velocity - belt for velocity in velocities]
+
+
+def belt_doubts(markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt) -> list[str]:
+    """A stated speed of the belt that is not that of the standing feet."""
+    places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
+    if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
+        return []
+    velocities = [np.gradient(place, markers.time, axis=0) for place in places]
+    shown = float(np.linalg.norm(_belt(places, velocities)))
+    stated = belt.way_m(markers.time[0], markers.time[-1]) / float(np.ptp(markers.time))
+    if abs(shown - stated) <= max(_BELT_APART * max(stated, shown), _LEAST_BELT_M_S):
+        return []
+    ratio = stated / max(shown, 1e-9)
+    unit = "; it looks to be in km/h" if abs(ratio / 3.6 - 1) < _BELT_APART else ""
+    return [
+        f"the stated speed of the belt is {stated:.2f} m/s on average, but standing feet go {shown:.2f} m/s{unit}: "
+        "correct belt_speed_m_s (m/s), or leave it out"
+    ]
+
+
+def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> FloatArray:
+    """(3,) m/s, horizontal: median velocity of feet that are lowest."""
     low = []
     for place, velocity in zip(places, velocities, strict=True):
         shown = _seen(velocity).any(axis=1) & _seen(place).any(axis=1)
@@ -98,10 +132,7 @@ def _velocities(markers: Markers, places: Sequence[FloatArray]) -> list[FloatArr
         near = shown & (height <= np.quantile(height[shown], _LOW)) if shown.any() else shown
         low.append(np.nanmean(velocity[near], axis=1))
     every = np.concatenate(low)
-    belt = np.median(every, axis=0) * np.array([1.0, 0.0, 1.0]) if len(every) else np.zeros(3)
-    if np.linalg.norm(belt) < _LEAST_BELT_M_S:
-        belt = np.zeros(3)
-    return [velocity - belt for velocity in velocities]
+    return np.median(every, axis=0) * np.array([1.0, 0.0, 1.0]) if len(every) else np.zeros(3)
 
 
 def _stands(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Markers, nearest_samples, runs
 from kinertia.trial.foot_motion import FootMotion, foot_motions
 
@@ -40,7 +41,7 @@ FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
 
 
-def measured_frames(markers: Markers, loads: FootLoads, feet: FootMarkers) -> BoolArray:
+def measured_frames(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> BoolArray:
     """(n,) True where every foot on the ground stands on a loaded plate, so that all ground contact is known.
 
     A loaded foot is on the ground by its load. A foot without load is on the ground while one of its markers
@@ -56,9 +57,10 @@ def measured_frames(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Bo
     measured only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have seen both the
     take-off and the landing. A foot whose markers are missing counts as on the ground.
 
-    Speeds are against the ground under the loaded feet, so that a treadmill's belt is no trouble.
+    Speeds are against the ground under the loaded feet, so that a treadmill's belt is no trouble; against the belt
+    where its speed is stated.
     """
-    return ground_contact(markers, loads, feet).measured(markers.time)
+    return ground_contact(markers, loads, feet, belt).measured(markers.time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +90,7 @@ class GroundContact:
         return measured
 
 
-def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers) -> GroundContact:
+def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> GroundContact:
     """Which foot is on the ground and which on a loaded plate, by the rules of `measured_frames`."""
     nearest = nearest_samples(loads.time, markers.time)
     inside = (markers.time >= loads.time[0] - 1e-6) & (markers.time <= loads.time[-1] + 1e-6)
@@ -97,7 +99,7 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers) -> Gro
         axis=1,
     )
     ground = loaded.copy()
-    moves = foot_motions([markers.select(feet[foot]) for foot in FEET], loaded)
+    moves = foot_motions([markers.select(feet[foot]) for foot in FEET], loaded, belt)
     if loaded.any():
         clearance, landing, leaving = _learned(moves, loaded)
         resting = np.stack([move.still for move in moves], axis=1) & ~loaded

@@ -76,7 +76,7 @@ def load_places_trouble(recording: Recording, feet: Mapping[str, Sequence[str]])
         recording: a motion with plates.
         feet: labels of the markers on each foot, "r" and "l".
     """
-    ways = foot_ways(recording.markers, feet)
+    ways = foot_ways(recording.markers, feet, recording.belt)
     if ways is None or recording.plates is None:
         return ""
     contacts = _contacts(recording.plates, ways)
@@ -93,7 +93,7 @@ def load_places_trouble(recording: Recording, feet: Mapping[str, Sequence[str]])
 
 def load_places_doubts(recording: Recording, feet: Mapping[str, Sequence[str]]) -> list[str]:
     """Offsets of all plates together, and loads that belong to both feet, if `load_places_trouble` found nothing."""
-    ways = foot_ways(recording.markers, feet)
+    ways = foot_ways(recording.markers, feet, recording.belt)
     if ways is None or recording.plates is None:
         return []
     contacts = _contacts(recording.plates, ways)

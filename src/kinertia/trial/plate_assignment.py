@@ -69,7 +69,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
     if len(recording.markers.time) < 2:
         raise TrialError(recording.name, "only one frame; expected a motion, or use the file as a static trial")
     loads, notes = assign_plates(recording, feet)
-    contact = ground_contact(recording.markers, loads, feet)
+    contact = ground_contact(recording.markers, loads, feet, recording.belt)
     measured = contact.measured(recording.markers.time)
     if window_s is not None:
         spans = _spans(recording.markers.time, measured)
@@ -81,7 +81,8 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         )
     if not measured.any():
         raise TrialError(recording.name, _nothing_measured(recording.markers.time, contact, window_s))
-    return Trial(recording.name, recording.markers, loads, measured, (*recording.notes, *notes), recording.virtual_sd_m)
+    told = (*recording.notes, *notes)
+    return Trial(recording.name, recording.markers, loads, measured, told, recording.virtual_sd_m, recording.belt)
 
 
 def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[str, ...]]:

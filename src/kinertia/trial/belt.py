@@ -1,0 +1,45 @@
+"""The belt of a treadmill whose speed is stated.
+
+Where it is not, standing feet tell it, as one speed for the whole trial: as good for a belt that keeps its speed, and
+wrong for one that starts, stops or follows the person.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_NO_WAY_M_S = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Belt:
+    """Speed of a belt over time; of one that keeps its speed, a single time is enough.
+
+    Attributes:
+        time: (k,) s, on the markers' clock.
+        speed_m_s: (k,).
+
+    Examples:
+        >>> belt = Belt(np.array([0.0, 2.0]), np.array([1.0, 2.0]))
+        >>> belt.velocity(np.array([1.0]), np.array([-0.9, 0.0, 0.0])).tolist()
+        [[-1.5, 0.0, 0.0]]
+        >>> belt.way_m(0.0, 2.0)
+        3.0
+    """
+
+    time: np.ndarray
+    speed_m_s: np.ndarray
+
+    def velocity(self, time: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """(n, 3) m/s at these times, in the direction (3,) in which standing feet go; zero where they go nowhere."""
+        length = float(np.linalg.norm(along))
+        direction = along / length if length > _NO_WAY_M_S else np.zeros(3)
+        return np.asarray(np.interp(time, self.time, self.speed_m_s)[:, None] * direction)
+
+    def way_m(self, start_s: float, end_s: float) -> float:
+        """How far it goes."""
+        between = self.time[(self.time > start_s) & (self.time < end_s)]
+        at = np.array([start_s, *between, end_s])
+        return float(np.trapezoid(np.interp(at, self.time, self.speed_m_s), at))

@@ -1,0 +1,71 @@
+"""A treadmill's belt that does not keep its speed: stated, the feet are told to stand as on a floor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.belt_file import read_belt
+from kinertia.trial.belt import Belt
+from kinertia.trial.foot_ways import belt_doubts
+from kinertia.trial.plate_assignment import build_trial
+from walk_on_plates import FEET, walk
+
+STEPS = [("r", 0), ("l", 0), ("r", 1)]
+
+
+@pytest.fixture(scope="module")
+def faster():
+    """A walk of 1.2 m/s over ground, and the same on a belt that speeds up from 0.4 to 2.0 m/s."""
+    on_floor = walk(STEPS)
+    time = on_floor.markers.time
+    speed = 0.4 + 1.6 * time / time[-1]
+    belt = Belt(time, speed)
+    way = np.array([belt.way_m(0.0, t) for t in time])
+    positions = on_floor.markers.positions - way[:, None, None] * [1.0, 0.0, 0.0]
+    # the loads travel with the feet
+    plates = on_floor.plates
+    under = np.interp(plates.time, time, way)
+    moment = plates.moment - np.cross(under[:, None, None] * [1.0, 0.0, 0.0], plates.force)
+    on_belt = replace(
+        on_floor, markers=replace(on_floor.markers, positions=positions), plates=replace(plates, moment=moment)
+    )
+    return on_floor, on_belt, belt
+
+
+def test_measured_frames_are_those_of_the_floor(faster):
+    on_floor, on_belt, belt = faster
+    expected = build_trial(on_floor, FEET).measured
+    stated = build_trial(replace(on_belt, belt=belt), FEET)
+    np.testing.assert_array_equal(stated.measured, expected)
+    assert stated.belt is belt
+    # one speed for all is not what this belt has
+    assert (build_trial(on_belt, FEET).measured != expected).any()
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1.0, ""), (3.6, "it looks to be in km/h"), (0.5, "standing feet go")])
+def test_a_speed_that_is_not_the_belts_is_doubted(faster, factor, words):
+    _, on_belt, belt = faster
+    doubts = belt_doubts(on_belt.markers, FEET, replace(belt, speed_m_s=factor * belt.speed_m_s))
+    assert bool(doubts) == bool(words)
+    assert all(words in one for one in doubts)
+
+
+@pytest.mark.parametrize("kind", ["csv", "semicolons", "mot"])
+def test_files(tmp_path, kind):
+    if kind == "mot":
+        path = tmp_path / "grf.mot"
+        path.write_text("grf\nnRows=2\nnColumns=3\nendheader\ntime\tground_force_vx\tbelt_speed\n0\t1\t1\n2\t1\t2\n")
+    else:
+        path = tmp_path / "speed.csv"
+        text = "time_s,speed_m_s\n0,1.0\n2,2.0\n"
+        path.write_text(text if kind == "csv" else text.replace(",", ";").replace(".", ","))
+    belt = read_belt(path)
+    assert belt.way_m(0.0, 2.0) == pytest.approx(3.0)
+    assert belt.velocity(np.array([1.0, 9.0]), np.array([0.0, 0.0, -3.0])).tolist() == [[0, 0, -1.5], [0, 0, -2]]
+
+
+def test_a_constant():
+    belt = read_belt(1.5)
+    assert belt.way_m(3.0, 5.0) == pytest.approx(3.0)
+    assert read_belt(None) is None
