@@ -1,5 +1,7 @@
 """Labels that make no body are named with their cause; those of sound trials never are."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,17 @@ def test_a_turned_person_is_the_same_person(recorded):
     angle = np.radians(130.0)
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     assert sides_trouble(Markers(markers.time, markers.labels, markers.positions @ turn.T), marker_set) == ""
+
+
+@pytest.mark.parametrize(("up", "words"), [(2, r"along \+Z"), (-2, "along -Z"), (0, r"along \+X"), (-1, "along -Y")])
+def test_another_axis_up(recorded, up, words):
+    """Arms held out sideways make a person as wide as tall: extents do not tell."""
+    markers, marker_set = recorded
+    axis, sign = abs(up), -1.0 if up < 0 else 1.0
+    turn = {2: [[1, 0, 0], [0, 0, -1], [0, 1, 0]], 0: [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], 1: np.diag([-1.0, 1.0, -1.0])}
+    to = sign * np.array(turn[axis], dtype=float)
+    trouble = sides_trouble(Markers(markers.time, markers.labels, markers.positions @ to.T), marker_set)
+    assert re.search(f"from the feet to the pelvis it goes .* m {words}", trouble)
 
 
 @pytest.mark.parametrize("axis", [0, 2])

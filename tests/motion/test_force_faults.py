@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
-from kinertia.motion.force_faults import direction_trouble, offset_trouble
+from kinertia.motion.force_faults import direction_trouble, offset_trouble, plate_sign_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.plate_assignment import build_trial
@@ -50,6 +50,24 @@ def sorted_by_foot(walk, marker_set=None):
 
 def test_sound_walks_are_not_doubted(walk):
     assert trouble_of(walk) == ""
+
+
+@pytest.mark.parametrize("axis", ["X", "Z"])
+@pytest.mark.parametrize("plate", [0, 1])
+def test_the_sign_of_one_plate(walk, axis, plate):
+    signs = np.ones((2, 3))
+    signs[plate, "XYZ".index(axis)] = -1.0
+    wrong = with_force(walk, lambda force: force * signs)
+    trouble = one_plate_trouble(wrong)
+    assert trouble.startswith(f"the horizontal force of {walk.plates.names[plate]} along {axis} has the wrong sign")
+    assert one_plate_trouble(walk) == ""
+    assert one_plate_trouble(with_force(walk, lambda force: force * np.prod(signs, axis=0))) == ""
+
+
+def one_plate_trouble(walk):
+    marker_set = choose_marker_set(walk.markers.labels)
+    owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
+    return plate_sign_trouble(walk.plates, sorted_by_foot(walk, marker_set), owners)
 
 
 def on_one_belt(walk):
@@ -150,6 +168,7 @@ def test_a_file_at_another_rate(walk, factor, words):
 def test_signs_in_a_run(measured_recording, signs, words):
     """Limbs swing so much that the pelvis does not go as the centre of mass."""
     run = measured_recording("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
+    assert one_plate_trouble(run) == ""
     trouble = trouble_of(with_force(run, lambda force: force * signs))
     assert trouble.startswith(words)
     assert bool(trouble) == bool(words)

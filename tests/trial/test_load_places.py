@@ -66,6 +66,15 @@ def test_other_origins(walk, offset_m):
     assert "entres of pressure" in trouble
 
 
+@pytest.mark.parametrize("offset_m", [0.1, -0.1])
+def test_offsets_along_the_walk(walk, offset_m):
+    """As long as loads lie along the foot: where they begin and end tells."""
+    recording, feet = walk
+    other = moved(recording, (offset_m, 0.0, 0.0))
+    trouble = load_places_trouble(other, feet) or "".join(load_places_doubts(other, feet))
+    assert "centres of pressure" in trouble
+
+
 def test_points_in_mm(walk):
     recording, feet = walk
     assert "they are in mm" in load_places_trouble(moved(recording, (0.0, 0.0, 0.0), factor=1000.0), feet)
@@ -134,3 +143,12 @@ def test_both_feet_on_a_plate():
         part[rows, 1] = 0.0
     (doubt,) = load_places_doubts(replace(recording, plates=replace(plates, force=force, moment=moment)), SIMPLE_FEET)
     assert "both feet are on it (plate 1 from 0.7" in doubt
+
+
+def test_a_foot_that_swings_is_on_no_plate(measured_recording):
+    """A runner's centre of pressure that is off the foot is not the other foot's, which is in the air."""
+    run = measured_recording("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
+    feet = choose_marker_set(run.markers.labels).foot_labels()
+    doubts = load_places_doubts(moved(run, (0.0, 0.0, 0.13)), feet)
+    assert doubts
+    assert not any("both feet are on it" in doubt for doubt in doubts)

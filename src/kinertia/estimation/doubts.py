@@ -14,7 +14,7 @@ from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
-from kinertia.motion.force_faults import direction_trouble, offset_trouble
+from kinertia.motion.force_faults import direction_trouble, offset_trouble, plate_sign_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
@@ -107,7 +107,8 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
         marker_set: which marker is on which segment.
     """
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
-    if trouble := direction_trouble(trial, owners):
+    one_plate = "" if recording.plates is None else plate_sign_trouble(recording.plates, trial, owners)
+    if trouble := one_plate or direction_trouble(trial, owners):
         return _refused(trouble)
     offset = offset_trouble(trial, owners)
     return _told([*([offset] if offset else []), *gain_doubts(recording, trial, owners)])

@@ -16,6 +16,8 @@ from kinertia.trial.data import FloatArray, Markers
 _UP = np.array([0.0, 1.0, 0.0])
 _CLEAR = 0.5
 """Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
+_UPRIGHT = 0.5
+"""Cosine of 60 degrees: who sits has the pelvis half beside the feet."""
 _FLAT = 0.8
 """Cosine of 37 degrees."""
 _BELOW_M = 0.05
@@ -36,6 +38,8 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         marker_set: which label is which landmark.
     """
     places = _landmarks(markers, marker_set)
+    if lying := _lying_trouble(places):
+        return lying
     fronts = _fronts(places)
     if len(fronts) < 2:
         return ""
@@ -64,6 +68,24 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         _order_trouble(places, marker_set)
         or _outside_trouble(places, right, marker_set)
         or _elbow_trouble(places, right, marker_set)
+    )
+
+
+def _lying_trouble(places: Mapping[str, FloatArray]) -> str:
+    """A pelvis that is beside the feet, or under them: the person is upright, but not along Y."""
+    feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
+    if not feet or not {"asis_r", "asis_l"} <= set(places):
+        return ""
+    with np.errstate(invalid="ignore"):
+        along = np.nanmedian((places["asis_r"] + places["asis_l"]) / 2 - np.mean(feet, axis=0), axis=0)
+    length = float(np.linalg.norm(along))
+    if not length > 0 or along[1] > _UPRIGHT * length:
+        return ""
+    axis = int(np.argmax(np.abs(along)))
+    sign = "-" if along[axis] < 0 else "+"
+    return (
+        f"from the feet to the pelvis it goes {abs(along[axis]):.2f} m along {sign}{'XYZ'[axis]} and {along[1]:.2f} m "
+        f"along +Y, which should be up; turn the file's axes so that {sign}{'XYZ'[axis]} becomes +Y"
     )
 
 

@@ -70,7 +70,7 @@ def body_trouble(static: Markers, trial: Markers, marker_set: MarkerSet) -> str:
     distances = _Distances.of(static, trial, marker_set)
     if not len(distances.pairs):
         return ""
-    return _swapped(distances) or _another_body(distances)
+    return _swapped(distances) or _turned_round(distances) or _another_body(distances)
 
 
 def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
@@ -133,6 +133,34 @@ def _swapped(distances: _Distances) -> str:
         f"the markers {one} and {other} look swapped, here or in the static trial: distances to the others of their "
         f"segments differ by up to {1e3 * before_m:.0f} mm between the two, and by {1e3 * after_m:.0f} mm once they "
         "are exchanged; correct the labels"
+    )
+
+
+def _turned_round(distances: _Distances) -> str:
+    """Which two pairs of labels of one segment fit once both are exchanged: front and back, for one."""
+    off = np.abs(distances.differences())
+    if not (off > _SWAPPED_M).any():
+        return ""
+    mates = {k: set(distances.pairs[(distances.pairs == k).any(axis=1)].ravel()) for k in np.unique(distances.pairs)}
+    best: tuple[float, tuple[int, int, int, int]] | None = None
+    for a, b in combinations(mates, 2):
+        for c, d in combinations(mates, 2):
+            if a >= c or len({a, b, c, d}) < 4 or not {b, c, d} <= mates[a]:
+                continue
+            order = np.arange(len(distances.labels))
+            order[[a, b, c, d]] = b, a, d, c
+            own = np.isin(distances.pairs, (a, b, c, d)).any(axis=1)
+            after = np.nan_to_num(np.abs(distances.differences(order)[own]), nan=np.inf)
+            if off[own].max() > _SWAPPED_M and after.max() < _CURED * off[own].max():
+                gain = float(off[own].sum() - after.sum())
+                best = max(best or (0.0, (a, b, c, d)), (gain, (a, b, c, d)), key=lambda one: one[0])
+    if best is None:
+        return ""
+    one, two, three, four = (distances.labels[k] for k in best[1])
+    return (
+        f"the markers {one} and {two}, and {three} and {four} look swapped, here or in the static trial: distances in "
+        f"their segment differ by up to {1e3 * off.max():.0f} mm between the two, and fit once they are exchanged "
+        "(or the segment's other markers are); correct the labels"
     )
 
 

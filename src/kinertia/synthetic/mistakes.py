@@ -84,7 +84,7 @@ MISTAKES = (
     Mistake(
         "front and back of the pelvis swapped in the static trial",
         markers.exchanged(*_ASIS_PSIS, where="static"),
-        "pelvis points backwards",
+        "pelvis points backwards|ASI.*PSI.* look swapped|ASIS.*PSIS.* look swapped",
     ),
     Mistake(
         "heel and toe swapped, one foot",

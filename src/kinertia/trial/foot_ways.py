@@ -21,6 +21,8 @@ _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 _LEAST_SWING_M_S = 1.0
 """Who does not move the feet faster takes no steps."""
 _SHORTEST_S = 0.1
+_LANDING_S = 0.05
+"""A foot may bear load so long before it stands and after."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,14 @@ class FootWay:
     back: FloatArray
     front: FloatArray
     stands: tuple[tuple[float, float, bool], ...]
+
+    def standing(self, time: FloatArray) -> BoolArray:
+        """(k,) whether it stands then, or a little before or after; everywhere where that cannot be told."""
+        if not self.stands:
+            return np.ones(len(time), dtype=bool)
+        spans = [(time >= start - _LANDING_S) & (time <= end + _LANDING_S) for start, end, _ in self.stands]
+        result: BoolArray = np.any(spans, axis=0)
+        return result
 
     def beyond(self, time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(k,) m, how far places (k, 2) at times (k,) are in front of the back, and in front of the front."""

@@ -33,6 +33,9 @@ _BEGIN_M, _END_M = -0.015, 0.06
 """There is no foot behind the marker at the back of the heel: on sound trials, from squats to forefoot runs, the first
 twentieth of a load is 36 to 99 mm in front of it. The last one is at most 25 mm in front of the foremost marker, which
 may be on the metatarsals."""
+_BOTH_BACK_M, _BOTH_FORWARD_M = (0.02, -0.07), (0.13, 0.035)
+"""Where the first twentieth of steps and their last one are both, on average, farther back, or farther forward, no way
+of landing or pushing off is the reason. On nine sound trials they are 36 to 85 mm and -58 to 25 mm."""
 _OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
 _BOTH_M, _ONE_STEP_S, _MOSTLY = 0.08, 1.5, 0.5
 """Loads that last longer than a step are of both feet, in turn (walking on one belt) or at once (squats): then most of
@@ -97,7 +100,7 @@ def load_places_doubts(recording: Recording, feet: Mapping[str, Sequence[str]]) 
     if ways is None or recording.plates is None:
         return []
     contacts = _contacts(recording.plates, ways)
-    doubts = [_offset_doubt(contacts), _both_feet_doubt(recording.plates, contacts)]
+    doubts = [_offset_doubt(contacts), _both_feet_doubt(recording.plates, contacts, ways)]
     return [one for one in doubts if one]
 
 
@@ -303,21 +306,34 @@ def _ends_doubt(contacts: Sequence[_Contact]) -> str:
     # of two contacts both, lest a second foot on one plate counts
     ends = np.sort([one.ends_m for one in contacts], axis=0)
     behind, before = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])
-    if behind >= _BEGIN_M and before <= _END_M:
+    steps = [one.ends_m for one in contacts if np.isfinite(one.end_s - one.start_s)]
+    if behind < _BEGIN_M:
+        where = f"begin {-1e3 * behind:.0f} mm behind the heels' markers (usual are 35 to 100 mm in front of them)"
+    elif before > _END_M:
+        where = f"end {1e3 * before:.0f} mm in front of the foremost markers of the feet (usual are 25 at most)"
+    elif steps and _shifted(first := float(np.mean(steps, axis=0)[0]), last := float(np.mean(steps, axis=0)[1])):
+        where = (
+            f"begin {1e3 * first:.0f} mm in front of the heels' markers and end {1e3 * last:+.0f} mm from the foremost "
+            "markers of the feet (usual are 35 to 100 mm, and -60 to +25 mm)"
+        )
+    else:
         return ""
-    where = (
-        f"begin {-1e3 * behind:.0f} mm behind the heels' markers (usual are 35 to 100 mm in front of them)"
-        if behind < _BEGIN_M
-        else f"end {1e3 * before:.0f} mm in front of the foremost markers of the feet (usual are 25 at most)"
-    )
     return (
-        f"centres of pressure {where}, median of {len(contacts)} contacts: cameras and plates have different origins, "
+        f"centres of pressure {where}, of {len(contacts)} contacts: cameras and plates have different origins, "
         "or all plates are off along the walk; check the places of the plates with a pole or by standing on a marker"
     )
 
 
-def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact]) -> str:
-    """A load between the feet: both are on the plate, but only the sum of what they do is known."""
+def _shifted(first_m: float, last_m: float) -> bool:
+    """Whether steps both begin and end too far back, or too far forward."""
+    (first_back, last_back), (first_forward, last_forward) = _BOTH_BACK_M, _BOTH_FORWARD_M
+    return (first_m < first_back and last_m < last_back) or (first_m > first_forward and last_m > last_forward)
+
+
+def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact], ways: tuple[FootWay, FootWay]) -> str:
+    """A load between the feet: both are on the plate, but only the sum of what they do is known. A foot that swings by
+    its markers is on none.
+    """
     spans = []
     for contact in contacts:
         distance = np.linalg.norm(contact.off_m, axis=2)
@@ -326,6 +342,7 @@ def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[_Contact]) -> str:
         # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
         if contact.time[-1] - contact.time[0] > _ONE_STEP_S:
             away = between
+        away &= ways[1 - contact.foot].standing(contact.time)
         share = float(contact.weight[away].sum() / contact.weight.sum())
         if share > (_MOSTLY if contact.time[-1] - contact.time[0] > _ONE_STEP_S else _OUTSIDE_SHARE):
             when = contact.time[away]
