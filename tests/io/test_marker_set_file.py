@@ -128,3 +128,26 @@ def test_an_unknown_preset_lists_those_that_exist():
         match=r"no such marker set.*cgm2, cleveland-clinic, ior-lower-body, opencap, opencap-mocap, plug-in-gait, plug",
     ):
         read_marker_set("helen-hayes")
+
+
+@pytest.mark.parametrize(
+    ("codes", "side", "expected"),
+    [
+        ("van-sint-jan-lower-body", "{}", "RCAJ"),
+        ("qualisys-lower-body", "{}_", "R_SAE"),
+        ("ior-lower-body", None, "RA"),
+    ],
+)
+def test_landmark_codes_are_told_by_their_labels(codes, side, expected):
+    """As https://wiki.has-motion.com (IOR Gait Full Body Model) lists them, with and without an underscore."""
+    bones = {
+        "van": ["IAS", "IPS", "FTC", "FLE", "FME", "FAX", "TTC", "FAL", "TAM", "FCC", "FM1", "FM2", "FM5"],
+        "ior": ["ASIS", "PSIS", "GT", "LE", "ME", "HF", "TT", "LM", "MM", "CA", "FM", "SM", "VM"],
+    }["ior" if side is None else "van"]
+    before = "{}" if side is None else side
+    trunk = ["C7", "IJ", "PX"] if side is None else ["CV7", "SJN", "SXS"]
+    labels = [before.format(letter) + bone for letter in "RL" for bone in bones] + trunk
+    chosen = choose_marker_set(labels)
+    assert chosen == read_marker_set(codes)
+    assert chosen.landmarks["acromion_r"] == (expected,)
+    assert set(labels) <= set(chosen.labels)

@@ -1,5 +1,7 @@
 """What plates read while nobody stands on them: zeros and drift; loads too small for a person."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,3 +53,19 @@ def test_a_plate_that_nobody_stands_on():
     idle = plates(factor=1e-9)
     assert loads_trouble(idle) == ""
     assert loads_doubts(idle) == []
+
+
+@pytest.mark.parametrize(("top_n", "lost"), [(600.0, True), (690.0, True), (900.0, False)])
+def test_an_amplifier_at_the_end_of_its_range(top_n, lost):
+    plate = plates()
+    force = plate.force.copy()
+    force[..., 1] = np.minimum(force[..., 1], top_n)
+    doubts = loads_doubts(replace(plate, force=force))
+    assert [f"stays at {top_n:.1f} N, its largest value" in doubt for doubt in doubts] == [True] * lost
+
+
+@pytest.mark.parametrize("digits", [0, -1])
+def test_rounded_forces_are_not_cut(digits):
+    vertical = np.where((TIME > 1) & (TIME < 1.6), 700.0 * np.sin(np.pi * (TIME - 1) / 0.6), 0.0).round(digits)
+    force = np.outer(vertical, [0.0, 1.0, 0.0])[:, None]
+    assert loads_doubts(PlateLoads(TIME, ("plate 1",), force, np.zeros_like(force), (None,))) == []

@@ -76,10 +76,13 @@ def _lying_trouble(places: Mapping[str, FloatArray]) -> str:
     feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
     if not feet or not {"asis_r", "asis_l"} <= set(places):
         return ""
-    with np.errstate(invalid="ignore"):
-        along = np.nanmedian((places["asis_r"] + places["asis_l"]) / 2 - np.mean(feet, axis=0), axis=0)
+    lines = (places["asis_r"] + places["asis_l"]) / 2 - np.mean(feet, axis=0)
+    lines = lines[np.isfinite(lines).all(axis=1)]
+    if not len(lines):
+        return ""
+    along = np.median(lines, axis=0)
     length = float(np.linalg.norm(along))
-    if not length > 0 or along[1] > _UPRIGHT * length:
+    if along[1] > _UPRIGHT * length:
         return ""
     axis = int(np.argmax(np.abs(along)))
     sign = "-" if along[axis] < 0 else "+"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads, runs
 
 _LONGEST_ARM_M = 0.15
 """Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
@@ -15,6 +15,10 @@ _STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of a person's weight on every plate."""
 _WEAKEST_N = 0.3
+_SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
+"""At the end of a range a force stays exactly the same, and comes there steeply."""
+_ROUNDED = 6.0
+"""A peak that is flat for being rounded is at most 4.5 times what it is rounded to above what was as long before."""
 _IDLE_PERCENT = (2.0, 15.0)
 """A plate that somebody walks over is idle for at least so many percent of the record."""
 
@@ -43,10 +47,10 @@ def loads_trouble(plates: PlateLoads) -> str:
 
 
 def loads_doubts(plates: PlateLoads) -> list[str]:
-    """Zeros that are wrong or drift, by what plates read while nobody stands on them."""
+    """Saturated amplifiers; zeros that are wrong or drift, by what plates read while nobody stands on them."""
+    doubts = _saturated(plates)
     if plates.idle is None:
-        return []
-    doubts = []
+        return doubts
     for name, idle in zip(plates.names, plates.idle, strict=True):
         drifts = abs(idle.drift_n) > _DRIFT_N
         if drifts:
@@ -59,6 +63,29 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
         off = [(axis, value) for axis, value in level if not (drifts and axis == "Y")]
         if off:
             doubts.append(_wrong_zero(name, off))
+    return doubts
+
+
+def _saturated(plates: PlateLoads) -> list[str]:
+    """Vertical forces that reach their largest value and stay there, where a foot's would have gone on."""
+    doubts = []
+    for name, vertical in zip(plates.names, plates.force[..., 1].T, strict=True):
+        top = float(vertical.max(initial=0.0))
+        flat = [
+            (first, last)
+            for first, last in runs(vertical >= top * (1.0 - _SAME))
+            if last - first >= _FEWEST_FLAT and plates.time[last] - plates.time[first] >= _FLAT_S
+        ]
+        steps = np.diff(np.unique(vertical))
+        rise = max(_STEEP * top, _ROUNDED * float(steps.min(initial=top)))
+        cut = [(a, b) for a, b in flat if top - vertical[max(2 * a - b, 0)] > rise]
+        if top > _STEP_N and cut:
+            lasted = max(float(plates.time[b] - plates.time[a]) for a, b in cut)
+            doubts.append(
+                f"the vertical force of {name} stays at {top:.1f} N, its largest value, for up to "
+                f"{1e3 * lasted:.0f} ms: its amplifier or converter is at the end of its range, and more was there than it shows; choose a "
+                "larger range and record the trial again, or use one without such a step"
+            )
     return doubts
 
 
