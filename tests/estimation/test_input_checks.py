@@ -91,6 +91,16 @@ def test_warnings_come_one_by_one(short_fit):
     assert "physically impossible for 1 of 12 segments (thigh_r)" in said
 
 
+def test_how_far_a_centre_of_mass_is_is_told_by_the_prior_where_there_is_one(short_fit):
+    """A trunk may well be 104 mm off: its deviation is 34 mm."""
+    literature, carried = short_fit.literature, CarriedMass.of(short_fit.literature.total_mass_kg, ())
+    far = replace(literature, com_m=literature.com_m + np.eye(12, 3) * 0.104)
+    assert any("moved by 104 mm" in w for w in fit_warnings(carried, literature, far))
+    prior_sd = np.full((12, 10), 0.04)
+    assert fit_warnings(carried, literature, far, prior_sd=prior_sd) == []
+    assert any("moved by 104 mm" in w for w in fit_warnings(carried, literature, far, prior_sd=0.8 * prior_sd))
+
+
 def two_trials(stretch_m=0.0, label="R.Shank.Rear"):
     made = walk(walking_subject(), 0.3)
     trials = []

@@ -109,12 +109,13 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     settings, ready = settings or Settings(), with_attached(ready)
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
+    prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
     warnings = (
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
         *outcome.warnings,
         *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),
-        *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source),
+        *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
     )
     return Fit(
         subject=ready.subject,

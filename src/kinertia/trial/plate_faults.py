@@ -83,8 +83,8 @@ def _saturated(plates: PlateLoads) -> list[str]:
             lasted = max(float(plates.time[b] - plates.time[a]) for a, b in cut)
             doubts.append(
                 f"the vertical force of {name} stays at {top:.1f} N, its largest value, for up to "
-                f"{1e3 * lasted:.0f} ms: its amplifier or converter is at the end of its range, and more was there than "
-                "it shows; choose a larger range and record the trial again, or use one without such a step"
+                f"{1e3 * lasted:.0f} ms: its amplifier or converter is at the end of its range, and more was there "
+                "than it shows; choose a larger range and record the trial again, or use one without such a step"
             )
     return doubts
 

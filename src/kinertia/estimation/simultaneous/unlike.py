@@ -8,6 +8,7 @@ The total mass is left out as far as scale and plates may disagree, which has a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,10 @@ _KNOWN_SHARE = 0.5
 """Share of a combination's prior variance that the data must have taken away for it to count."""
 
 
+_MIRRORED = (3, 8, 9)
+"""Parameters that change their sign from right to left: com_z, ixz, iyz."""
+_ALIKE = 0.5
+"""Share of a segment's move that its other side must have made, too."""
 _SCALE_AGAINST_PLATES = 0.03
 """Relative deviation of the total mass here."""
 
@@ -36,12 +41,15 @@ class Unlikeness:
         combinations: how many these are.
         chance: share of the prior's people who are as far away or further.
         segments: those that have moved most, the furthest first.
+        both_sides: whether the first of them and its other side have moved alike: joints that are found wrongly do so,
+            a prosthesis does not.
     """
 
     distance2: float
     combinations: int
     chance: float
     segments: tuple[str, ...]
+    both_sides: bool
 
     @property
     def unlike(self) -> bool:
@@ -50,13 +58,22 @@ class Unlikeness:
 
     def sentence(self) -> str:
         """What that means, the likeliest causes first."""
+        wrong = "a wrong joint, plate or marker"
+        causes = [
+            "a prosthesis ([segment.shank_l] prosthesis = true)",
+            "something that was worn or carried ([[attached]])",
+            "a body that the tables do not describe (age_years, population under [subject])",
+        ]
+        if self.both_sides:
+            wrong = (
+                f"{wrong}, since left and right are off alike (joint widths, places of the knees' and ankles' markers)"
+            )
+        causes = [wrong, *causes[1:], causes[0]] if self.both_sides else [*causes, wrong]
         rounded = 10.0 ** round(np.log10(max(self.chance, 1e-9)))
         return (
             f"the person is unlike the prior: {self.combinations} combinations of parameters that the data show are "
             f"together as far from it as in 1 of {1.0 / rounded:,.0f} people, most of all "
-            f"{', '.join(self.segments)}; a prosthesis ([segment.shank_l] prosthesis = true), something that was worn "
-            f"or carried ([[attached]]), a body that the tables do not describe (age_years, population under "
-            f"[subject]), or a wrong joint, plate or marker"
+            f"{', '.join(self.segments)}; likely causes: {'; '.join(causes)}"
         )
 
 
@@ -70,6 +87,18 @@ def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.
     along = directions[:, shown].T @ moved / np.sqrt(1.0 - left[shown])
     distance2, count = float(along @ along), int(shown.sum())
     chance = float(chdtrc(count, distance2)) if count else 1.0
-    far = np.abs(moved.reshape(-1, 10)).max(axis=1)
-    order = np.argsort(-far)[:3]
-    return Unlikeness(distance2, count, chance, tuple(estimate.segments[k] for k in order))
+    by_segment = moved.reshape(-1, 10)
+    order = np.argsort(-np.abs(by_segment).max(axis=1))[:3]
+    segments = tuple(estimate.segments[k] for k in order)
+    return Unlikeness(distance2, count, chance, segments, _alike(estimate.segments, by_segment, int(order[0])))
+
+
+def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
+    """Whether segment k and its other side have moved (s, 10) alike in what has moved most of it."""
+    name = segments[k]
+    other = name[:-1] + {"r": "l", "l": "r"}.get(name[-1], "")
+    if name[-2:] not in ("_r", "_l") or other not in segments:
+        return False
+    most = int(np.argmax(np.abs(moved[k])))
+    sign = -1.0 if most in _MIRRORED else 1.0
+    return bool(sign * moved[segments.index(other), most] / moved[k, most] > _ALIKE)
