@@ -117,7 +117,7 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
     assert "likely causes: a prosthesis" in far.sentence()
     off = PRIOR.mean.table()
     for side in "rl":
-        off[SEGMENTS.index(f"shank_{side}"), 1] -= 6.0 * PRIOR.sd[SEGMENTS.index(f"shank_{side}"), 1]
+        off[SEGMENTS.index(f"shank_{side}"), 1] -= 16.0 * PRIOR.sd[SEGMENTS.index(f"shank_{side}"), 1]
     joints = unlikeness(PRIOR, BodySegmentParameters.from_table(SEGMENTS, off), exact)
     assert joints.unlike
     assert joints.both_sides

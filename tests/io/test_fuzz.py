@@ -19,7 +19,7 @@ LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits 
 @LINUX
 @pytest.mark.parametrize(
     ("seed", "cases", "commands"),
-    [(1, 120, 8), pytest.param(2, 10_000, 160, marks=pytest.mark.slow)],
+    [(1, 120, 8), pytest.param(2, 10_000, 1200, marks=pytest.mark.slow)],
     ids=["some", "ten thousand"],
 )
 def test_damaged_files(tmp_path, seed, cases, commands):
