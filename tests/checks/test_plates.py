@@ -112,3 +112,14 @@ def test_who_jumps_is_not_weighed():
     both[:, :, 1] = force[:, None]
     assert mass_by_strides(trial_of(replace(loads, force=both), 0.0, 3.9)) is None
     assert mass_by_strides(trial_of(replace(loads, force=both), 1.0, 3.9)).mass_kg == pytest.approx(MASS_KG)
+
+
+def test_hops_on_one_leg_are_no_strides():
+    """0.25 s on the ground of every 0.5 s, which carry the body on average."""
+    loads = gait_loads(4.0)
+    on_ground = loads.time % 0.5 < 0.25
+    force = np.zeros_like(loads.force)
+    force[:, 0, 1] = np.where(on_ground, 2.0 * MASS_KG * GRAVITY_M_S2, 0.0)
+    mass = mass_by_strides(trial_of(replace(loads, force=force), 0.1, 3.9))
+    assert mass.over == "whole hops"
+    assert mass.mass_kg == pytest.approx(MASS_KG, rel=0.01)

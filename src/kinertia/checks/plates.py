@@ -131,16 +131,16 @@ def _off_plate(force: FloatArray, moment: FloatArray, corners: FloatArray) -> tu
 
 
 def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
-    """Body mass by the mean vertical force over whole strides in the middle of the longest measured window.
+    """Body mass by the mean vertical force over whole strides in the middle of the longest window of known forces.
 
     Landings and leavings of one foot are a stride apart (or several, where steps missed the plates), those of opposite
-    feet a step. Gait repeats itself, so that the strides may begin anywhere. One who stands, or takes no step in
-    `_LONG_WINDOW_S` or longer, is weighed over the whole window. None where the window holds nothing of these: one who
-    jumps is faster at one end of it than at the other.
+    feet a step; where one foot never touches the ground, they are hops. Gait repeats itself, so that the strides may
+    begin anywhere. One who stands, or takes no step in `_LONG_WINDOW_S` or longer, is weighed over the whole window.
+    None where the window holds nothing of these: one who jumps is faster at one end of it than at the other.
     """
     if not trial.measured.any():
         return None
-    start, end = trial.windows()[0]
+    start, end = trial.carried_windows()[0]
     strides, steps = periods(trial.loads)
     fitting = [period for period in strides if period <= end - start]
     stepping = [period for period in steps if period <= end - start]
@@ -157,7 +157,10 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
         return None
     first, last = (start + end - span) / 2, (start + end + span) / 2
     inside = (trial.loads.time >= first - 1e-9) & (trial.loads.time <= last + 1e-9)
-    mean = float(trial.loads.force[inside, :, 1].sum(axis=1).mean())
+    vertical = trial.loads.force[inside, :, 1]
+    if over == "whole strides" and not vertical.any(axis=0).all():
+        over = "whole hops"
+    mean = float(vertical.sum(axis=1).mean())
     return ForceMass(mean / GRAVITY_M_S2, first, last, over)
 
 
