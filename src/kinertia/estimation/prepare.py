@@ -110,7 +110,7 @@ class Prepared:
 
 @one_blas_thread
 def calibrate(
-    model: Gait27, trials: Sequence[Trial], subject: Subject, attached: Sequence[Attached] = ()
+    model: Gait27, trials: Sequence[Trial], carried: CarriedMass
 ) -> tuple[Skeleton, list[str]]:
     """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials, and notes.
 
@@ -119,7 +119,7 @@ def calibrate(
     """
     for trial in trials:
         check_visible(model.skeleton, trial)
-    check_force_masses(model.skeleton, CarriedMass.of(known(subject.mass_kg), attached), trials)
+    check_force_masses(model.skeleton, carried, trials)
     check_same_person(model.skeleton, trials)
     poses = first_poses(model.skeleton, trials)
     skeleton, _ = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
@@ -177,10 +177,10 @@ def prepare(
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [(with_upright_trunk(model.skeleton, trial), angle) for trial, angle in turned]
     trials = [trial for trial, _ in turned]
-    skeleton, notes = calibrate(model, trials, subject, attached)
+    carried = CarriedMass.of(known(subject.mass_kg), attached)
+    skeleton, notes = calibrate(model, trials, carried)
     warnings += unseen_body(skeleton)
-    body_kg = CarriedMass.of(known(subject.mass_kg), attached).body_kg
-    literature = literature_bsp(body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp)
+    literature = literature_bsp(carried.body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp)
     expected = population_prior(literature_prior(literature), subject)
     calibration_s = (time.perf_counter() - started) / len(inputs)
 
