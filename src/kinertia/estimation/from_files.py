@@ -16,6 +16,7 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.session import with_instruments
 from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.measures_file import read_measures
 from kinertia.io.population_file import read_population
 from kinertia.io.provenance import recordings
 from kinertia.io.recording import read_recording
@@ -70,7 +71,8 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile) -> Prepared:
         return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
     group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
-    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group)
+    measures = None if wanted.prior.measures is None else read_measures(wanted.prior.measures)
+    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group, measures)
 
 
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
