@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import product
+from itertools import product, zip_longest
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.measures import girths_with_widths, measures, sample_people
 from kinertia.model.skeleton import Skeleton
-from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, stadium_bsp
+from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, expect_yeadon, stadium_bsp
 
 _DENSITY_SD = {
     **{"head": 0.027, "shoulders": 0.10, "thorax": 0.09, "abdomen": 0.10, "upper_arm": 0.033, "forearm": 0.036},
@@ -54,6 +54,13 @@ _SHRINKAGE = 0.5
 """Share of the five people's correlations that is believed."""
 _WIDEST_GIRTH_RATIO = (2.0, np.pi)
 """Girth over width of any stadium; depths count as widths."""
+_KINDS_OF_PART = {
+    "s": ("pelvis", "torso"),
+    "a": ("upper_arm_r", "forearm_r"),
+    "j": ("thigh_r", "shank_r", "foot_r"),
+}
+"""By the letter of the package's keys."""
+_STEP = 1e-4
 _TELLS = ("mass", "com", "ixx", "iyy", "izz")
 _FAR_SD, _FAR_TOTAL_SD = 4.0, 3.0
 
@@ -148,6 +155,7 @@ def measured_body(
     Raises:
         PriorError: the package yeadon is missing, or the measures cannot be of a person.
     """
+    expect_yeadon()
     names = [one.name for one in measures()]
     expected, spread = expected_measures(mass_kg, height_m)
     rows = [(names.index(name), value, sd / value) for name, (value, sd) in stated.items()]
@@ -156,7 +164,12 @@ def measured_body(
     seen, noise = np.eye(len(names))[places], np.diag(np.square(sd))
     logs, left = updated(expected, spread, seen, np.log(values), noise)
     doubts = _doubts(stated, seen @ expected, seen @ spread @ seen.T + noise, np.log(values))
-    return _with_errors(logs, left, lumbar_m, doubts)
+    try:
+        return _with_errors(logs, left, lumbar_m, doubts)
+    except PriorError as error:
+        if doubts:  # the likelier cause, and in the words of the sheet
+            raise PriorError(f"no body has these girths and lengths: {'; '.join(doubts)}") from error
+        raise
 
 
 def _doubts(
@@ -186,21 +199,41 @@ def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, doub
     """The body of measures whose logarithms have this mean and covariance."""
     middle = np.exp(logs)
     values = _told(middle, lumbar_m)
-    step = 1e-4
-    slopes = [(_told(middle * np.exp(step * one), lumbar_m) - values).ravel() / step for one in np.eye(len(middle))]
-    by_measure = np.array(slopes).T
+    by_measure = _slopes(middle, lumbar_m, values)
     errors = by_measure @ covariance @ by_measure.T
     columns = [
         _DENSITY_SD[part] * (_told(middle, lumbar_m, {**DENSITY_KG_M3, part: 1.01 * density}) - values) / 0.01
         for part, density in DENSITY_KG_M3.items()
     ]
-    columns.append(_LUMBAR_CUT_SD_M * (_told(middle, lumbar_m + step) - values) / step)
+    columns.append(_LUMBAR_CUT_SD_M * (_told(middle, lumbar_m + _STEP) - values) / _STEP)
     columns += _of_shapes_and_cuts(values)
     other = np.array([column.ravel() for column in columns]).T
     errors += other @ other.T
     mass = slice(0, None, len(_TELLS))
     total_sd = float(np.sqrt(_HOW_MANY @ errors[mass, mass] @ _HOW_MANY))
     return MeasuredBody(values, errors, _total_kg(values[:, 0]), total_sd, doubts)
+
+
+def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.ndarray:
+    """(35, 58) change of what a body tells with the logarithm of each measure.
+
+    Trunk, arm and leg know nothing of one another, so that a measure of each is changed at a time; but the thigh begins
+    with the trunk's lowest cross-section.
+    """
+    keys = [one.key for one in measures()]
+    hips = [k for k, key in enumerate(keys) if key.startswith("Ls0")]
+    by_part = [[k for k, key in enumerate(keys) if key[1] == part and k not in hips] for part in _KINDS_OF_PART]
+    together = [[k] for k in hips] + [[k for k in each if k is not None] for each in zip_longest(*by_part)]
+    slopes = np.zeros((*values.shape, len(keys)))
+    for which in together:
+        moved = measures_m.copy()
+        moved[which] *= np.exp(_STEP)
+        change = (_told(moved, lumbar_m) - values) / _STEP
+        for k in which:
+            kinds = KINDS if k in hips else _KINDS_OF_PART[keys[k][1]]
+            rows = [KINDS.index(kind) for kind in kinds]
+            slopes[rows, :, k] = change[rows]
+    return slopes.reshape(values.size, len(keys))
 
 
 def _of_shapes_and_cuts(values: np.ndarray) -> list[np.ndarray]:

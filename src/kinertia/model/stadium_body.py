@@ -21,6 +21,7 @@ import contextlib
 import io
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
@@ -81,7 +82,7 @@ def stadium_bsp(
         PriorError: the package is missing, a level is not beyond the one before, or the lumbar joint is not in the
             trunk below the nipples.
     """
-    person = _person(dict(zip((one.key for one in measures()), measures_m, strict=True)))
+    person = _person(tuple(measures_m.tolist()))
     for solid in (solid for segment in person.segments for solid in segment.solids):
         if not solid.height > 0.0:
             level = solid.label.partition(": ")[2]
@@ -106,12 +107,13 @@ def stadium_bsp(
     )
 
 
-def _person(values: Mapping[str, float]) -> Any:
-    """The package's person, both sides alike. It prints what it thinks of cross-sections that cannot be; so do we."""
+@lru_cache(maxsize=1)
+def _person(measures_m: tuple[float, ...]) -> Any:
+    """The package's person, both sides alike; what it prints of cross-sections that cannot be is for us to say."""
     expect_yeadon()
     from yeadon import Human
 
-    both = {key: values[one.key] for one in measures() for key in one.keys}
+    both = {key: value for one, value in zip(measures(), measures_m, strict=True) for key in one.keys}
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return Human(both)
