@@ -21,7 +21,7 @@ SEGMENTS = PRIOR.mean.segments
 
 
 def subject(**values):
-    return Subject(name="A", sex="male", **{"mass_kg": 70.0, "height_m": 1.8, **values})
+    return Subject(**{"name": "A", "sex": "male", "mass_kg": 70.0, "height_m": 1.8, **values})
 
 
 def test_a_person_of_unknown_height_is_an_adult():
@@ -130,7 +130,7 @@ def test_what_is_found_of_a_rucksack_is_told_of_either_laboratory():
     text = rucksack_sentence(found)
     assert "24 people. Nothing stated of the plates, one in twenty with a faulty gain: RMS error 0.80 kg" in text
     assert (
-        "with gain_sd_percent = 0.2: RMS error 0.50 kg, stated deviation 0.40 kg, within the 95 % interval in" in text
+        "with gain_sd_percent = 0.2: RMS error 0.50 kg, stated deviation 0.40 kg, within the 95 % interval" in text
     )
 
 
