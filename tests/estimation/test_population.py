@@ -129,9 +129,7 @@ def test_what_is_found_of_a_rucksack_is_told_of_either_laboratory():
     found = [RucksackAccuracy(24, None, 0.8, 0.7, 0.96), RucksackAccuracy(24, 0.2, 0.5, 0.4, 0.95)]
     text = rucksack_sentence(found)
     assert "24 people. Nothing stated of the plates, one in twenty with a faulty gain: RMS error 0.80 kg" in text
-    assert (
-        "with gain_sd_percent = 0.2: RMS error 0.50 kg, stated deviation 0.40 kg, within the 95 % interval" in text
-    )
+    assert "with gain_sd_percent = 0.2: RMS error 0.50 kg, stated deviation 0.40 kg, within the 95 % interval" in text
 
 
 @pytest.mark.parametrize("name", POPULATIONS)
