@@ -96,7 +96,8 @@ def test_the_prior_moves_towards_the_measured_body_and_keeps_what_girths_do_not_
     (prior, body), (plain, _) = (with_measures(PRIOR, WALKER.skeleton, each, MASS_KG, HEIGHT_M) for each in (thick, {}))
     names = PRIOR.mean.segments
     thigh, left = names.index("thigh_r"), names.index("thigh_l")
-    assert prior.mean.mass_kg[thigh] > 1.04 * plain.mean.mass_kg[thigh]
+    assert prior.mean.mass_kg[thigh] > plain.mean.mass_kg[thigh] + 0.2 * PRIOR.sd[thigh, 0]
+    assert prior.mean.inertia_kgm2[thigh, 1, 1] > 1.1 * plain.mean.inertia_kgm2[thigh, 1, 1], "girth squared, twice"
     assert prior.sd[thigh, 0] < PRIOR.sd[thigh, 0]
     np.testing.assert_array_equal(prior.mean.com_m[:, 2], PRIOR.mean.com_m[:, 2])
     apart = np.zeros(len(PRIOR.covariance))
@@ -105,6 +106,20 @@ def test_the_prior_moves_towards_the_measured_body_and_keeps_what_girths_do_not_
     assert apart @ prior.covariance @ apart == pytest.approx(before, rel=1e-6), "the mean of both sides says nothing"
     assert prior.mean.physically_consistent().all()
     assert body.total_kg == pytest.approx(MASS_KG, rel=0.2)
+
+
+def test_a_usual_person_stays_near_the_tables():
+    """Cuts and densities of tables and stadiums differ; that must not pass for knowledge of the person."""
+    expected, _ = expected_measures(MASS_KG, HEIGHT_M)
+    usual = {one.name: (value, one.sd_m) for one, value in zip(measures(), np.exp(expected), strict=True)}
+    prior, _ = with_measures(PRIOR, WALKER.skeleton, usual, MASS_KG, HEIGHT_M)
+    moved = (prior.mean.table() - PRIOR.mean.table()) / PRIOR.sd
+    assert np.abs(moved).max() < 2.0
+    assert np.sqrt(np.mean(np.square(moved[:, [0, 2, 4, 5, 6]]))) < 1.0
+    trunk = [PRIOR.mean.segments.index(name) for name in ("pelvis", "torso")]
+    whole = np.zeros(len(PRIOR.covariance))
+    whole[[10 * row for row in trunk]] = 1.0
+    assert whole @ prior.covariance @ whole < 0.9 * (whole @ PRIOR.covariance @ whole)
 
 
 def test_of_a_prosthesis_nothing_was_measured():

@@ -13,7 +13,8 @@ errors are
 - the cuts': where a segment ends is a matter of definition, in which the tables differ by 14-16 % of the mass of thigh
   and upper arm; what one segment has more the next has less.
 
-It says nothing of centres of mass across the segments, of products of inertia, and of differences between the sides.
+It says nothing of centres of mass across the segments, of products of inertia, and of differences between the sides; of
+the pelvis it says what mass it has together with the torso.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ _SHAPE_SD, _MOMENT_SD, _CENTRE_SD_M = 0.05, 0.08, 0.008
 _CUT_SD = 0.10
 """Of the distal segment's mass, at hip, ankle and shoulder."""
 _LUMBAR_CUT_SD_M = 0.04
-"""The tables' pelvis ends above in an oblique plane, and below far beneath the hip joint centres."""
+"""Of the torso's lower end: the tables cut in oblique planes, and not all at this joint."""
 _CUTS = (("thigh_r", "pelvis", 2.0), ("foot_r", "shank_r", 1.0), ("upper_arm_r", "torso", 2.0))
 """Distal segment, the one that it is cut from, and how many of the first are."""
 _JOINT_LENGTH_SD_M = 0.01
@@ -293,23 +294,35 @@ def with_measures(
     lengths_m, hip, lumbar = _joint_lengths(skeleton)
     body = measured_body(stated, lengths_m, float(lumbar[1] - hip[1]), mass_kg, height_m)
     seen = np.zeros((body.values.size, 10 * len(names)))
-    values = body.values.copy()
-    values[KINDS.index("pelvis"), 1] += hip[1]
     for i, kind in enumerate(KINDS):
         both = [name for name in names if name in (kind, kind.removesuffix("_r") + "_l") and name not in artificial]
         for name, (j, told) in product(both, enumerate(_TELLS)):
             seen[len(_TELLS) * i + j, 10 * names.index(name) + _column(kind, told)] = 1.0 / len(both)
+    kept = _with_whole_trunk()
+    seen, values, errors = kept @ seen, kept @ body.values.ravel(), kept @ body.covariance @ kept.T
     # in deviations, for kilograms and kg m2 are far apart
-    own, off = prior.sd.ravel(), np.sqrt(np.diag(body.covariance))
+    own, off = prior.sd.ravel(), np.sqrt(np.diag(errors))
     moved, covariance = updated(
         np.zeros(len(own)),
         prior.covariance / np.outer(own, own),
         seen * own / off[:, None],
-        (values.ravel() - seen @ prior.mean.table().ravel()) / off,
-        body.covariance / np.outer(off, off),
+        (values - seen @ prior.mean.table().ravel()) / off,
+        errors / np.outer(off, off),
     )
     mean = BodySegmentParameters.from_table(names, prior.mean.table() + (own * moved).reshape(-1, 10))
     return replace(prior, mean=mean, covariance=covariance * np.outer(own, own)), body
+
+
+def _with_whole_trunk() -> np.ndarray:
+    """(30, 35) from what a body of stadiums tells to what a prior can be compared with.
+
+    Where the trunk is cut makes no difference to the mass of pelvis and torso together. To the pelvis alone it does:
+    the tables' is half as heavy again as that between the levels of hip and lumbar joints.
+    """
+    every = np.eye(len(KINDS) * len(_TELLS))
+    pelvis, torso = (len(_TELLS) * KINDS.index(kind) for kind in ("pelvis", "torso"))
+    every[torso, pelvis] = 1.0
+    return np.delete(every, range(pelvis, pelvis + len(_TELLS)), axis=0)
 
 
 def _joint_lengths(skeleton: Skeleton) -> tuple[dict[str, float], np.ndarray, np.ndarray]:
