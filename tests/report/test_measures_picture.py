@@ -1,6 +1,7 @@
 """The picture of where to measure."""
 
 from itertools import pairwise
+from pathlib import Path
 from xml.etree import ElementTree
 
 from command_line import run
@@ -27,6 +28,11 @@ def test_every_level_is_shown_once_with_its_words_apart_from_others():
     for anchor in ("start", "end"):
         rows = sorted(float(text.get("y")) for text in root.iter(f"{SVG}text") if text.get("text-anchor") == anchor)
         assert all(below - above > 14.0 for above, below in pairwise(rows))
+
+
+def test_the_picture_of_the_pages_is_this_one():
+    picture = Path(__file__).parents[2] / "docs" / "figures" / "measures.svg"
+    assert picture.read_text(encoding="utf-8") == measures_picture()
 
 
 def test_the_command_writes_sheet_and_picture_and_overwrites_neither(tmp_path):

@@ -58,6 +58,7 @@ def measures_picture() -> str:
 
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_SCALE * _WIDTH_CM:.0f}" height="{_SCALE * height:.0f}" '
+        f'viewBox="0 0 {_SCALE * _WIDTH_CM:.0f} {_SCALE * height:.0f}" '
         f'font-family="sans-serif" font-size="14" role="img" aria-label="Levels at which a person is measured">',
         '<rect width="100%" height="100%" fill="white"/>',
         f'<g font-size="18" fill="{_INK}"><text x="20" y="30">Girth: tape around, at right angles to the limb. Width: '
