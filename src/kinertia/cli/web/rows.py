@@ -31,7 +31,7 @@ _LABELS = {
     "source": "Measured by",
     "on_scale": "On the scale, too",
     "com_mm": "CoM: forwards, upwards, right (mm)",
-    "com_sd_mm": "known to (mm)",
+    "com_sd_mm": "CoM known to (mm)",
     "size_mm": "Depth, height, width (mm)",
 }
 _THREE = ("com_mm", "size_mm")
