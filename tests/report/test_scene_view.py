@@ -26,7 +26,7 @@ def test_view_plays_and_pauses(demo, canvas):
     button = demo.page.locator("#motion-view [data-do=play]")
     button.click()
     playwright.expect(button).to_have_text("Pause")
-    demo.page.wait_for_timeout(600)
+    demo.page.wait_for_function("document.querySelector('#motion-view canvas').dataset.frame > 5")
     button.click()
     playwright.expect(button).to_have_text("Play")
     stopped = frame(canvas)
