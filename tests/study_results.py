@@ -47,7 +47,7 @@ POPULATIONS = [
     )
     for prior in ("adults'", "their own")
 ]
-RUCKSACK = RucksackAccuracy(4, 0.4, 0.5, 1.0)
+RUCKSACKS = [RucksackAccuracy(4, None, 0.9, 1.0, 1.0), RucksackAccuracy(4, 0.3, 0.4, 0.5, 1.0)]
 
 
 def sensitivity() -> Sensitivity:

@@ -23,7 +23,7 @@ from kinertia.report.rendering import _asset
 from kinertia.report.sensitivity import render_sensitivity
 from kinertia.report.table1 import render_table1
 from kinertia.report.table1_variants import render_variants
-from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS, RUCKSACK, SOUND
+from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS, RUCKSACKS, SOUND
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")
 
@@ -62,7 +62,7 @@ def pages(demo_run, fit, two_level, measured_walk, tmp_path_factory):
         "plan": lambda: written("plan.html", render_plan(PLAN)),
         "crossval": lambda: written("crossval.html", render_crossval(HELD_OUT, "literature")),
         "accuracy": lambda: written("accuracy.html", render_accuracy(ACCURACIES, 1)),
-        "populations": lambda: written("populations.html", render_populations(POPULATIONS, RUCKSACK)),
+        "populations": lambda: written("populations.html", render_populations(POPULATIONS, RUCKSACKS)),
         "sensitivity": lambda: written("sensitivity.html", render_sensitivity(study_results.sensitivity())),
         "faults": lambda: written("faults.html", render_faults(SOUND, OUTCOMES, SOUND)),
         "table1": lambda: written("table1.html", render_table1(study_results.table1())),
