@@ -23,12 +23,11 @@ from measured_trials import table
 from walks import WALKS, data_folder, fit_arguments
 
 YARDSTICK = "import numpy, scipy.optimize, pandas"
-_START = "from kinertia.cli.start import main; main()"
 
 
 def commands(results: Path) -> dict[str, list[str]]:
     """Command lines by what the table calls them."""
-    kinertia = [sys.executable, "-c", _START]
+    kinertia = [sys.executable, "-m", "kinertia"]
     fit = ["fit", *fit_arguments(data_folder(), "rajagopal"), "-o", str(results), "--quiet"]
     return {
         f"`{YARDSTICK}`": [sys.executable, "-c", YARDSTICK],

@@ -18,7 +18,7 @@ FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+DESKTOP, PHONE = {"width": 1400, "height": 900}, {"width": 390, "height": 844}
 PATIENCE_MS = 30_000
 
 
@@ -38,10 +38,14 @@ class Opened:
         playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
 
     def picture(self, locator):
-        """Pixels (h, w, 3), 0 to 1."""
-        from matplotlib.image import imread  # takes longer to load than most tests
+        return picture(locator)
 
-        return imread(io.BytesIO(locator.screenshot()), format="png")[..., :3]
+
+def picture(shown, **options):
+    """Pixels (h, w, 3), 0 to 1, of a page or a part of one."""
+    from matplotlib.image import imread  # takes longer to load than most tests
+
+    return imread(io.BytesIO(shown.screenshot(**options)), format="png")[..., :3]
 
 
 def ink(pixels):

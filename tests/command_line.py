@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -12,6 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.cli.app import main
+
+PROGRAM = [sys.executable, "-m", "kinertia"]
+"""The command in a process of its own: what a test that kills it, or talks to it, puts its arguments behind."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,15 @@ def run(*arguments: object) -> Outcome:
         except SystemExit as end:
             status = end.code
     return Outcome(0 if status is None else status, out.getvalue(), err.getvalue())
+
+
+def run_apart(*arguments: object, encoding: str = "utf-8", **environment: str) -> Outcome:
+    """The same in a process of its own, whose streams have this encoding."""
+    known = os.environ | {"PYTHONIOENCODING": encoding} | environment
+    done = subprocess.run(
+        [*PROGRAM, *map(str, arguments)], env=known, capture_output=True, encoding=encoding, check=False
+    )
+    return Outcome(done.returncode, done.stdout, done.stderr)
 
 
 def loaded_after(code: str) -> set[str]:

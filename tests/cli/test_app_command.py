@@ -10,9 +10,7 @@ import urllib.request
 
 import pytest
 
-from command_line import run
-
-PROGRAM = "from kinertia.cli.start import main; main()"
+from command_line import PROGRAM, run
 
 
 @pytest.mark.parametrize("package", ["starlette", "uvicorn"])
@@ -40,7 +38,7 @@ def test_a_port_of_another_program_is_an_error(tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
 def test_it_shows_its_address_and_ends_in_order(tmp_path):
     pytest.importorskip("uvicorn")
-    command = [sys.executable, "-c", PROGRAM, "app", "--folder", str(tmp_path / "library"), "--no-browser"]
+    command = [*PROGRAM, "app", "--folder", str(tmp_path / "library"), "--no-browser"]
     unbuffered = {**os.environ, "PYTHONUNBUFFERED": "1"}
     it = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=unbuffered)
     ask = urllib.request.build_opener(urllib.request.ProxyHandler({})).open

@@ -12,7 +12,7 @@ import pandas as pd
 import psutil
 import pytest
 
-from command_line import run
+from command_line import PROGRAM, run
 from kinertia.cli.cohort import _LOCK
 from kinertia.io.file_lock import sole_use
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
@@ -105,15 +105,7 @@ def study(tmp_path):
 @pytest.mark.slow
 def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(study, tmp_path):
     out = tmp_path / "out"
-    command = [
-        sys.executable,
-        "-c",
-        "from kinertia.cli.start import main; main()",
-        "cohort",
-        str(study),
-        "-o",
-        str(out),
-    ]
+    command = [*PROGRAM, "cohort", str(study), "-o", str(out)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while process.stderr.readline().strip() != "people":
             assert process.poll() is None

@@ -1,15 +1,12 @@
 """`kinertia fit` of several people; values as people write them, results as scripts read them; shell completion."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
 
-from command_line import run
+from command_line import run, run_apart
 from kinertia.errors import FileError
 
 
@@ -113,10 +110,7 @@ def test_check_tells_scripts_what_it_tells_people(subjects):
 
 @pytest.mark.slow
 def test_shells_complete_commands_and_options():
-    program = "from kinertia.cli.start import main; main()"
     for typed, expected in (("kinertia com", "compare"), ("kinertia report --no", "--norms")):
         words = {"_KINERTIA_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=False, env={**os.environ, **words}
-        )
-        assert done.stdout.split() == [expected], done.stderr
+        done = run_apart(**words)
+        assert done.out.split() == [expected], done.err

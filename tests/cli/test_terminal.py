@@ -10,6 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from command_line import run_apart
+
 NAME = "größe→ 歩行"
 SEVERAL = """
 import json, sys
@@ -24,13 +26,6 @@ for arguments in json.loads(sys.argv[1]):
 """
 """Runs command lines one after the other: starting Python takes longer than they do."""
 END = "--- ended with"
-
-
-def _kinertia(encoding, *arguments):
-    command = [sys.executable, "-c", "from kinertia.cli.start import main; main()", *map(str, arguments)]
-    return subprocess.run(
-        command, env=os.environ | {"PYTHONIOENCODING": encoding}, capture_output=True, encoding=encoding, check=False
-    )
 
 
 @pytest.fixture(scope="module", params=[pytest.param("ascii", marks=pytest.mark.slow), "cp1252"])
@@ -82,7 +77,7 @@ def test_errors_with_letters_that_it_lacks(done):
 
 @pytest.mark.slow
 def test_a_whole_fit(encoding, tmp_path):
-    done = _kinertia(encoding, "demo", "--measured", "-o", tmp_path / NAME)
-    assert done.returncode == 0, done.stderr
-    assert "results in" in done.stdout
+    done = run_apart("demo", "--measured", "-o", tmp_path / NAME, encoding=encoding)
+    assert done.status == 0, done.err
+    assert "results in" in done.out
     assert (tmp_path / NAME / "report.html").is_file()

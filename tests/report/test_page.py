@@ -1,4 +1,4 @@
-"""What the report says, without a browser: words, safety of the page, provenance, notebooks."""
+"""What the report says, without a browser: words, safety of the page, provenance."""
 
 import hashlib
 import os
@@ -9,7 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import plotly.graph_objects as go
 import pytest
 
 from command_line import run
@@ -22,18 +21,13 @@ from kinertia.report import page as page_module
 from kinertia.report.headline import words
 from kinertia.report.page import MOST_TRIALS, bsp_rows, render
 from kinertia.report.wording import fixed
-from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
+from kinertia.trial.data import FootLoads
 from report_page import Elements, figures_of
 
 MOST_BYTES = 2_500_000
 MOST_BYTES_OF_MANY = 4_500_000
 """However many trials there are, and however long."""
 PARTS = ["verdict", "cycle", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
-
-
-@pytest.fixture(scope="module")
-def page(fit):
-    return render(fit)
 
 
 @pytest.mark.parametrize("which", ["fit", "two_level"])
@@ -356,67 +350,6 @@ def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
     assert files[str(own.relative_to(above))] == hashlib.sha256(b"x").hexdigest()
     assert len(files) == 4
     assert set(provenance_of(read_subject(demo.subject_file), "").files) == {"static.trc", "walk.trc", "walk_grf.mot"}
-
-
-def test_fit_trial_and_parameters_show_themselves(fit, two_level):
-    for one in (fit, two_level):
-        shown = Elements(one._repr_html_())
-        assert one.subject.name in shown.text
-        assert words(one).headline in shown.text
-        assert len(shown.named("tr")) == 1 + 4 + 1 + 120
-    trial = fit.trials[0].kinematics.trial
-    shown = Elements(trial._repr_html_()).text
-    assert f"{len(trial.markers.time)} frames at 100 Hz" in shown
-    start, end = trial.windows()[0]
-    assert f"{start:.3f} to {end:.3f} s" in shown
-    assert f"right foot {trial.loads.force[:, 0, 1].max():.0f} N" in shown
-    fitted = fit.trials[0]
-    shown = Elements(fitted._repr_html_())
-    assert fitted.name in shown.text
-    assert f"{len(fitted.time)} of {len(trial.markers.time)} frames used" in shown.text
-    assert len(shown.named("tr")) == 5
-    table = Elements(fit.estimate._repr_html_())
-    assert len(table.named("tr")) == 2 + 12
-    assert f"{fit.estimate.mass_kg[1]:.4g}" in table.text
-
-
-def test_recording_shows_itself():
-    time = np.arange(4) / 100
-    positions = np.zeros((4, 2, 3))
-    positions[1, 1] = np.nan
-    markers = Markers(time, ("A", "<B>"), positions)
-    force = np.zeros((4, 1, 3))
-    force[2, 0, 1] = 812.0
-    plates = PlateLoads(time, ("FP1",), force, np.zeros((4, 1, 3)), (None,))
-    shown = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
-    for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", "beware"):
-        assert text in shown
-    still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
-    assert "1 frames" not in still
-    assert "no force plates" in still
-
-
-@pytest.mark.slow
-def test_pictures_are_those_of_the_report(fit, page):
-    written = figures_of(page)
-    plot = fit.plot
-    for name, figure in (
-        ("trial1-residuals", plot.residuals()),
-        ("trial1-coordinates", plot.coordinates()),
-        ("trial1-moments", plot.moments()),
-        ("trial1-markers", plot.markers()),
-        ("bsp-change", plot.bsp()),
-        ("bsp-departure", plot.departures()),
-        ("body-mass", plot.body()),
-        ("body-information", plot.body("information")),
-        ("bsp-information", plot.information()),
-    ):
-        assert figure.to_json() == go.Figure(**written[name]).to_json(), name
-    assert isinstance(plot.skeleton(fit.trials[0].name), go.Figure)
-    assert len(plot.skeleton().frames) > 30
-    assert plot.gaps() is None or isinstance(plot.gaps(), go.Figure)
-    with pytest.raises(KeyError, match=fit.trials[0].name):
-        plot.residuals("nowhere")
 
 
 def test_three_trials_with_strides_stay_below_3_mb(fit):

@@ -1,5 +1,6 @@
 """Every kind of page in a browser: accessible by axe's rules, silent, within its window, alone, and on paper."""
 
+import functools
 import io
 from dataclasses import replace
 
@@ -7,25 +8,31 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+import study_results
 from chromium import DESKTOP, Opened, colour, playwright
 from kinertia.checks.files import PersonFiles, check_files, files_by_name
-from kinertia.model.bsp import PARAMETERS
+from kinertia.report.accuracy import render_accuracy
 from kinertia.report.check_page import save_check_page
 from kinertia.report.comparison import render_comparison
+from kinertia.report.crossval_page import render_crossval
+from kinertia.report.faults import render_faults
 from kinertia.report.page import render
-from kinertia.report.plan_page import save_plan
+from kinertia.report.plan_page import render_plan
+from kinertia.report.populations import render_populations
 from kinertia.report.rendering import _asset
-from kinertia.report.result_page import Part, render_parts
-from kinertia.report.row_figures import dot_figure
-from kinertia.studies.plan import Plan
+from kinertia.report.sensitivity import render_sensitivity
+from kinertia.report.table1 import render_table1
+from kinertia.report.table1_variants import render_variants
+from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS, RUCKSACKS, SOUND
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")
 
 pytestmark = pytest.mark.slow
 
-SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 10"><rect width="10" height="10" fill="#0072B2"/></svg>'
 REPORTS = ("report", "three trials", "two-level")
-PAGES = (*REPORTS, "comparison", "check", "plan", "study")
+STUDIES = ("crossval", "accuracy", "populations", "sensitivity", "faults", "table1", "variants")
+LOOKS = ((1400, "light"), (390, "dark"))
+"""Widths of windows, and the system's colours in them."""
 AROUND_FIGURES = {"exclude": [[".main-svg"]]}
 """What plotly draws is a picture to axe; the element around it has its text."""
 ON_PAPER_PX = 1100
@@ -42,11 +49,6 @@ def pages(demo_run, fit, two_level, measured_walk, tmp_path_factory):
         recordings, mistakes = check_files(PersonFiles(wanted))
         return save_check_page(recordings, [], [*mistakes, "lost.trc: no such file"], folder / "check")
 
-    def plan():
-        prior = np.ones((2, len(PARAMETERS)))
-        sd = {("walk",): 0.4 * prior, ("squat",): 0.9 * prior, ("walk", "squat"): 0.3 * prior}
-        return save_plan(Plan(("shank_r", "shank_l"), prior, sd), folder / "plan") / "plan.html"
-
     def written(name, text):
         (folder / name).write_text(text, encoding="utf-8")
         return folder / name
@@ -57,10 +59,16 @@ def pages(demo_run, fit, two_level, measured_walk, tmp_path_factory):
         "two-level": lambda: demo_run[1] / "two-level" / "report.html",
         "comparison": lambda: written("compare.html", render_comparison({"one": fit, "two": two_level})),
         "check": check,
-        "plan": plan,
-        "study": lambda: written("study.html", study_page()),
+        "plan": lambda: written("plan.html", render_plan(PLAN)),
+        "crossval": lambda: written("crossval.html", render_crossval(HELD_OUT, "literature")),
+        "accuracy": lambda: written("accuracy.html", render_accuracy(ACCURACIES, 1)),
+        "populations": lambda: written("populations.html", render_populations(POPULATIONS, RUCKSACKS)),
+        "sensitivity": lambda: written("sensitivity.html", render_sensitivity(study_results.sensitivity())),
+        "faults": lambda: written("faults.html", render_faults(SOUND, OUTCOMES, SOUND)),
+        "table1": lambda: written("table1.html", render_table1(study_results.table1())),
+        "variants": lambda: written("variants.html", render_variants(study_results.variants())),
     }
-    return {name: make() for name, make in made.items()}
+    return functools.cache(lambda name: made[name]())
 
 
 def without_plotly(path, folder):
@@ -84,44 +92,80 @@ def three_times(fit):
     return replace(fit, trials=trials, posterior=replace(fit.posterior, marker_noise=noise))
 
 
-def study_page():
-    dots = dot_figure(["one", "two"], {"error (N m)": {"before": [2.0, 1.0], "after": [1.0, 0.5]}}, "Errors.")
-    table = {"headings": ("", "before", "after"), "rows": [["one", "2", "1"], ["two", "1", "0.5"]]}
-    parts = [
-        Part("Figure", ("Said above.",), dots, "A caption.", **table),
-        Part("Picture", picture=SVG, alt="A square.", caption="A caption.", listed=("One.", "Two.")),
-    ]
-    return render_parts("A study", "Of something.", parts)
-
-
 def shot(page):
     """Pixels (h, w, 3), 0 to 1, of what is in the window."""
     return imread(io.BytesIO(page.screenshot()), format="png")[..., :3]
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
-@pytest.mark.parametrize("name", PAGES)
-def test_page(browser, pages, name, width, scheme, tmp_path):
-    path = pages[name]
-    assert path.stat().st_size < 3_000_000
-    if name in REPORTS:
-        path = without_plotly(path, tmp_path)
-    opened = Opened(browser, path, {"width": width, "height": 900}, scheme)
-    page = opened.page
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert (shot(page)[:20, :20].mean() < 0.35) == (scheme == "dark")
+def few_rows(page):
+    """Leave three rows of each kind in every table: the others are alike, and axe would look at each cell."""
+    page.evaluate(
+        """document.querySelectorAll("tbody").forEach((body) => {
+            const seen = {};
+            [...body.rows].forEach((row) => {
+                seen[row.className] = (seen[row.className] ?? 0) + 1;
+                if (seen[row.className] > 3) row.remove();
+            });
+        })"""
+    )
+
+
+def violations(page):
+    """What axe finds, in one line each."""
     found = axe.Axe().run(page, AROUND_FIGURES).response
-    told = [f"{one['id']}: {[node['target'] for node in one['nodes'][:3]]}" for one in found["violations"]]
-    assert told == []
     assert len(found["passes"]) > 15
+    return [f"{one['id']}: {[node['target'] for node in one['nodes'][:3]]}" for one in found["violations"]]
+
+
+def look(opened, width, scheme):
+    """Show it in a window of this width, where it fits, in the system's colours."""
+    opened.page.emulate_media(color_scheme=scheme)
+    opened.page.set_viewport_size({"width": width, "height": 900})
+    assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+    assert (shot(opened.page)[:20, :20].mean() < 0.35) == (scheme == "dark")
+
+
+def assert_alone_and_on_paper(opened):
+    """Nothing was said or asked for, and print is white, within its width, and without what is pressed."""
+    page = opened.page
     assert opened.errors == []
-    assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [path.as_uri()]
+    assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [page.url]
     page.emulate_media(media="print")
     page.set_viewport_size({"width": ON_PAPER_PX, "height": 900})
     assert page.evaluate("document.documentElement.scrollWidth") <= ON_PAPER_PX
     assert page.locator("button:visible:not(th *), nav:visible, input:visible").count() == 0
     assert shot(page)[:20, :20].min() > 0.99, "white paper in either scheme"
     page.close()
+
+
+@pytest.mark.parametrize("name", [*REPORTS, "comparison", "check", "plan"])
+def test_page(browser, pages, name, tmp_path):
+    path = pages(name)
+    assert path.stat().st_size < 3_000_000
+    if name in REPORTS:
+        path = without_plotly(path, tmp_path)
+    opened = Opened(browser, path)
+    for width, scheme in LOOKS:
+        look(opened, width, scheme)
+    few_rows(opened.page)
+    for width, scheme in LOOKS:
+        look(opened, width, scheme)
+        assert violations(opened.page) == []
+    assert_alone_and_on_paper(opened)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_page_of_a_study(browser, pages, name):
+    """All have the template of the page of `plan`, which is looked at in both colours."""
+    opened = Opened(browser, pages(name))
+    plots = opened.page.locator(".plot")
+    assert plots.count() + opened.page.locator(".picture, img").count() > 0
+    for plot in plots.all():
+        assert colour(opened.picture(plot)) > 0.0005
+    for width, scheme in LOOKS:
+        look(opened, width, scheme)
+    assert violations(opened.page) == []
+    assert_alone_and_on_paper(opened)
 
 
 def test_axe_would_find_what_is_wrong(browser, tmp_path):
@@ -137,7 +181,7 @@ def test_axe_would_find_what_is_wrong(browser, tmp_path):
 
 
 def test_one_view_shows_the_trial_that_is_chosen_and_zooms_by_key_and_button(browser, pages, tmp_path):
-    opened = Opened(browser, without_plotly(pages["three trials"], tmp_path))
+    opened = Opened(browser, without_plotly(pages("three trials"), tmp_path))
     page = opened.page
     assert page.locator("canvas").count() == 1
     view, canvas = page.locator("#motion-view"), page.locator("#motion-view canvas")
@@ -170,10 +214,12 @@ def test_one_view_shows_the_trial_that_is_chosen_and_zooms_by_key_and_button(bro
 
 
 def test_the_body_fills_the_view(browser, pages, tmp_path):
-    """From top to bottom on a desktop, and on a phone as far as its width allows."""
-    for viewport, least in ((DESKTOP, 0.85), ({"width": 390, "height": 844}, 0.6)):
-        opened = Opened(browser, without_plotly(pages["report"], tmp_path), viewport)
+    """From top to bottom on a desktop, and on a phone as far as its width allows; least shares of height and width."""
+    for viewport, high, wide in ((DESKTOP, 0.85, 0.33), ({"width": 390, "height": 844}, 0.6, 0.45)):
+        opened = Opened(browser, without_plotly(pages("report"), tmp_path), viewport)
         drawn = opened.picture(opened.page.locator("#motion-view canvas"))
-        rows = np.flatnonzero((np.ptp(drawn, axis=2) > 0.15).any(axis=1))
-        assert (rows[-1] - rows[0]) / len(drawn) > least
+        inked = np.ptp(drawn, axis=2) > 0.15
+        for axis, least in ((0, high), (1, wide)):
+            seen = np.flatnonzero(inked.any(axis=1 - axis))
+            assert (seen[-1] - seen[0]) / inked.shape[axis] > least
         opened.page.close()

@@ -2,29 +2,16 @@
 
 import json
 
-import numpy as np
 import plotly.graph_objects as go
 import pytest
 
 from kinertia.cli.terminal import print_json
-from kinertia.model.bsp import PARAMETERS
 from kinertia.report.crossval_page import crossval_rows, crossval_sentence, crossval_summary, render_crossval
 from kinertia.report.faults import render_faults
 from kinertia.report.plan_page import plan_rows, render_plan, save_plan
 from kinertia.report.result_page import Part, render_parts
-from kinertia.studies.cross_validation import Explained, HeldOut
-from kinertia.studies.faults import FaultOutcome, Finding, SoundWalk
-from kinertia.studies.plan import Plan
 from report_page import figures_of
-
-PRIOR = np.ones((2, len(PARAMETERS)))
-PLAN = Plan(
-    ("shank_r", "<b>"), PRIOR, {("walk",): 0.4 * PRIOR, ("<i>squat",): 0.9 * PRIOR, ("walk", "<i>squat"): 0.2 * PRIOR}
-)
-HELD_OUT = (
-    HeldOut("one", ("two",), Explained(200.0, 10.0, 4.0, 0.010), Explained(150.0, 8.0, 3.0, 0.009)),
-    HeldOut("two", ("one",), Explained(100.0, 9.0, 3.5, 0.008), Explained(120.0, 9.5, 3.6, 0.008)),
-)
+from study_results import HELD_OUT, OUTCOMES, PLAN, SOUND
 
 
 def drawn(page):
@@ -60,14 +47,7 @@ def test_cross_validation_says_how_many_trials_are_explained_better():
 
 
 def test_faults_are_counted_by_walk():
-    sound = [SoundWalk("one", None, (), None), SoundWalk("other", None, (Finding("caution", "mass"),), None)]
-    outcomes = [
-        FaultOutcome("one", "a", "named", "said", "check"),
-        FaultOutcome("other", "a", "named", "said", "fit"),
-        FaultOutcome("one", "b", "silent"),
-        FaultOutcome("other", "b", "not possible"),
-    ]
-    page = render_faults(sound, outcomes, sound[:1])
+    page = render_faults(SOUND, OUTCOMES, SOUND[:1])
     (figure,) = drawn(page).values()
     assert {trace["name"]: trace["x"] for trace in figure["data"]} == {
         "named": [1, 1],

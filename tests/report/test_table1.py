@@ -1,35 +1,19 @@
 import json
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import study_results
 from command_line import run
 from kinertia.report.table1 import save_table1, table1_frame, table1_rows
-from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Draw, Errors, Table1, study_trial
-
-PARAMETERS = tuple(
-    f"{segment}.{parameter}"
-    for segment in ("pelvis", "torso", "thigh", "shank", "foot", "upper_arm", "forearm")
-    for parameter in ("mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz")
-)
+from kinertia.studies.table1 import CONDITIONS, study_trial
 
 
 @pytest.fixture
 def table():
-    """Two draws of invented errors: twice and four times the published ones."""
-    draws = tuple(
-        Draw(
-            number=k,
-            errors={c: Errors(*(factor * np.array(astuple(PUBLISHED[c]))).tolist()) for c in CONDITIONS},
-            parameter_errors={c: np.outer([0.1, 0.01 * factor], np.ones(49)) for c in CONDITIONS},
-            costs={c: np.array([2.0, 1.0]) for c in CONDITIONS},
-            converged=dict.fromkeys(CONDITIONS, True),
-        )
-        for k, factor in enumerate((2.0, 4.0))
-    )
-    return Table1(PARAMETERS, np.ones(49), draws, 3, "walk <1>")
+    return study_results.table1()
 
 
 def test_frame_has_ours_and_the_published(table):

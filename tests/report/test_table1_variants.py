@@ -1,27 +1,15 @@
-from dataclasses import astuple
-
-import numpy as np
 import pandas as pd
 import pytest
 
+import study_results
 from command_line import run
 from kinertia.report.table1_variants import HEADINGS, save_variants, variants_frame, variants_rows
-from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Draw, Errors, Table1
 from kinertia.studies.table1_variants import LONG, LONG_GROUND, NOISY
 
 
 @pytest.fixture
 def tables():
-    """Two variants of two draws: twice and four times the published errors, of which the first has all conditions."""
-
-    def draw(number, factor, conditions):
-        errors = {c: Errors(*(factor * np.array(astuple(PUBLISHED[c]))).tolist()) for c in conditions}
-        paths = {c: np.full((4, 49), 0.1) for c in conditions}
-        costs = {c: np.array([8.0, 4.0, 3.0, 2.99999]) for c in conditions}
-        return Draw(number, errors, paths, costs, dict.fromkeys(conditions, True))
-
-    draws = (draw(0, 2.0, CONDITIONS), draw(1, 4.0, NOISY))
-    return {title: Table1(("a",) * 49, np.ones(49), draws, 1, title) for title in (LONG, LONG_GROUND)}
+    return study_results.variants()
 
 
 def test_rows_have_the_published_first(tables):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import kinertia.studies.sensitivity as sensitivity_study
+import study_results
 from command_line import run
 from kinertia.studies.sensitivity import (
     AMPLITUDES,
@@ -12,21 +13,13 @@ from kinertia.studies.sensitivity import (
     SHOWN,
     STRIDE_S,
     WITH_SQUATS,
-    Sensitivity,
     run_sensitivity,
 )
 from one_process import in_one_process
 
 
-def made_up() -> Sensitivity:
-    """Three parameters: one always seen, one lost in noise, one never seen."""
-    errors = {key: np.array([0.2, 0.3, 0.99]) for key in CONDITIONS}
-    errors["study x 2"] = np.array([0.3, 0.7, 1.0])
-    return Sensitivity(("torso.com_z", "thigh.mass", "pelvis.iyy"), errors, 2, 1)
-
-
 def test_answers():
-    sensitivity = made_up()
+    sensitivity = study_results.sensitivity()
     assert sensitivity.insensitive("study") == ["torso.com_z"]
     assert sensitivity.insensitive("artefact") == ["torso.com_z", "thigh.mass"]
     assert sensitivity.never() == ["pelvis.iyy"]
@@ -59,7 +52,7 @@ def test_noise_makes_errors_larger():
 
 
 def test_command(tmp_path, monkeypatch):
-    monkeypatch.setattr("kinertia.cli.study.run_sensitivity", lambda *arguments: made_up())
+    monkeypatch.setattr("kinertia.cli.study.run_sensitivity", lambda *arguments: study_results.sensitivity())
     outcome = run("study", "sensitivity", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     assert "torso.com_z, thigh.mass" in outcome.out

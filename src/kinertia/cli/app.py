@@ -13,6 +13,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from kinertia.cli.failure import STATUS, show_failure
+from kinertia.cli.outcome import add_command
 from kinertia.cli.terminal import out, show_error
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import INTERRUPTIONS
@@ -64,7 +65,8 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
  70  Kinertia itself failed; the line says where its log file is
 130  interrupted; nothing half-written is left
 
-Results go to standard output, progress and errors to standard error.
+Results go to standard output, progress and errors to standard error; with
+--json the results are JSON, for scripts.
 """
 
 _MODULES = {
@@ -103,7 +105,7 @@ def application(only: str | None = None) -> typer.Typer:
         if isinstance(command, typer.Typer):
             app.add_typer(command, name=name)
         else:
-            app.command(name)(command)
+            add_command(app, command, name)
     return app
 
 

@@ -11,10 +11,10 @@ from typing import Annotated
 import typer
 
 from kinertia.cli.measured_demo import FILES
-from kinertia.cli.terminal import out
+from kinertia.cli.terminal import out, print_json
 from kinertia.errors import KinertiaError
 
-_WARM_UP = (sys.executable, "-c", "from kinertia.cli.start import main; main()", "warm-up", "--quiet")
+_WARM_UP = (sys.executable, "-m", "kinertia", "warm-up", "--quiet")
 """`kinertia warm-up` in a process of its own."""
 _HOW = 'pip install "kinertia[app]"'
 
@@ -25,6 +25,9 @@ def app(
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only show the address.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print address and library as JSON, for scripts, before anything is served.")
+    ] = False,
 ) -> None:
     """Drop files on a page in the browser, check them, fit, read the report.
 
@@ -50,10 +53,14 @@ def app(
     library = Library(Path.home() / "Kinertia" if folder is None else folder)
     with library.opened():
         server = Server(library, port, FILES, _WARM_UP)
-        out.print(f"Kinertia is at {server.address}", soft_wrap=True)
-        out.print(f"library: {library.folder}; Ctrl-C ends it", soft_wrap=True)
+        if as_json:
+            print_json({"address": server.address, "library": str(library.folder)})
+        else:
+            out.print(f"Kinertia is at {server.address}", soft_wrap=True)
+            out.print(f"library: {library.folder}; Ctrl-C ends it", soft_wrap=True)
         if not no_browser:
             webbrowser.open(server.address)
         with suppress(KeyboardInterrupt):
             server.run()
-    out.print("ended; everything that was finished is in the library")
+    if not as_json:
+        out.print("ended; everything that was finished is in the library")

@@ -14,8 +14,9 @@ from kinertia.checks.files import PersonFiles, check_files, files_by_name, files
 from kinertia.checks.model import ModelCheck, check_model
 from kinertia.checks.recording import RecordingCheck
 from kinertia.checks.verdict import stands_against
-from kinertia.cli.options import AsJson, Force, Quiet, Sex, Verbose, number, results_folder
-from kinertia.cli.terminal import out, plain_table, print_json, show_error, show_verdicts, shown_progress
+from kinertia.cli.options import Force, Quiet, Sex, Verbose, number, results_folder
+from kinertia.cli.outcome import Outcome
+from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
@@ -54,11 +55,10 @@ def check(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
-) -> None:
+) -> Outcome:
     """Show what is in measured files or in a model, and whether it can be used.
 
     Measured: rates, units, axes; markers and gaps; force plates and which foot
@@ -101,17 +101,13 @@ def check(
         recordings, more = check_files(wanted, lambda share: progress("reading", share))
     mistakes += more
     page = None if output is None else save_check_page(recordings, models, mistakes, output)
-    if as_json:
-        print_json(_told(recordings, models, mistakes))
-    else:
-        with suppress(SystemExit):  # rich's, where nobody reads on (| head)
-            _show(recordings, models, page, verbose)
+    with suppress(SystemExit):  # rich's, where nobody reads on (| head)
+        _show(recordings, models, page, verbose)
     for mistake in mistakes:
         show_error(mistake)
-    if mistakes:
-        raise typer.Exit(2)
     judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
-    raise typer.Exit(int(any(map(stands_against, judged))))
+    status = 2 if mistakes else int(any(map(stands_against, judged)))
+    return Outcome(_told(recordings, models, mistakes), status)
 
 
 def _told(

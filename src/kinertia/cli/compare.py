@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import AsJson, Force, Quiet, results_folder
-from kinertia.cli.terminal import out, print_json
+from kinertia.cli.options import Force, Quiet, results_folder
+from kinertia.cli.outcome import Outcome
+from kinertia.cli.terminal import out
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import names_from_common_folder
 from kinertia.report.comparison import (
@@ -26,10 +27,9 @@ from kinertia.report.saved_fit import load_fit
 def compare(
     results: Annotated[list[Path], typer.Argument(help="Folders that kinertia fit has written, two or more.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for page and table.")] = Path("comparison"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """What differs between fits beyond their error bars: sessions of one person, methods, models.
 
     The first is what the others are compared with. Writes compare.html and
@@ -49,9 +49,6 @@ def compare(
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")
         write_columns(work / "compare.csv", comparison_columns(fits))
-    if as_json:
-        print_json(comparison_summary(fits))
-        return
     (first_name, first), *others = fits.items()
     for sentence in remarks(fits):
         out.print(f"note: {sentence}")
@@ -63,3 +60,4 @@ def compare(
         )
         out.print(line + (f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})" if changed else ""))
     out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
+    return Outcome(comparison_summary(fits))

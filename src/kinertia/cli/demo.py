@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -12,8 +12,10 @@ from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.fit_report import report_fit, report_verdicts
 from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.report.files import summary
 from kinertia.trial.rms import rms_length
 
 
@@ -24,7 +26,7 @@ def demo(
     output: Output = Path("out"),
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Show what Kinertia does; needs no files.
 
     A synthetic person walks through a synthetic laboratory; Kinertia then estimates from its files and compares the
@@ -41,13 +43,14 @@ def demo(
     """
     results_folder(output, force)
     if measured:
-        _measured_demo(output)
+        return _measured_demo(output)
     with shown_progress() as progress:
         result = run_demo(output, progress=progress)
     _report_demo(result, output)
+    return Outcome({"folder": str(output), **summary(result.fit), "truth": _against_truth(result)})
 
 
-def _measured_demo(folder: Path) -> NoReturn:
+def _measured_demo(folder: Path) -> Outcome:
     with shown_progress() as progress:
         fit = run_measured_demo(folder, progress)
     judged = verdicts(fit)
@@ -65,7 +68,21 @@ def _measured_demo(folder: Path) -> NoReturn:
         f"to see what the files are like: kinertia check {lab / 'subject.toml'}",
         soft_wrap=True,
     )
-    raise typer.Exit(int(stands_against(judged)))
+    return Outcome({"folder": str(folder), **summary(fit)}, int(stands_against(judged)))
+
+
+def _against_truth(result: Demo) -> dict[str, Any]:
+    """RMS errors of the parameters by estimate, and of the joint moments (N m) by joint."""
+    names = ("mass_kg", "com_m", "inertia_kgm2")
+    bodies = {"literature": result.fit.literature, "estimate": result.fit.estimate}
+    bodies["two_level"] = result.two_level.estimate
+    return {
+        "rms_errors": {name: dict(zip(names, result.rms_errors(body), strict=True)) for name, body in bodies.items()},
+        "moment_rms_errors_Nm": {
+            joint: dict(zip(("usual_pipeline", "estimate"), pair, strict=True))
+            for joint, pair in result.moment_errors.items()
+        },
+    }
 
 
 def _report_demo(result: Demo, folder: Path) -> None:

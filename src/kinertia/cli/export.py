@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from kinertia.cli.options import Force, Quiet, results_folder
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
@@ -19,12 +20,14 @@ from kinertia.report.tables import write_csv, write_json, write_mat
 def export(
     results: Annotated[Path, typer.Argument(help="Folder that kinertia fit has written.")],
     csv: Annotated[bool, typer.Option("--csv", help="A file per table, for Excel, R and others.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="One file, tables.json, for scripts.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One file, tables.json; which files were written is printed as JSON, too.")
+    ] = False,
     mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the tables.")] = Path("export"),
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Write all tables of a fit: segments, calibration, strides, curves over the gait cycle and over time.
 
     [bold]Examples[/]
@@ -33,7 +36,7 @@ def export(
 
     kinertia export out --mat -o matlab
     """
-    if not (csv or json or mat):
+    if not (csv or as_json or mat):
         raise typer.BadParameter("say in which form: --csv, --json or --mat (several at once are fine)")
     results_folder(output, force)
     fit = load_fit(results)
@@ -42,8 +45,10 @@ def export(
         (work / "export.json").write_text(dumps(content, indent=2) + "\n", encoding="utf-8")
         if csv:
             write_csv(fit, work)
-        if json:
+        if as_json:
             write_json(fit, work / "tables.json")
         if mat:
             write_mat(fit, work / "tables.mat")
     out.print(f"tables in {output}", soft_wrap=True)
+    files = sorted(path.relative_to(output).as_posix() for path in output.rglob("*.*") if not path.name.startswith("."))
+    return Outcome({"folder": str(output), "files": files})

@@ -11,8 +11,9 @@ import typer
 
 from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.fit_report import report_fit, report_verdicts
-from kinertia.cli.options import AsJson, Force, Output, Quiet, Sex, Verbose, number, results_folder
-from kinertia.cli.terminal import out, print_json, show_error, shown_progress
+from kinertia.cli.options import Force, Output, Quiet, Sex, Verbose, number, results_folder
+from kinertia.cli.outcome import Outcome
+from kinertia.cli.terminal import out, show_error, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
@@ -54,11 +55,10 @@ def fit(
         bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
     ] = False,
     method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
-) -> None:
+) -> Outcome:
     """Estimate body segment parameters from gait.
 
     Of several subject files each gets a folder of its name in the folder for
@@ -109,13 +109,10 @@ def fit(
         judged = verdicts(result)
         status = max(status, int(stands_against(judged)))
         summaries.append({"folder": str(one.folder), **summary(result)})
-        if not (out.quiet or as_json):
-            report_fit(result)
-            report_verdicts(judged, result, verbose)
-            out.print(f"results in {one.folder}", soft_wrap=True)
-    if as_json:
-        print_json(summaries if len(runs) > 1 else summaries[0])
-    raise typer.Exit(status)
+        report_fit(result)
+        report_verdicts(judged, result, verbose)
+        out.print(f"results in {one.folder}", soft_wrap=True)
+    return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
 
 @dataclass(frozen=True)

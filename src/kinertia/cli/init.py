@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.subject_draft import NO_FORCES, init_subject
+from kinertia.io.subject_draft import FILL_IN, NO_FORCES, init_subject
 from kinertia.report.measures_picture import measures_picture
 
 
@@ -20,7 +21,7 @@ def init(
     measures: Annotated[
         bool, typer.Option("--measures", help="Write the sheet of girths and lengths to fill in, and no subject.toml.")
     ] = False,
-) -> None:
+) -> Outcome:
     """Write a first subject.toml from the files in a folder.
 
     With --measures a sheet for girths and lengths of the person, measures.csv, and a picture of where to measure,
@@ -31,20 +32,22 @@ def init(
     kinertia init data/subject01
     """
     if measures:
-        _measures(folder)
-        return
+        return _measures(folder)
     path = folder / "subject.toml"
     if path.exists():
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
     text = init_subject(folder)
     write_then_rename(path, text)
-    for line in text.splitlines():
-        if line.startswith(NO_FORCES):
-            out.print(line.removeprefix("# "), soft_wrap=True)
+    lines = text.splitlines()
+    notes = [line.removeprefix("# ") for line in lines if line.startswith(NO_FORCES)]
+    for note in notes:
+        out.print(note, soft_wrap=True)
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
+    asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
+    return Outcome({"subject_file": str(path), "fill_in": asked, "notes": notes})
 
 
-def _measures(folder: Path) -> None:
+def _measures(folder: Path) -> Outcome:
     sheet, picture = folder / "measures.csv", folder / "measures.svg"
     if not folder.is_dir():
         raise FileError(folder, "is no folder; give that of the person's files")
@@ -57,3 +60,4 @@ def _measures(folder: Path) -> None:
         'subject file, under [prior]: measures = "measures.csv"',
         soft_wrap=True,
     )
+    return Outcome({"sheet": str(sheet), "picture": str(picture)})

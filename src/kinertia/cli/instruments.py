@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from kinertia.cli.options import Quiet, own_file
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, show_warning, shown_progress
 from kinertia.errors import FileError, SessionError
 from kinertia.estimation.from_files import check_plates, fit_subject
@@ -25,7 +26,7 @@ def instruments(
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("instruments.toml"),
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Read force plates and clock of a session from all its trials, for use in all its fits.
 
     Writes a file for session = "..." under [instruments] in the subject files
@@ -50,6 +51,12 @@ def instruments(
     write_then_rename(output, session_text(VERSION, session.values, session.people))
     _report(session)
     out.print(f"written to {output}; name it in the subject files: session = ... under [instruments]", soft_wrap=True)
+    found = {
+        instrument: {unknown: dict(zip(("value", "sd", "unit"), known, strict=True)) for unknown, known in each.items()}
+        for instrument, each in session.values.items()
+    }
+    names = [person.name for person in session.people]
+    return Outcome({"file": str(output), "people": names, "found": found, "warnings": session.contradictions})
 
 
 def _wanted(path: Path) -> SubjectFile:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table
 from kinertia.errors import FileError
 from kinertia.io.marker_set_draft import draft_marker_set
@@ -23,7 +24,7 @@ def markers(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File (.toml) for a draft of a marker set of your own.")
     ] = None,
-) -> None:
+) -> Outcome:
     """Show the labels of a file against every marker-set preset, and draft a marker set from them.
 
     A preset is recognised by itself where a file has at least 80 % of its labels. For any other set give -o, complete
@@ -39,15 +40,18 @@ def markers(
     out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
     table = plain_table("preset", "labels present", "absent")
     shares = {name: share_worn(read_marker_set(name), labels) for name in preset_names()}
+    presets = []
     for name in sorted(shares, key=lambda name: -shares[name]):
         wanted = read_marker_set(name).labels
         absent = [label for label in wanted if label not in labels]
         more = f" and {len(absent) - _LISTED} more" if len(absent) > _LISTED else ""
         table.add_row(name, f"{len(wanted) - len(absent)} of {len(wanted)}", ", ".join(absent[:_LISTED]) + more)
+        presets.append({"name": name, "labels": len(wanted), "absent": absent})
     out.print(table)
     best = max(shares, key=lambda name: shares[name])
-    if shares[best] >= ENOUGH_WORN:
-        out.print(f"{best} is recognised by itself", soft_wrap=True)
+    recognised = best if shares[best] >= ENOUGH_WORN else None
+    if recognised:
+        out.print(f"{recognised} is recognised by itself", soft_wrap=True)
     elif output is None:
         out.print("no preset is recognised; for a draft of your own: -o our_lab.toml", soft_wrap=True)
     if output is not None:
@@ -55,3 +59,5 @@ def markers(
             raise FileError(output, "exists already and is left alone; remove it, or give another name")
         write_then_rename(output, draft_marker_set(labels, output.stem))
         out.print(f"wrote {output}: check it, complete what it asks for, then give it as --markers", soft_wrap=True)
+    draft = None if output is None else str(output)
+    return Outcome({"labels": labels, "presets": presets, "recognised": recognised, "draft": draft})

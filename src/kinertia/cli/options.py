@@ -52,7 +52,6 @@ def sex(text: str) -> str:
 Sex = Annotated[
     str | None, typer.Option(parser=sex, metavar="SEX", help="male or female (m, f): which table of the literature.")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON, for scripts, and nothing else.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
 Force = Annotated[bool, typer.Option("--force", help="Write into a folder that holds other files, too.")]
 Quiet = Annotated[

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import AsJson, Force, Output, Quiet, results_folder
-from kinertia.cli.terminal import out, plain_table, print_json, shown_progress
+from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.outcome import Outcome
+from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.estimation.from_files import prepare_subject
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.io.subject_file import read_subject
@@ -30,10 +31,9 @@ def plan(
         typer.Argument(help="Subject file (.toml) whose trials to choose from; the package's motions if left out."),
     ] = None,
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Predict the error bar of every BSP from candidate motions, to know what to record. Estimates nothing.
 
     [bold]Examples[/]
@@ -51,24 +51,21 @@ def plan(
             wanted = read_subject(subject)
             planned = plan_motions(prepare_subject(wanted, progress), wanted.settings.cutoff_hz)
     save_plan(planned, output)
-    if as_json:
-        print_json(plan_summary(planned))
-        return
     table = plain_table(*PLAN_HEADINGS)
     for row in plan_rows(planned):
         table.add_row(*row)
     out.print(f"\n{PLAN_CAPTION}")
     out.print(table)
     out.print(f"results in {output}: plan.html, plan.csv (predicted sd of every parameter), plan.json", soft_wrap=True)
+    return Outcome(plan_summary(planned))
 
 
 def crossval(
     subject: Annotated[Path, typer.Argument(help="Subject file (.toml) with two or more trials.")],
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Hold out each trial in turn: do BSPs from the others explain it better than the literature's?
 
     [bold]Example[/]
@@ -83,9 +80,6 @@ def crossval(
         held_out = cross_validate(ready, bandwidth, progress)
     before = "literature" if ready.file is None else "model"
     save_crossval(held_out, before, output)
-    if as_json:
-        print_json(crossval_summary(held_out))
-        return
     table = plain_table(*(heading.replace(" (", "\n(") for heading in CROSSVAL_HEADINGS))
     last = ""
     for name, *row in crossval_rows(held_out, before):
@@ -95,3 +89,4 @@ def crossval(
     out.print(table)
     out.print(crossval_sentence(held_out))
     out.print(f"results in {output}: crossval.html, crossval.json", soft_wrap=True)
+    return Outcome(crossval_summary(held_out))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from kinertia.cli.options import Quiet
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
 from kinertia.estimation.result import Fit
@@ -24,7 +25,7 @@ def report(
         Path | None, typer.Option(help="CSV file with norms, drawn as bands: quantity,percent,mean,sd.")
     ] = None,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Write the report of a fit again, without the recordings: report.html in its folder is replaced.
 
     With --norms, your laboratory's normal curves are grey bands behind those
@@ -37,14 +38,15 @@ def report(
     kinertia report out --norms adults.csv
     """
     saved = read_saved(results)
-    bands = {} if norms is None else _norms_for(saved.fit, norms)
+    bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, norms)
     page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
     write_then_rename(results / "report.html", page)
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)
+    return Outcome({"report": str(results / "report.html"), "norms": list(bands), "without_curve": without_curve})
 
 
-def _norms_for(fit: Fit, path: Path) -> dict[str, Norm]:
-    """The norms in a file; says which of them this fit has no curve for."""
+def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
+    """The norms in a file, and which of them this fit has no curve for."""
     norms, known = read_norms(path), quantities_of(fit)
     other = sorted(set(norms) - known)
     if len(other) == len(norms):
@@ -54,4 +56,4 @@ def _norms_for(fit: Fit, path: Path) -> dict[str, Norm]:
         )
     if other:
         out.print(f"note: norms that this fit has no curve for: {', '.join(other)}")
-    return norms
+    return {name: norm for name, norm in norms.items() if name in known}, other

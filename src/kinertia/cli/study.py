@@ -11,8 +11,9 @@ import numpy as np
 import typer
 
 from kinertia.cli.measured_demo import FILES as MEASURED_WALK
-from kinertia.cli.options import AsJson, Force, Output, Quiet, results_folder
-from kinertia.cli.terminal import out, plain_table, print_json, shown_progress
+from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.outcome import Outcome, add_command
+from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
 from kinertia.report.accuracy import (
     HEADINGS,
@@ -50,7 +51,6 @@ Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whateve
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
 
 
-@study.command()
 def table1(
     repeats: Annotated[int, typer.Option(min=1, help="Independent draws of start and noise.")] = 10,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")] = 1,
@@ -63,10 +63,9 @@ def table1(
         typer.Option("--variants", help="The noisy half again, one thing changed at a time; some 15 minutes."),
     ] = False,
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
 
     [bold]Examples[/]
@@ -88,18 +87,13 @@ def table1(
             table = run_table1(source, repeats, seed, name, progress=lambda share: progress(f"{repeats} draws", share))
     if variants:
         save_variants(results, output)
-        if as_json:
-            print_json({"seed": seed, "draws": variants_frame(results).to_dict(orient="records")})
-            return
         _report_variants(results, seed)
         _say_where(output, ("variants.html", "variants.md", "variants.csv"), "variants.png")
-        return
+        return Outcome({"seed": seed, "draws": variants_frame(results).to_dict(orient="records")})
     save_table1(table, output)
-    if as_json:
-        print_json(table1_summary(table))
-        return
     _report_table1(table, source.deviation)
     _say_where(output, ("report.html", "table1.json", "table1.csv"), "table1.png")
+    return Outcome(table1_summary(table))
 
 
 def _report_variants(results: Mapping[str, Table1], seed: int) -> None:
@@ -131,16 +125,14 @@ def _report_table1(table: Table1, deviation: np.ndarray) -> None:
             )
 
 
-@study.command()
 def accuracy(
     draws: Annotated[int, typer.Option(min=2, help="People in each scenario.")] = 100,
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Do the error bars hold? People drawn from the literature's prior, measured with faults, estimated.
 
     [bold]Example[/]
@@ -151,9 +143,6 @@ def accuracy(
     with shown_progress() as progress:
         accuracies = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
     save_accuracy(accuracies, seed, output)
-    if as_json:
-        print_json(accuracy_summary(accuracies, seed))
-        return
     for scenario in accuracies.values():
         out.print(f"\n{scenario.title}; {scenario.draws} people, {100 * scenario.converged:.0f} % converged")
         for headings, rows in ((JOINT_HEADINGS, joint_rows), (HEADINGS, accuracy_rows)):
@@ -163,18 +152,17 @@ def accuracy(
             out.print(shown)
     out.print(JOINT_CAPTION)
     out.print(f"\nresults in {output}: accuracy.html, accuracy.json, accuracy.md")
+    return Outcome(accuracy_summary(accuracies, seed))
 
 
-@study.command()
 def populations(
     people: Annotated[int, typer.Option(min=2, help="People of each population.")] = 20,
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """What does a wrong prior cost? Children, obese, old people, prostheses, with the adults' prior and their own.
 
     Also: is a rucksack of unknown mass found?
@@ -187,27 +175,23 @@ def populations(
     with shown_progress() as progress:
         accuracies, rucksacks = run_populations(people, seed, workers, lambda share: progress("people", share))
     save_populations(accuracies, rucksacks, seed, output)
-    if as_json:
-        print_json(populations_summary(accuracies, rucksacks, seed))
-        return
     shown = plain_table(*POPULATION_HEADINGS)
     for row in population_rows(accuracies):
         shown.add_row(*row)
     out.print(shown)
     out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksacks)}")
     out.print(f"\nresults in {output}: populations.html, populations.json, populations.md", soft_wrap=True)
+    return Outcome(populations_summary(accuracies, rucksacks, seed))
 
 
-@study.command()
 def sensitivity(
     draws: Annotated[int, typer.Option(min=2, help="People in each condition.")] = 24,
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Which BSPs are not highly sensitive to noisy kinematics? Errors against noise, strides and squats.
 
     [bold]Example[/]
@@ -218,17 +202,14 @@ def sensitivity(
     with shown_progress() as progress:
         result = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
     save_sensitivity(result, output)
-    if as_json:
-        print_json(sensitivity_summary(result))
-        return
     for kind, title in KINDS.items():
         listed = ", ".join(result.insensitive(kind)) or "none"
         out.print(f"small errors up to twice the amplitude of {title}: {listed}")
     out.print(f"shown by no condition: {', '.join(result.never()) or 'none'}")
     _say_where(output, ("sensitivity.html", "sensitivity.md", "sensitivity.json", "sensitivity.csv"), "sensitivity.png")
+    return Outcome(sensitivity_summary(result))
 
 
-@study.command()
 def faults(
     walks: Annotated[
         list[Path] | None,
@@ -236,10 +217,9 @@ def faults(
     ] = None,
     workers: Workers = None,
     output: Output = Path("out"),
-    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Is a wrong measurement named? Fifty known mistakes in real walks, one at a time.
 
     Swapped labels, wrong axes, units, clocks and zeros, another person's static
@@ -265,9 +245,6 @@ def faults(
         people = sound_laboratories(Path(folder), SOUND_LABORATORIES)
         laboratories = run_sound(people, workers, lambda share: progress("sound laboratories", share))
     save_faults(sound, outcomes, laboratories, output)
-    if as_json:
-        print_json(faults_summary(sound, outcomes, laboratories))
-        return
     shown = plain_table("", *(one.name for one in sound))
     for kind in counts(()):
         shown.add_row(kind, *(str(counts([one for one in outcomes if one.walk == walk.name])[kind]) for walk in sound))
@@ -279,6 +256,7 @@ def faults(
         for finding in walk.findings:
             out.print(f"sound {walk.name}: {finding.by}: {finding.sentence}")
     out.print(f"results in {output}: faults.html, faults.md, faults.json", soft_wrap=True)
+    return Outcome(faults_summary(sound, outcomes, laboratories))
 
 
 def _say_where(output: Path, files: Sequence[str], picture: str) -> None:
@@ -287,3 +265,7 @@ def _say_where(output: Path, files: Sequence[str], picture: str) -> None:
     out.print(f"results in {output}: {', '.join([*files, picture] if drawn else files)}", soft_wrap=True)
     if not drawn:
         out.print(f"no {picture}: matplotlib is not installed; install it: {HOW}", soft_wrap=True)
+
+
+for command in (table1, accuracy, populations, sensitivity, faults):
+    add_command(study, command)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from kinertia.cli.options import Quiet
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, shown_progress
 from kinertia.model.compiled import cache_folder, is_compiled
 
 
-def warm_up(quiet: Quiet = False) -> None:
+def warm_up(quiet: Quiet = False) -> Outcome:
     """Compile beforehand what the first fit would compile.
 
     Kinertia's calculations are compiled once on a machine, which takes about
@@ -24,3 +25,4 @@ def warm_up(quiet: Quiet = False) -> None:
     with shown_progress():
         pass
     out.print(f"{'compiled already' if done else 'compiled'}: {cache_folder()}", soft_wrap=True)
+    return Outcome({"compiled_before": done, "folder": str(cache_folder())})

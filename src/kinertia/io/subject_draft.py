@@ -17,6 +17,8 @@ from kinertia.io.subject_file import Model, TrialFiles
 from kinertia.io.subject_text import entry_line
 from kinertia.settings import Settings, Subject, Table
 
+FILL_IN = "  # FILL IN: "
+"""What is before the words of an entry that stays unknown."""
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 """What the names of static trials contain."""
 NO_FORCES = "# No forces were found for"
@@ -93,7 +95,7 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
 def _entry(table: type[Table], key: str, value: object, example: object = None, note: str = "") -> str:
     """`key = value  # what it is`; without a value a commented example to fill in."""
     if value is None:
-        return f"# {key} = {json.dumps(example)}  # FILL IN: {table.model_fields[key].description}{note}"
+        return f"# {key} = {json.dumps(example)}{FILL_IN}{table.model_fields[key].description}{note}"
     return entry_line(table, key, value, note)
 
 

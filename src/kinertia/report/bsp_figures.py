@@ -135,7 +135,7 @@ def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict
             "mode": "markers",
             "x": compact(np.zeros(int(free.sum()))),
             "y": place[free].tolist(),
-            "marker": {"symbol": "line-ns-open", "size": 9, "color": style.GREY},
+            "marker": {"symbol": "square", "size": 7, "color": style.PALE},
             "error_x": _bars(INTERVAL_SD * prior_sd[free] / scale[free], 7, style.PALE),
             "name": f"{start.word}, 95 %",
             "hoverinfo": "skip",

@@ -8,10 +8,20 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
 from command_line import run
-from kinertia.cli.web.entries import USE, entries, fields, recognise, trouble, write_form, write_text
+from kinertia.cli.web.entries import (
+    USE,
+    entries,
+    fields,
+    marker_set_field,
+    recognise,
+    trouble,
+    write_form,
+    write_text,
+)
 from kinertia.cli.web.file_table import file_table, uses_of, with_uses, within_folder
 from kinertia.cli.web.library import Library
 from kinertia.errors import FileError, SettingsError
+from kinertia.io.marker_set_file import preset_names
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Subject
 
@@ -216,3 +226,17 @@ def test_age_population_and_what_is_attached_reach_the_subject_file(person, meas
     assert content["attached"] == [{"name": "rucksack", "segment": "torso", "mass_kg": "8.0 +- 0.1"}]
     wanted = tomllib.loads(person.subject.read_text(encoding="utf-8"))["subject"]
     assert (wanted["age_years"], wanted["population"]) == (11.5, "child")
+
+
+def test_the_marker_set_is_chosen_among_the_presets(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    field = marker_set_field(entries(person))
+    assert field.choices == tuple(preset_names())
+    write_form(person, {"marker_set": "plug-in-gait", "sex": "male"})
+    assert read_subject(person.subject).model.markers == "plug-in-gait"
+    assert marker_set_field(entries(person)).value == "plug-in-gait"
+    write_form(person, {"marker_set": ""})
+    assert read_subject(person.subject).model.markers is None
+    assert marker_set_field({"model": {"markers": "own.toml"}}) is None
+    assert marker_set_field({"model": {"osim": "scaled.osim"}}) is None

@@ -3,6 +3,7 @@
 import json
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
 
@@ -42,6 +43,16 @@ def until(condition):
         time.sleep(0.02)
 
 
+@contextmanager
+def fitting(library, *names):
+    """Jobs at work, and new people of these names whose fits wait there in this order."""
+    people, jobs = [library.add(name) for name in names], Jobs()
+    with jobs.at_work():
+        for person in people:
+            jobs.add(person, "fit")
+        yield jobs, *people
+
+
 def test_people_are_done_one_after_the_other(library, worker):
     worker("(folder.parent / 'order').open('a').write(folder.name + ' '); time.sleep(0.1)")
     people, jobs = [library.add(name) for name in ("C", "A", "B")], Jobs()
@@ -58,9 +69,7 @@ def test_people_are_done_one_after_the_other(library, worker):
 
 def test_progress_and_time_left_are_of_the_stage(library, worker):
     worker("say(stage='estimate', share=0.25)\nwhile not (folder / 'go').exists(): time.sleep(0.02)")
-    person, jobs = library.add("Anna"), Jobs()
-    with jobs.at_work():
-        jobs.add(person, "fit")
+    with fitting(library, "Anna") as (jobs, person):
         until(lambda: progress(person, jobs)["fit"]["share"] == 0.25)
         told = progress(person, jobs)
         assert told["fit"]["stage"] == "estimate"
@@ -72,19 +81,14 @@ def test_progress_and_time_left_are_of_the_stage(library, worker):
 
 def test_an_error_in_the_files_is_the_persons_note(library, worker):
     worker("say(error='walk.c3d: no force plate in it'); sys.exit(2)")
-    person, jobs = library.add("Anna"), Jobs()
-    with jobs.at_work():
-        jobs.add(person, "fit")
+    with fitting(library, "Anna") as (jobs, person):
         until(lambda: not jobs.busy(person))
     assert person.notes()["fit"] == {"how": "failed", "message": "walk.c3d: no force plate in it"}
 
 
 def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
     worker("print('noise')\nif folder.name == 'Anna': os.abort()\nsay(stage='done', share=1.0)")
-    anna, ben, jobs = library.add("Anna"), library.add("Ben"), Jobs()
-    with jobs.at_work():
-        jobs.add(anna, "fit")
-        jobs.add(ben, "fit")
+    with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
         until(lambda: not jobs.busy(ben))
     assert "Kinertia failed" in anna.notes()["fit"]["message"]
     assert str(anna.folder / "failure.log") in anna.notes()["fit"]["message"]
@@ -93,10 +97,7 @@ def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
 
 def test_who_waits_and_who_is_at_work_are_cancelled(library, worker):
     worker("say(stage='estimate', share=0.1); time.sleep(60)")
-    anna, ben, jobs = library.add("Anna"), library.add("Ben"), Jobs()
-    with jobs.at_work():
-        jobs.add(anna, "fit")
-        jobs.add(ben, "fit")
+    with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
         until(lambda: progress(anna, jobs)["fit"]["stage"] == "estimate")
         process = jobs.of(anna, "fit")._process
         jobs.cancel(ben, "fit")
@@ -109,10 +110,7 @@ def test_who_waits_and_who_is_at_work_are_cancelled(library, worker):
 
 def test_what_is_at_work_when_the_server_ends_is_interrupted(library, worker):
     worker("say(stage='estimate', share=0.1); time.sleep(60)")
-    anna, ben, jobs = library.add("Anna"), library.add("Ben"), Jobs()
-    with jobs.at_work():
-        jobs.add(anna, "fit")
-        jobs.add(ben, "fit")
+    with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
         until(lambda: progress(anna, jobs)["fit"]["stage"] == "estimate")
         process = jobs.of(anna, "fit")._process
     assert process.poll() is not None
@@ -121,9 +119,7 @@ def test_what_is_at_work_when_the_server_ends_is_interrupted(library, worker):
 
 def test_a_check_does_not_wait_for_fits(library, worker):
     worker("time.sleep(60 if sys.argv[1] == 'fit' else 0)")
-    person, jobs = library.add("Anna"), Jobs()
-    with jobs.at_work():
-        jobs.add(person, "fit")
+    with fitting(library, "Anna") as (jobs, person):
         jobs.add(person, "check")
         until(lambda: jobs.of(person, "check") is None)
         assert jobs.of(person, "fit") is not None

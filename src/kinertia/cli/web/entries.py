@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
+from kinertia.cli.web.field import Field, choices_of
 from kinertia.cli.web.file_table import (
     Content,
     file_table,
@@ -16,7 +16,9 @@ from kinertia.cli.web.file_table import (
     within_folder,
 )
 from kinertia.cli.web.library import SUBJECT, Person
+from kinertia.cli.web.rows import with_rows
 from kinertia.errors import KinertiaError, SettingsError
+from kinertia.io.marker_set_file import preset_names
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import read_subject
@@ -36,28 +38,10 @@ _LABELS = {
     "ankle_width_mm": "Ankle width (mm)",
     "elbow_width_mm": "Elbow width (mm)",
 }
+_MARKER_SET = "marker_set"
+_ABOUT_MARKER_SET = "left open: found from the labels where they have most of a preset's"
 USE = "use:"
 """What the fields of the form are called that say what a file is used as; the file's name follows."""
-
-
-@dataclass(frozen=True)
-class Field:
-    """One entry of `[subject]` in the form.
-
-    Attributes:
-        key: of the subject file.
-        label, about: what it is, short and at length.
-        value: as the field shows it.
-        choices: of a field that is no number or text.
-        optional: whether most people leave it empty.
-    """
-
-    key: str
-    label: str
-    about: str
-    value: str
-    choices: tuple[str, ...]
-    optional: bool
 
 
 def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Field]:
@@ -67,7 +51,7 @@ def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Fie
     shown = []
     for key, about in Subject.model_fields.items():
         value = str((typed or {}).get(key, known.get(key, "")))
-        choices = _choices(about.annotation)
+        choices = choices_of(about.annotation)
         label = _LABELS.get(key, key.replace("_", " "))
         optional = key == "name" or key.endswith("_mm")
         shown.append(
@@ -76,11 +60,19 @@ def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Fie
     return sorted(shown, key=lambda field: field.optional)
 
 
-def _choices(annotation: object) -> tuple[str, ...]:
-    """What an entry can be where there is a list of it."""
-    if get_origin(annotation) is Literal:
-        return get_args(annotation)
-    return next((found for part in get_args(annotation) if (found := _choices(part))), ())
+def marker_set_field(content: Content, typed: Mapping[str, str] | None = None) -> Field | None:
+    """Which preset; None where a file of the person's is the marker set, or a model has the markers."""
+    model = _model(content)
+    written = str(model.get("markers", ""))
+    if "osim" in model or (written and written not in preset_names()):
+        return None
+    value = (typed or {}).get(_MARKER_SET, written)
+    return Field(_MARKER_SET, "Marker set", _ABOUT_MARKER_SET, value, tuple(preset_names()), False)
+
+
+def _model(content: Content) -> Mapping[str, Any]:
+    model = content.get("model")
+    return model if isinstance(model, Mapping) else {}
 
 
 def entries(person: Person) -> Content:
@@ -147,12 +139,17 @@ def write_form(person: Person, form: Mapping[str, str]) -> None:
         text = form[key].strip()
         subject.pop(key, None)
         if text:
-            number = not _choices(Subject.model_fields[key].annotation) and key != "name"
+            number = not choices_of(Subject.model_fields[key].annotation) and key != "name"
             subject[key] = _number(key, text) if number else text
     uses = {name.removeprefix(USE): use for name, use in form.items() if name.startswith(USE)}
     rows = file_table(person.files(), content)
     known = {row.name: uses.get(row.name, row.use) for row in rows if row.choices}
-    write(person, with_uses({**content, "subject": subject}, known))
+    changed = with_rows({**content, "subject": subject}, form)
+    if _MARKER_SET in form:
+        changed["model"] = {**_model(content), "markers": form[_MARKER_SET]}
+        if not form[_MARKER_SET]:
+            del changed["model"]["markers"]
+    write(person, with_uses(changed, known))
 
 
 def _number(key: str, text: str) -> float:

@@ -10,13 +10,15 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from kinertia.cli.web.entries import USE, entries, fields, trouble
+from kinertia.cli.web.entries import USE, entries, fields, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import Person
 from kinertia.cli.web.responses import page
+from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
 from kinertia.errors import KinertiaError
+from kinertia.model.marker_set import SEGMENTS
 
 _ENDED = {
     "cancelled": "Cancelled.",
@@ -123,6 +125,9 @@ def person_page(
         use=USE,
         uses={row.name: (typed or {}).get(USE + row.name, row.use) for row in rows},
         fields=fields(dict(content), typed),
+        marker_set=marker_set_field(dict(content), typed),
+        more={each.kind: each for each in rows_of(dict(content), typed)},
+        segments=SEGMENTS,
         text=person.subject.read_text(encoding="utf-8", errors="replace") if person.subject.is_file() else "",
         broken=broken,
         problem=problem,

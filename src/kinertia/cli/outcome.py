@@ -1,0 +1,61 @@
+"""How a command ends: what it has for scripts, and its exit status. `--json` of all commands is here."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import wraps
+from typing import Annotated, Any, NoReturn, get_type_hints
+
+import typer
+
+from kinertia.cli.terminal import out, print_json
+
+_AS_JSON = Annotated[bool, typer.Option("--json", help="Print the results as JSON, for scripts, and nothing else.")]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended.
+
+    Attributes:
+        content: what a script needs of it, as `--json` prints it; paths as text.
+        status: exit status.
+    """
+
+    content: Mapping[str, Any] | Sequence[Any]
+    status: int = 0
+
+
+def add_command(app: typer.Typer, command: Callable[..., Any], name: str | None = None) -> None:
+    """Make it a command of `app`; one that returns an `Outcome` gets `--json`, which prints that in place of all words.
+
+    A command that has an `as_json` of its own is told of the option, too.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    app.command(name)(_with_json(command, hints) if hints["return"] is Outcome else command)
+
+
+def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Callable[..., NoReturn]:
+    signature = inspect.signature(command)
+    own = "as_json" in signature.parameters
+
+    @wraps(command)
+    def run(*, as_json: bool, **given: Any) -> NoReturn:
+        if own:
+            given["as_json"] = as_json
+        with out.capture() if as_json else nullcontext():
+            outcome = command(**given)
+        if as_json:
+            print_json(outcome.content)
+        raise typer.Exit(outcome.status)
+
+    if not own:
+        option = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_AS_JSON)
+        signature = signature.replace(parameters=[*signature.parameters.values(), option])
+    annotated = [one.replace(annotation=hints.get(name, _AS_JSON)) for name, one in signature.parameters.items()]
+    run.__signature__ = signature.replace(parameters=annotated)  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in annotated}
+    return run

@@ -1,0 +1,33 @@
+"""One entry of a form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args, get_origin
+
+
+@dataclass(frozen=True)
+class Field:
+    """One entry of the form.
+
+    Attributes:
+        key: its name in the form.
+        label, about: what it is, short and at length.
+        value: as the field shows it.
+        choices: of a field that is no number or text.
+        optional: whether most people leave it empty.
+    """
+
+    key: str
+    label: str
+    about: str
+    value: str
+    choices: tuple[str, ...]
+    optional: bool
+
+
+def choices_of(annotation: object) -> tuple[str, ...]:
+    """What an entry can be where there is a list of it."""
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    return next((found for part in get_args(annotation) if (found := choices_of(part))), ())

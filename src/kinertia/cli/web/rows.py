@@ -1,0 +1,147 @@
+"""Entries of which a subject file has as many as there are, as rows of the form: measured segments, what is attached.
+
+What stands in a row is written as it was typed, numbers as numbers; what is wrong with it, `read_subject` says.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from kinertia.cli.web.field import Field
+from kinertia.cli.web.file_table import Content
+from kinertia.settings import Attached, KnownSegment, Table, number_of
+
+_SEGMENT = "segment"
+_TABLES: dict[str, type[Table]] = {"segment": KnownSegment, "attached": Attached}
+_TEXTS = (_SEGMENT, "name", "source")
+_LABELS = {
+    "segment": "Segment",
+    "name": "Name",
+    "mass_kg": "Mass (kg)",
+    "com_x_mm": "CoM forwards (mm)",
+    "com_y_mm": "CoM upwards (mm)",
+    "com_z_mm": "CoM to the right (mm)",
+    "ixx_kgm2": "Ixx (kg m2)",
+    "iyy_kgm2": "Iyy (kg m2)",
+    "izz_kgm2": "Izz (kg m2)",
+    "prosthesis": "Prosthesis",
+    "source": "Measured by",
+    "on_scale": "On the scale, too",
+    "com_mm": "CoM: forwards, upwards, right (mm)",
+    "com_sd_mm": "CoM known to (mm)",
+    "size_mm": "Depth, height, width (mm)",
+}
+_THREE = ("com_mm", "size_mm")
+_BETWEEN = re.compile(r"\s*;\s*|,?\s+")
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """All rows of one kind, the last of them empty, for one more.
+
+    Attributes:
+        kind: "segment" or "attached".
+        rows: the fields of each.
+    """
+
+    kind: str
+    rows: tuple[tuple[Field, ...], ...]
+
+    @property
+    def written(self) -> int:
+        """How many there are but for the empty one."""
+        return len(self.rows) - 1
+
+
+def rows(content: Content, typed: Mapping[str, str] | None = None) -> list[Rows]:
+    """Rows of every kind; what was typed goes before what is written."""
+    return [
+        Rows(kind, tuple(_fields(kind, number, row) for number, row in enumerate([*each, {}])))
+        for kind in _TABLES
+        for each in (_typed(kind, typed) if typed else _written(kind, content),)
+    ]
+
+
+def with_rows(content: Content, form: Mapping[str, str]) -> Content:
+    """The entries with those of the form; a row without its segment or name goes, and kinds without a row stay."""
+    changed = dict(content)
+    for kind in _TABLES:
+        if not any(key.startswith(f"{kind}:") for key in form):
+            continue
+        entries = [{key: _value(key, text) for key, text in row.items()} for row in _typed(kind, form)]
+        if kind == _SEGMENT:
+            given: Any = {str(row.pop(_SEGMENT)): row for row in entries}
+        else:
+            given = entries
+        changed.pop(kind, None)
+        if given:
+            changed[kind] = given
+    return changed
+
+
+def _keys(kind: str) -> list[str]:
+    """Keys of a row, the one that it cannot be without first."""
+    keys = list(_TABLES[kind].model_fields)
+    return [_SEGMENT, *keys] if kind == _SEGMENT else keys
+
+
+def _fields(kind: str, number: int, row: Mapping[str, str]) -> tuple[Field, ...]:
+    fields = []
+    for key in _keys(kind):
+        about = _TABLES[kind].model_fields.get(key)
+        choices = ("yes", "no") if about is not None and about.annotation is bool else ()
+        description = "which" if about is None else about.description or ""
+        optional = about is None or not about.is_required()
+        fields.append(Field(f"{kind}:{number}:{key}", _LABELS[key], description, row.get(key, ""), choices, optional))
+    return tuple(fields)
+
+
+def _written(kind: str, content: Content) -> list[dict[str, str]]:
+    """Rows of the subject file as the form shows them; none of what has another shape."""
+    value = content.get(kind)
+    if kind == _SEGMENT and isinstance(value, Mapping):
+        value = [{_SEGMENT: name, **one} for name, one in value.items() if isinstance(one, Mapping)]
+    if not isinstance(value, list):
+        return []
+    return [{key: _shown(one[key]) for key in _keys(kind) if key in one} for one in value if isinstance(one, Mapping)]
+
+
+def _typed(kind: str, form: Mapping[str, str]) -> list[dict[str, str]]:
+    """Rows of the form that are not empty where they must not be."""
+    found: dict[int, dict[str, str]] = {}
+    for name, text in form.items():
+        what, _, rest = name.partition(":")
+        number, _, key = rest.partition(":")
+        if what == kind and number.isdecimal() and key in _keys(kind) and text.strip():
+            found.setdefault(int(number), {})[key] = text.strip()
+    return [row for _, row in sorted(found.items()) if _keys(kind)[0] in row]
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _value(key: str, text: str) -> object:
+    """What a subject file says for what was typed."""
+    if key in _TEXTS:
+        return text
+    if text in ("yes", "no"):
+        return text == "yes"
+    if key in _THREE:
+        bare = text.strip("[] ")
+        return [_number(part) for part in (_BETWEEN.split(bare) if _BETWEEN.search(bare) else bare.split(","))]
+    return _number(text)
+
+
+def _number(text: str) -> object:
+    """A number; of a value with its deviation the text, with decimal points."""
+    try:
+        return number_of(text)
+    except ValueError:
+        return _DECIMAL_COMMA.sub(".", text)

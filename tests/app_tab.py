@@ -1,0 +1,121 @@
+"""A tab of the browser on `kinertia app`: what a user does there, and what went wrong in it."""
+
+import json
+import shutil
+from urllib.parse import urlsplit
+
+from chromium import DESKTOP, playwright
+from kinertia.cli.measured_demo import FILES
+from kinertia.io.provenance import sha256
+
+PATIENCE_MS = 120_000
+
+
+class Tab:
+    """A tab of the browser, with what went wrong in it and where its requests went."""
+
+    def __init__(self, browser, app, viewport=None):
+        self.app = app
+        self.page = browser.new_page(viewport=viewport or DESKTOP)
+        self.page.set_default_timeout(PATIENCE_MS)
+        self.errors, self.hosts = [], set()
+        self.page.on("console", lambda message: message.type in ("error", "warning") and self.heard(message.text))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("request", lambda request: self.hosts.add(urlsplit(request.url).netloc))
+
+    def heard(self, text):
+        """What Chromium itself says of an answer to wrong input is no error of the page's."""
+        if "422 (Unprocessable Entity)" not in text:
+            self.errors.append(text)
+
+    def home(self):
+        self.page.goto(self.app.address)
+        return self
+
+    def drop(self, *files):
+        """Files for somebody new, who is called as the first of them or, of a folder, as it."""
+        chosen = self.page.get_by_label("Choose a folder" if files[0].is_dir() else "Choose files")
+        chosen.set_input_files([str(file) for file in files] if not files[0].is_dir() else str(files[0]))
+        return self
+
+    def drag(self, *paths):
+        """The same by dragging files and folders from outside over the page, and letting them go there."""
+        box = self.page.locator("[data-drop]").first.bounding_box()
+        at = {"x": box["x"] + 40, "y": box["y"] + 40}
+        data = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
+        session = self.page.context.new_cdp_session(self.page)
+        for kind in ("dragEnter", "dragOver", "drop"):
+            session.send("Input.dispatchDragEvent", {"type": kind, **at, "data": data})
+        session.detach()
+        return self
+
+    def arrived(self):
+        self.page.wait_for_url("**/people/*")
+        playwright.expect(self.page.get_by_role("heading", name="1. Files and person")).to_be_visible()
+        return self
+
+    def fill(self, **entries):
+        for label, value in entries.items():
+            field = self.page.get_by_label({"sex": "Sex", "mass": "Body mass (kg)", "height": "Height (m)"}[label])
+            field.select_option(value) if label == "sex" else field.fill(value)
+        return self
+
+    def check(self):
+        self.page.get_by_role("button", name="Save and check").click()
+        return self
+
+    def text(self, changed):
+        """Change the text of the subject file."""
+        self.page.get_by_text("The subject file, with all entries").click()
+        field = self.page.get_by_label("Subject file", exact=True)
+        field.fill(changed(field.input_value()))
+        self.page.get_by_role("button", name="Save this text and check").click()
+        return self
+
+    def checked(self):
+        playwright.expect(self.page.locator("section[aria-labelledby=check] .headline")).to_be_visible(
+            timeout=PATIENCE_MS
+        )
+        playwright.expect(self.page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+        return self
+
+    def estimate(self):
+        self.page.get_by_role("button", name="Estimate", exact=True).click()
+        return self
+
+    def verdict(self):
+        """The headline on the page, which the report inside it has as well."""
+        headline = self.page.locator("section[aria-labelledby=results] > .headline")
+        playwright.expect(headline).to_be_visible(timeout=PATIENCE_MS)
+        report = self.page.frame_locator("iframe.report").locator("#verdict .headline, .headline").first
+        playwright.expect(report).to_have_text(headline.inner_text(), timeout=PATIENCE_MS)
+        return headline.inner_text()
+
+    def person(self):
+        name = self.page.get_by_role("heading", level=1).inner_text()
+        return self.app.library.person(name)
+
+    def message(self):
+        return self.page.locator(".message.fail").first.inner_text()
+
+    def quiet(self):
+        assert self.errors == []
+        assert self.hosts == {urlsplit(self.app.address).netloc}
+        self.page.close()
+
+
+def with_everything(person):
+    """Files, findings and results, without computing any."""
+    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+        shutil.copyfile(path, person.folder / path.name)
+    person.check.mkdir()
+    found = [{"title": "walk", "verdicts": [{"level": level, "sentence": "s"} for level in ("fail", "caution")]}]
+    outcome = {"inputs": "", "mistakes": ["a file"], "advice": "more", "findings": found}
+    (person.check / "outcome.json").write_text(json.dumps(outcome))
+    person.results.mkdir()
+    (person.results / "fit.json").write_text("{}")
+    page = "<!doctype html><html lang=en><title>report</title><main><h1>report</h1></main>"
+    (person.results / "report.html").write_text(page)
+    outcome = {"inputs": "", "level": "caution", "headline": "Usable with care.", "ended": 1.7e9}
+    outcome["summary"] = sha256(person.results / "fit.json")
+    (person.results / "outcome.json").write_text(json.dumps(outcome))

@@ -1,0 +1,130 @@
+"""`--json`: what every command prints for scripts, and nothing else."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from command_line import run
+from kinertia.cli import demo as demo_module
+from kinertia.cli import instruments as instruments_module
+from kinertia.io.session_file import read_session
+from reference import commands
+
+NOT_YET = {"kinertia cohort", "kinertia population"}
+
+
+def told(*arguments, status=0):
+    """What a command prints, which is JSON from the first letter to the last."""
+    outcome = run(*arguments, "--json")
+    assert outcome.status == status, outcome.err
+    return json.loads(outcome.out, parse_constant=pytest.fail)
+
+
+def test_every_command_has_the_option():
+    lacking = {
+        name for name, command in commands() if not any("--json" in parameter.opts for parameter in command.params)
+    }
+    groups = {name for name, command in commands() if getattr(command, "commands", None)}
+    assert lacking - groups - {"kinertia"} == NOT_YET
+
+
+def test_init_says_what_is_to_be_filled_in(tmp_path, measured_walk):
+    for name in ("static.c3d", "walk.c3d"):
+        shutil.copyfile(measured_walk / name, tmp_path / name)
+    content = told("init", tmp_path)
+    text = (tmp_path / "subject.toml").read_text(encoding="utf-8")
+    assert content["subject_file"] == str(tmp_path / "subject.toml")
+    assert content["fill_in"] == [line.split()[1] for line in text.splitlines() if "FILL IN:" in line] == ["sex"]
+
+
+def test_markers_says_which_preset_is_recognised(measured_walk, tmp_path):
+    content = told("markers", measured_walk / "static.c3d", "-o", tmp_path / "own.toml")
+    assert content["recognised"] == "plug-in-gait"
+    assert {"LASI", "RASI"} <= set(content["labels"])
+    assert content["draft"] == str(tmp_path / "own.toml")
+    shown = run("markers", measured_walk / "static.c3d").out
+    for preset in content["presets"]:
+        assert f"{preset['labels'] - len(preset['absent'])} of {preset['labels']}" in shown
+
+
+def test_check_says_what_it_shows_and_fails_as_without(measured_walk, tmp_path):
+    content = told("check", measured_walk / "walk.c3d")
+    assert content["recordings"][0]["name"] == "walk.c3d"
+    content = told("check", measured_walk / "walk.c3d", "--mass", 90, status=1)
+    assert "fail" in {verdict["level"] for verdict in content["recordings"][0]["verdicts"]}
+    (tmp_path / "broken.c3d").write_bytes(b"no motion" * 100)
+    content = told("check", tmp_path / "broken.c3d", status=2)
+    assert len(content["errors"]) == 1
+
+
+def test_demo_sets_the_estimate_beside_the_truth(demo_run, tmp_path, monkeypatch):
+    demo, folder = demo_run
+    monkeypatch.setattr(demo_module, "run_demo", lambda *arguments, **options: demo)
+    content = told("demo", "-o", tmp_path / "out")
+    summary = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
+    assert {key: content[key] for key in summary} == summary
+    errors = content["truth"]["rms_errors"]
+    assert tuple(errors["estimate"].values()) == pytest.approx(demo.rms_errors(demo.fit.estimate))
+    assert errors["estimate"]["mass_kg"] < errors["literature"]["mass_kg"]
+    knee = content["truth"]["moment_rms_errors_Nm"]["knee"]
+    assert knee["estimate"] < knee["usual_pipeline"]
+
+
+def test_the_measured_demo_is_a_fit(measured_demo, tmp_path, monkeypatch):
+    monkeypatch.setattr(demo_module, "run_measured_demo", lambda folder, progress: measured_demo.fit)
+    content = told("demo", "--measured", "-o", tmp_path / "out", status=measured_demo.outcome.status)
+    summary = json.loads((measured_demo.folder / "fit.json").read_text(encoding="utf-8"))
+    assert {key: content[key] for key in summary} == summary
+
+
+def test_instruments_says_what_its_file_holds(measured_demo, measured_walk, tmp_path, monkeypatch):
+    monkeypatch.setattr(instruments_module, "fit_subject", lambda wanted, progress: measured_demo.fit)
+    content = told("instruments", measured_walk / "subject.toml", "-o", tmp_path / "instruments.toml")
+    (person,) = read_session(Path(content["file"]))
+    assert content["people"] == [person.name]
+    gain = content["found"]["plate 2"]["gain"]
+    written = (tmp_path / "instruments.toml").read_text(encoding="utf-8")
+    assert f"gain_percent = {100 * gain['value']:.3f}"[:-2] in written
+
+
+def test_report_and_export_name_their_files(demo_run, tmp_path):
+    results, tables = tmp_path / "results", tmp_path / "tables"
+    results.mkdir()
+    shutil.copy(demo_run[1] / "fit.npz", results)
+    assert told("report", results) == {"report": str(results / "report.html"), "norms": [], "without_curve": []}
+    (tmp_path / "norms.csv").write_text("quantity,percent,mean,sd\nknee_angle_moment,0,0,1\nkneecap,0,0,1\n")
+    content = told("report", results, "--norms", tmp_path / "norms.csv")
+    assert (content["norms"], content["without_curve"]) == (["knee_angle_moment"], ["kneecap"])
+    content = told("export", results, "--csv", "-o", tables)
+    assert content["folder"] == str(tables)
+    assert {"bsp.csv", "tables.json", "walk/moments.csv"} <= set(content["files"])
+    assert all((tables / name).is_file() for name in content["files"])
+
+
+def test_warm_up_says_where_it_is_compiled():
+    content = told("warm-up")
+    assert content["compiled_before"] is True
+    assert "kinertia" in content["folder"]
+
+
+def test_app_prints_its_address_first(monkeypatch, tmp_path):
+    pytest.importorskip("uvicorn")
+    from kinertia.cli.web.server import Server
+
+    monkeypatch.setattr(Server, "run", lambda self: self._socket.close())
+    content = told("app", "--folder", tmp_path, "--no-browser")
+    assert content["address"].startswith("http://127.0.0.1:")
+    assert content["library"] == str(tmp_path)
+
+
+def test_an_error_is_no_result(tmp_path):
+    outcome = run("init", tmp_path, "--json")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "holds no file of markers" in outcome.err
+
+
+def test_words_come_back_after_a_command_for_scripts(measured_walk):
+    told("markers", measured_walk / "static.c3d")
+    assert "plug-in-gait is recognised by itself" in run("markers", measured_walk / "static.c3d").out

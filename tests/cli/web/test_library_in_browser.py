@@ -1,0 +1,126 @@
+"""The life of the page in a browser: several tabs, reloads, cancelled and crashed fits, the library, the end."""
+
+import shutil
+from urllib.parse import quote
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
+pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
+from app_server import running
+from app_tab import PATIENCE_MS, Tab, with_everything
+from chromium import playwright
+from kinertia.cli.measured_demo import FILES
+from kinertia.cli.web import jobs
+
+WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share': 0.3}), flush=True)\ntime.sleep(90)"
+"""A fit that is not done before it is cancelled."""
+
+pytestmark = pytest.mark.slow
+
+
+def ready(library, name):
+    """Somebody who can be fitted."""
+    person = library.add(name)
+    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+        shutil.copyfile(path, person.folder / path.name)
+    return person
+
+
+@pytest.fixture
+def waiting(monkeypatch, app):
+    """A person whose fit does not end by itself."""
+    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", WAITING))
+    return ready(app.library, "Waiting")
+
+
+def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
+    first, second = Tab(browser, app), Tab(browser, app)
+    address = f"{app.address}people/{waiting.name}"
+    first.page.goto(address)
+    first.estimate()
+    stage = first.page.locator("[data-stage]")
+    playwright.expect(stage).to_have_text("estimate", timeout=PATIENCE_MS)
+    playwright.expect(first.page.locator("[data-left]")).to_contain_text("left")
+    assert first.page.get_by_label("Body mass (kg)").is_disabled() or first.page.locator("fieldset[disabled]").count()
+    first.page.reload()
+    playwright.expect(stage).to_have_text("estimate", timeout=PATIENCE_MS)
+    second.home()
+    playwright.expect(second.page.locator(".people li").filter(has_text=waiting.name)).to_contain_text("Fit: estimate")
+    second.page.goto(address)
+    playwright.expect(second.page.locator("progress")).to_have_attribute("value", "0.3")
+    second.page.get_by_role("button", name="Cancel").click()
+    for one in (second, first):
+        playwright.expect(one.page.locator(".message.caution")).to_contain_text("Cancelled.", timeout=PATIENCE_MS)
+        playwright.expect(one.page.get_by_role("button", name="Estimate", exact=True)).to_be_visible()
+        one.quiet()
+
+
+def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch):
+    crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
+    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", crash))
+    tab = Tab(browser, app)
+    for name, said in (("Crashing", "Kinertia failed"), ("Next", "")):
+        tab.page.goto(f"{app.address}people/{ready(app.library, name).name}")
+        tab.estimate()
+        playwright.expect(tab.page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+        messages = tab.page.locator("section[aria-labelledby=results] .message.fail")
+        playwright.expect(messages).to_have_count(1 if said else 0)
+        if said:
+            assert said in tab.message()
+            assert "failure.log" in tab.message()
+    tab.quiet()
+
+
+def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run, tmp_path):
+    library = tmp_path / "library"
+    with running(library) as own:
+        for name, results in (("Spring", demo_run[1]), ("Autumn", demo_run[1] / "two-level")):
+            folder = own.library.add(name).results
+            folder.mkdir()
+            for file in ("fit.npz", "fit.json", "report.html"):
+                shutil.copyfile(results / file, folder / file)
+        tab = Tab(browser, own).home()
+        page = tab.page
+        assert page.locator(".people a").all_inner_texts() in (["Spring", "Autumn"], ["Autumn", "Spring"])
+        page.get_by_role("link", name="Spring").click()
+        report = page.frame_locator("iframe.report")
+        playwright.expect(report.get_by_role("heading", name="synthetic walker")).to_be_visible(timeout=PATIENCE_MS)
+        tab.home()
+        for name in ("Spring", "Autumn"):
+            page.get_by_label(f"Compare {name}").check()
+        page.get_by_role("button", name="Compare the chosen").click()
+        compared = page.frame_locator("iframe")
+        playwright.expect(compared.get_by_role("columnheader", name="Autumn").first).to_be_visible(timeout=PATIENCE_MS)
+        tab.home()
+        page.get_by_label("Delete Autumn").click()
+        page.get_by_role("button", name="Delete Autumn").click()
+        playwright.expect(page.locator(".people a")).to_have_text(["Spring"])
+        assert [path.name for path in library.iterdir() if not path.name.startswith(".")] == ["Spring"]
+        tab.quiet()
+
+
+def test_a_report_reaches_nothing(browser, app):
+    """Whatever a file made a report say, it has no way to the page, the library or the network."""
+    person = app.library.add("Curious report")
+    with_everything(person)
+    tries = {
+        "asked": "fetch(location.href.replace('results/report.html', 'subject.toml')).then(() => 'yes', () => 'no')",
+        "out": "fetch('http://127.0.0.1:9/').then(() => 'yes', () => 'no')",
+        "page": "(() => { try { return parent.document ? 'yes' : 'no'; } catch { return 'no'; } })()",
+    }
+    tab = Tab(browser, app)
+    tab.page.goto(f"{app.address}people/{quote(person.name)}")
+    tab.page.frame_locator("iframe.report").get_by_role("heading", name="report").wait_for()
+    (frame,) = [frame for frame in tab.page.frames if frame.url.endswith("results/report.html")]
+    assert {name: frame.evaluate(tried) for name, tried in tries.items()} == dict.fromkeys(tries, "no")
+    assert any("Content Security Policy" in error for error in tab.errors)
+    tab.page.close()
+
+
+def test_it_ends_by_its_button_and_says_so(browser, tmp_path):
+    with running(tmp_path / "library") as own:
+        tab = Tab(browser, own).home()
+        tab.page.get_by_role("button", name="Close Kinertia").click()
+        playwright.expect(tab.page.get_by_role("heading", name="Kinertia has ended")).to_be_visible()
+        tab.page.close()

@@ -1,0 +1,88 @@
+"""Invented results of every study, of `plan` and of `crossval`: small ones, for tests of their pages and tables."""
+
+from dataclasses import astuple
+
+import numpy as np
+
+from kinertia.model.bsp import PARAMETERS
+from kinertia.studies.accuracy import CLASSES, ClassAccuracy, ScenarioAccuracy
+from kinertia.studies.cross_validation import Explained, HeldOut
+from kinertia.studies.faults import FaultOutcome, Finding, SoundWalk
+from kinertia.studies.joint_accuracy import JOINTS, JointAccuracy
+from kinertia.studies.plan import Plan
+from kinertia.studies.populations import PopulationAccuracy, RucksackAccuracy
+from kinertia.studies.sensitivity import CONDITIONS as NOISES
+from kinertia.studies.sensitivity import Sensitivity
+from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Draw, Errors, Table1
+from kinertia.studies.table1_variants import LONG, LONG_GROUND, NOISY
+
+PRIOR = np.ones((2, len(PARAMETERS)))
+PLAN = Plan(
+    ("shank_r", "<b>"), PRIOR, {("walk",): 0.4 * PRIOR, ("<i>squat",): 0.9 * PRIOR, ("walk", "<i>squat"): 0.2 * PRIOR}
+)
+HELD_OUT = (
+    HeldOut("one", ("two",), Explained(200.0, 10.0, 4.0, 0.010), Explained(150.0, 8.0, 3.0, 0.009)),
+    HeldOut("two", ("one",), Explained(100.0, 9.0, 3.5, 0.008), Explained(120.0, 9.5, 3.6, 0.008)),
+)
+SOUND = (SoundWalk("one", None, (), None), SoundWalk("other", None, (Finding("caution", "mass"),), None))
+OUTCOMES = (
+    FaultOutcome("one", "a", "named", "said", "check"),
+    FaultOutcome("other", "a", "named", "said", "fit"),
+    FaultOutcome("one", "b", "silent"),
+    FaultOutcome("other", "b", "not possible"),
+)
+ACCURACIES = {
+    name: ScenarioAccuracy(
+        f"laboratory {name}",
+        5,
+        {each: ClassAccuracy(0.95, 0.01, 0.8, 0.01, 0.02, 0.008, 0.9) for each in CLASSES},
+        {joint: JointAccuracy(1.0, 1.1, 0.94, 2.0, 0.01, 0.02, 0.01, 0.02) for joint in JOINTS},
+        1.0,
+    )
+    for name in ("one", "two")
+}
+POPULATIONS = [
+    PopulationAccuracy(
+        "children", prior, 4, *2 * [{"mass": 0.3, "CoM": 0.01, "inertia": 0.01}], 0.93, 1.2, 2.4, unlike=0.25
+    )
+    for prior in ("adults'", "their own")
+]
+RUCKSACKS = [RucksackAccuracy(4, None, 0.9, 1.0, 1.0), RucksackAccuracy(4, 0.3, 0.4, 0.5, 1.0)]
+
+
+def sensitivity() -> Sensitivity:
+    """Three parameters: one always seen, one lost in noise, one never seen."""
+    errors = {key: np.array([0.2, 0.3, 0.99]) for key in NOISES}
+    errors["study x 2"] = np.array([0.3, 0.7, 1.0])
+    return Sensitivity(("torso.com_z", "thigh.mass", "pelvis.iyy"), errors, 2, 1)
+
+
+def table1() -> Table1:
+    """Two draws: twice and four times the published errors."""
+    segments = ("pelvis", "torso", "thigh", "shank", "foot", "upper_arm", "forearm")
+    shown = ("mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz")
+    draws = tuple(
+        Draw(
+            number=k,
+            errors={c: Errors(*(factor * np.array(astuple(PUBLISHED[c]))).tolist()) for c in CONDITIONS},
+            parameter_errors={c: np.outer([0.1, 0.01 * factor], np.ones(49)) for c in CONDITIONS},
+            costs={c: np.array([2.0, 1.0]) for c in CONDITIONS},
+            converged=dict.fromkeys(CONDITIONS, True),
+        )
+        for k, factor in enumerate((2.0, 4.0))
+    )
+    parameters = tuple(f"{segment}.{parameter}" for segment in segments for parameter in shown)
+    return Table1(parameters, np.ones(49), draws, 3, "walk <1>")
+
+
+def variants() -> dict[str, Table1]:
+    """Two variants of two draws: twice and four times the published errors, of which the first has all conditions."""
+
+    def draw(number, factor, conditions):
+        errors = {c: Errors(*(factor * np.array(astuple(PUBLISHED[c]))).tolist()) for c in conditions}
+        paths = {c: np.full((4, 49), 0.1) for c in conditions}
+        costs = {c: np.array([8.0, 4.0, 3.0, 2.99999]) for c in conditions}
+        return Draw(number, errors, paths, costs, dict.fromkeys(conditions, True))
+
+    draws = (draw(0, 2.0, CONDITIONS), draw(1, 4.0, NOISY))
+    return {title: Table1(("a",) * 49, np.ones(49), draws, 1, title) for title in (LONG, LONG_GROUND)}
