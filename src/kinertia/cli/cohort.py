@@ -101,11 +101,7 @@ def _standing(people: Sequence[Any], output: Path) -> list[Standing]:
 
 def _fitted(everybody: Sequence[Standing], output: Path, scheduler: str | None) -> dict[str, Record]:
     """Records of all that were due, by name; nothing is started where nobody is."""
-    jobs = [
-        Job(one.person.name, one.person.subject.resolve(), output, one.inputs, one.trials)
-        for one in everybody
-        if one.due and one.person.subject is not None
-    ]
+    jobs = [Job.of(one, output) for one in everybody if one.due]
     records: dict[str, Record] = {}
     if not jobs:
         return records

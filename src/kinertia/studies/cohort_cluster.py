@@ -10,7 +10,7 @@ import logging
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,8 @@ RETRIES = 2
 """How often a person is tried again whose process was killed."""
 _SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
 """Of one processor, for a rough guess before anything was measured: see `docs/long-trials.md`."""
+_LEAST_LIMIT_S, _PATIENCE = 900.0, 50.0
+"""A fit is given so long, and so many times the guess: what takes longer has no end."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,9 @@ class Job:
         cohort: folder of the cohort's results, as workers see it.
         inputs: SHA-256 of what goes into the fit.
         trials: how many.
+        limit_s: after which its process is ended.
         kinertia: version of the command, which has to be the worker's.
+        run: which run of the command it is of.
     """
 
     person: str
@@ -48,7 +52,17 @@ class Job:
     cohort: Path
     inputs: str
     trials: int
+    limit_s: float
     kinertia: str = VERSION
+    run: str = ""
+
+    @classmethod
+    def of(cls, one: Standing, cohort: Path) -> Job:
+        """To fit a person who is due, into the folder of the cohort."""
+        if one.person.subject is None:
+            raise ValueError(f"{one.person.name} is not due")
+        limit_s = _LEAST_LIMIT_S + _PATIENCE * guessed_seconds([one], 1)
+        return cls(one.person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s)
 
     def record(self, status: int, sentence: str, settled: bool, seconds: float = 0.0) -> Record:
         """How it ended; `settled` where the same input always ends so."""
@@ -151,7 +165,7 @@ def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Jo
 
     run = uuid4().hex  # what two runs on one cluster submit must not be taken for the same
     of_key = {f"kinertia-{run}-{k}": job for k, job in enumerate(jobs)}
-    futures = [client.submit(fit_person, job, key=key, pure=False) for key, job in of_key.items()]
+    futures = [client.submit(fit_person, replace(job, run=run), key=key, pure=False) for key, job in of_key.items()]
     for future in as_completed(futures):
         job = of_key[future.key]
         if future.status == "finished":

@@ -76,6 +76,11 @@ class Place:
         """The record of a person without results."""
         return self.cohort / "failed" / f"{self.person}.json"
 
+    @property
+    def log(self) -> Path:
+        """What Kinertia's developers need of a failure."""
+        return self.cohort / "failed" / f"{self.person}.log"
+
     def record(self, inputs: str) -> Record | None:
         """What an earlier run of this version said of these inputs; None where none did.
 
@@ -131,11 +136,11 @@ def prepare_folder(cohort: Path) -> None:
 
 def keep(cohort: Path, record: Record) -> None:
     """Note how the fit of a person ended who has no results; results bring their own record, and end the other."""
-    failure = Place(cohort, record.person).failure
+    place = Place(cohort, record.person)
     if not record.fitted:
-        write_then_rename(failure, record.text())
+        write_then_rename(place.failure, record.text())
         return
-    for path in (failure, failure.with_suffix(".log")):
+    for path in (place.failure, place.log):
         path.unlink(missing_ok=True)
 
 
