@@ -58,7 +58,8 @@ def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fit
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", with_tests()["PYTHONPATH"])
         with local_cluster(ClusterSize(1, 2 * 1024**3)) as client:
-            records = {record.person: record for record in run_jobs(client, fit_person_unless_hanging, jobs)}
+            ended = list(run_jobs(client, fit_person_unless_hanging, jobs))
+    records = {one.record.person: one.record for one in ended}
     assert records["Anna"].fitted
     lost = records[HANGING]
     assert (lost.status, lost.inputs) == (70, "")

@@ -54,7 +54,7 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     if session:
         check_plates(wanted)
     ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted))
-    if known == InstrumentsFiles():
+    if known.model_copy(update={"date": None}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
         return replace(

@@ -11,6 +11,7 @@ from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.provenance import VERSION, command_line, provenance_of
+from kinertia.io.recording_date import session_date
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.report.cohort_tables import write_person
 from kinertia.report.files import save_fit
@@ -64,7 +65,8 @@ def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
     command = command_line(["kinertia", "fit", str(job.subject), "-o", str(folder)])
     with complete_folder(folder, "cohort") as work:
         save_fit(fit, work, provenance_of(wanted, command))
-        write_person(work, job.person, fit)
+        with_session = wanted.instruments.session is not None
+        write_person(work, job.person, fit, session_date(wanted), with_session)
         (work / RECORD).write_text(record.text(), encoding="utf-8")
 
 

@@ -164,7 +164,7 @@ def inputs_of(wanted: SubjectFile) -> str:
 
     Where the files are and what they are called changes nothing, nor do comments.
     """
-    content = json.dumps(_contents(wanted.model_dump()), sort_keys=True)
+    content = json.dumps(_contents(wanted.model_dump()), sort_keys=True, default=str)  # a date
     return hashlib.sha256(content.encode()).hexdigest()
 
 
