@@ -12,7 +12,7 @@ import typer
 
 from kinertia.cli.json_lines import JsonLines
 from kinertia.cli.options import Force, Output, Quiet, results_folder
-from kinertia.cli.terminal import be_quiet, out, plain_table, show_warning, shown_progress
+from kinertia.cli.terminal import be_quiet, out, plain_table, shown_progress
 from kinertia.errors import SettingsError
 from kinertia.io.file_lock import sole_use
 from kinertia.io.slurm_file import SlurmFile, read_slurm
@@ -185,7 +185,7 @@ def _run_again(
         taught = [person for person in people if person.name in there]
         second, notes = write_second_study(output, taught, lines.with_progress(shown))
     for note in notes:
-        show_warning(note)
+        out.print(f"note: {note}", soft_wrap=True)
         lines.say("note", sentence=note)
     return _run(second, output / LEARNT, where, csv, lines)
 

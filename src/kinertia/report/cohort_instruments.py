@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +37,9 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
         if len(rows):
             yield Part("Instruments over time", (_UNDATED,))
         return
-    panels = [_panel(str(unknown), of) for unknown, of in dated.groupby("unknown", sort=False)]
+    names = sorted(dated["instrument"].unique())
+    colours = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
+    panels = [_panel(str(unknown), colours, of) for unknown, of in dated.groupby("unknown", sort=False)]
     people, days = dated["person"].nunique(), dated["date"].nunique()
     without = rows["person"].nunique() - people
     said = f"{people} people on {days} day{'s' if days > 1 else ''}"
@@ -51,11 +53,11 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
     yield Part("Instruments over time", text, figure, caption)
 
 
-def _panel(unknown: str, rows: pd.DataFrame) -> Panel:
+def _panel(unknown: str, colours: Mapping[str, str], rows: pd.DataFrame) -> Panel:
     factor, shown = SHOWN_UNIT[str(rows["unit"].iloc[0])]
     traces = [
-        _line(str(instrument), _COLOURS[k % len(_COLOURS)], factor, of)
-        for k, (instrument, of) in enumerate(rows.groupby("instrument", sort=True))
+        _line(str(instrument), colours[str(instrument)], factor, of)
+        for instrument, of in rows.groupby("instrument", sort=True, observed=True)
     ]
     return Panel(f"{unknown} ({shown})", traces)
 

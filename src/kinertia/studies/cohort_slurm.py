@@ -52,5 +52,6 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
         ) as cluster,
         Client(cluster) as client,
     ):
-        cluster.scale(jobs=min(wanted.workers, people))
+        jobs = min(wanted.workers, people)
+        cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # another job for each that SLURM ends
         yield client
