@@ -103,5 +103,5 @@ def test_where_nothing_can_be_learnt_it_says_why(study, quick, tmp_path):
     shutil.rmtree(study / "B")
     outcome = run("cohort", study, "-o", tmp_path / "out", "--learn")
     assert outcome.status == 2
-    assert "nothing can be learnt from these people: no prior was learnt: 0 people" in outcome.err
+    assert "nothing can be learnt from these people: no prior was learnt: 1 people whose" in outcome.err
     assert (tmp_path / "out" / "cohort.parquet").is_file()

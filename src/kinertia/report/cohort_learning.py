@@ -17,7 +17,7 @@ from typing import Any
 
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.from_files import check_plates
-from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, information_of, learn
 from kinertia.estimation.session import person_instruments, session_instruments
 from kinertia.io.file_names import path_from
 from kinertia.io.output_folder import write_then_rename
@@ -89,7 +89,7 @@ def write_second_study(
     _teach_bodies(folder / "priors", [one for one in everybody if one.body is not None], notes, progress)
     _teach_instruments(folder / "sessions", everybody, notes)
     if not any(one.entries for one in everybody):
-        raise PriorError(f"nothing can be learnt from these people: {'; '.join(notes)}")
+        raise KinertiaError(f"nothing can be learnt from these people: {'; '.join(notes)}")
     return [_second(folder / "subjects", one) for one in everybody], notes
 
 
@@ -120,9 +120,13 @@ def _teach_bodies(
     """Write a prior for each part of the people, learnt from the others."""
     parts = [list(people[k::PARTS]) for k in range(min(PARTS, len(people)))]
     others = [_others(part, people) for part in parts]
+    if min(map(len, others), default=0) < FEWEST_PEOPLE:
+        found = f"{len(people)} people whose fits can teach"
+        notes.append(f"no prior was learnt: {found}; each one's takes at least {FEWEST_PEOPLE} others")
+        return
     bodies = [[one.body for one in of if one.body is not None] for of in others]
     try:
-        learnt = in_parallel(learn, bodies, None, partial(progress, "learning")) if parts else []
+        learnt = in_parallel(learn, bodies, None, partial(progress, "learning"))
     except PriorError as error:
         notes.append(f"no prior was learnt: {error}")
         return
