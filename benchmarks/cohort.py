@@ -140,10 +140,7 @@ def document(singles: list[float], runs: list[Run], workers: int) -> str:
     per_person_s = sum(singles) / len(singles)
     frames_h, people_h = DATA_SET_FRAMES * SECONDS_PER_FRAME / 3600.0, DATA_SET_PEOPLE * per_person_s / 3600.0
     total_h = ratio * (frames_h + people_h)
-    cores = [(count, total_h / count) for count in (1, workers, 64)]
-    listed = ", ".join(
-        f"{hours:.1f} h on {count} core{'s' if count > 1 else ''}" for count, hours in dict(cores).items()
-    )
+    listed = ", ".join(f"{total_h / cores:.1f} h on {cores} cores" for cores in sorted({2, workers, 64}))
     return f"""# Speed of cohorts
 
 {len(singles)} synthetic people, {WALK_S:g} s of gait each (markers and plates at 100 Hz), as files; {workers} processes
@@ -151,7 +148,8 @@ on {os.cpu_count()} cores. This page is written by `python benchmarks/cohort.py`
 
 {table(headings, rows)}
 
-- Single fits one after the other take {sum(singles):.0f} s, {per_person_s:.2f} s each, results included; divided by {workers}: {ideal_s:.0f} s. The cohort, tables and page included, takes {ratio:.2f} times that
+- Single fits one after the other take {sum(singles):.0f} s, {per_person_s:.2f} s each, results included; divided by
+  {workers}: {ideal_s:.0f} s. The cohort, tables and page included, takes {ratio:.2f} times that
   ({"within" if ratio <= ALLOWED else "more than"} {ALLOWED:g}).
 - From {fewer.people} to {all_of_them.people} people the most memory of all processes together goes from
   {fewer.most_mb:.0f} to {all_of_them.most_mb:.0f} MB.
