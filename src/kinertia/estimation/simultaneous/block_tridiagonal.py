@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dtrsm
+from scipy.linalg.blas import dgemm, dtrsm
 from scipy.linalg.lapack import dpotrf
 
 
@@ -45,10 +45,11 @@ class BlockBand:
 
     def forward(self, right: np.ndarray) -> np.ndarray:
         """Solve L x = right; right is (b, k, m)."""
-        result = np.empty_like(right)
-        for i in range(len(right)):
-            known = right[i] if i == 0 else right[i] - self.below[i - 1] @ result[i - 1]
-            result[i] = _solved(self.diagonal[i], known)
+        result = right.copy()
+        for i in range(len(result)):
+            if i:
+                _subtract_product(result[i], self.below[i - 1], result[i - 1])
+            _solve_in_place(self.diagonal[i], result[i])
         return result
 
     def backward(self, right: np.ndarray, after: np.ndarray | None = None) -> np.ndarray:
@@ -92,6 +93,16 @@ def _solved(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> n
     """L^-1 right, or L^-T right."""
     result: np.ndarray = dtrsm(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed)).T
     return result
+
+
+def _solve_in_place(lower: np.ndarray, right: np.ndarray) -> None:
+    """L^-1 right, in its place."""
+    dtrsm(1.0, lower.T, right.T, side=1, lower=0, overwrite_b=1)
+
+
+def _subtract_product(target: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
+    """Take left @ right off the target, in its place."""
+    dgemm(-1.0, right.T, left.T, beta=1.0, c=target.T, overwrite_c=1)
 
 
 def _times_inverse_transpose(lower: np.ndarray, left: np.ndarray) -> np.ndarray:
