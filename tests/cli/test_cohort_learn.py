@@ -91,8 +91,10 @@ def test_everybody_is_fitted_again_with_what_the_others_teach(study, quick, tmp_
     assert any("learnt from 5 people" in note for note in ready.notes)
     assert any("known from 2 people (B, C)" in note for note in ready.notes)
 
-    again = run("cohort", study, "-o", out, "--learn")
+    with mock.patch("kinertia.report.cohort_learning.read_saved", side_effect=AssertionError("nothing is new")):
+        again = run("cohort", study, "-o", out, "--learn")
     assert again.out.count("6 people: 0 to fit, 6 as before") == 2, again.out
+    assert "note: 1 people without a date" in again.out
     assert len((out / "resources.csv").read_text(encoding="utf-8").splitlines()) == 7
 
 

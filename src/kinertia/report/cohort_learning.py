@@ -9,6 +9,8 @@ person due again, as ever.
 from __future__ import annotations
 
 import datetime
+import hashlib
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,12 +19,13 @@ from typing import Any
 
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.from_files import check_plates
+from kinertia.estimation.input_checks import known
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, information_of, learn
 from kinertia.estimation.session import person_instruments, session_instruments
 from kinertia.io.file_names import path_from
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.population_file import population_text
-from kinertia.io.provenance import VERSION, recordings
+from kinertia.io.provenance import VERSION, recordings, sha256
 from kinertia.io.recording_date import session_date
 from kinertia.io.session_file import PersonInstruments, session_text
 from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
@@ -30,10 +33,11 @@ from kinertia.io.subject_text import subject_text
 from kinertia.io.toml_lines import read_toml
 from kinertia.report.saved_fit import read_saved
 from kinertia.studies.cohort_people import Person
-from kinertia.studies.cohort_record import Place
+from kinertia.studies.cohort_record import RECORD, Place
 from kinertia.studies.parallel import in_parallel
 
 FOLDER = "learnt"
+_DONE = "learnt.json"
 PARTS = 10
 """Of the people; each part's prior is learnt from the others."""
 _FILES = ("static", "osim", "markers", "forces", "loads", "session", "bsp", "population")
@@ -67,7 +71,7 @@ def write_second_study(
 
     Args:
         cohort: folder of the first fits; everything goes to a folder in it.
-        people: who has results there.
+        people: who has results there, and so a subject file.
         progress: called as the work goes on.
 
     Returns:
@@ -76,12 +80,16 @@ def write_second_study(
     Raises:
         KinertiaError: nothing can be learnt at all.
     """
+    folder = cohort / FOLDER
+    cause = _cause(cohort, people)
+    if (before := _learnt_before(folder, cause)) is not None:
+        return [Person(person.name, _subject_of(folder, person.name)) for person in people], before
     notes: list[str] = []
     everybody = []
     for k, person in enumerate(people):
         progress("reading results", k / len(people))
         everybody.append(_read(cohort, person, notes))
-    folder = cohort / FOLDER
+    (folder / _DONE).unlink(missing_ok=True)
     for name in ("priors", "sessions", "subjects"):
         (folder / name).mkdir(parents=True, exist_ok=True)
         for old in (folder / name).glob("*.toml"):
@@ -90,28 +98,52 @@ def write_second_study(
     _teach_instruments(folder / "sessions", everybody, notes)
     if not any(one.entries for one in everybody):
         raise KinertiaError(f"nothing can be learnt from these people: {'; '.join(notes)}")
-    return [_second(folder / "subjects", one) for one in everybody], notes
+    second = [_second(folder, one) for one in everybody]
+    write_then_rename(folder / _DONE, json.dumps({"kinertia": VERSION, "cause": cause, "notes": notes}) + "\n")
+    return second, notes
+
+
+def _cause(cohort: Path, people: Sequence[Person]) -> str:
+    """SHA-256 of all that the lesson is from: first fits by their records, subject files by place and text."""
+    parts = []
+    for person in people:
+        subject = known(person.subject)
+        record = sha256(Place(cohort, person.name).results / RECORD)
+        parts.append([person.name, str(subject.resolve()), sha256(subject), record])
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def _learnt_before(folder: Path, cause: str) -> list[str] | None:
+    """What an earlier run of this version noted of the same lesson; None where there was none."""
+    try:
+        done = json.loads((folder / _DONE).read_text(encoding="utf-8"))
+        return list(done["notes"]) if (done["kinertia"], done["cause"]) == (VERSION, cause) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _subject_of(folder: Path, name: str) -> Path:
+    return folder / "subjects" / f"{name}.toml"
 
 
 def _read(cohort: Path, person: Person, notes: list[str]) -> _Known:
-    if person.subject is None:
-        raise ValueError(f"{person.name} has no results")
-    wanted = read_subject(person.subject)
+    subject = known(person.subject)
+    wanted = read_subject(subject)
     fit = read_saved(Place(cohort, person.name).results).fit
-    known = _Known(person.name, person.subject, wanted, None, None)
+    of_person = _Known(person.name, subject, wanted, None, None)
     try:
         if wanted.prior.bsp is not None or wanted.prior.population is not None:
             raise PriorError(f"{person.name}: [prior] names a prior of its own")
-        known.body = information_of(fit)
+        of_person.body = information_of(fit)
     except KinertiaError as error:
         notes.append(f"not in the group's prior, nor fitted with it: {error}")
     try:
         if wanted.instruments.session is None and fit.posterior is not None:
             check_plates(wanted)
-            known.instruments = person_instruments(fit, recordings(wanted))
+            of_person.instruments = person_instruments(fit, recordings(wanted))
     except KinertiaError as error:
         notes.append(f"{person.name}: plates and clock are not shared: {error}")
-    return known
+    return of_person
 
 
 def _teach_bodies(
@@ -193,10 +225,9 @@ def _second(folder: Path, one: _Known) -> Person:
     tables["subject"] = {**tables["subject"], "name": one.wanted.subject.name}
     for table, entries in one.entries.items():
         tables[table] = {**tables.get(table, {}), **entries}
-    path = folder / f"{one.name}.toml"
-    write_then_rename(
-        path, subject_text(tables, f"{one.name}, with what the cohort teaches; by kinertia cohort --learn")
-    )
+    path = _subject_of(folder, one.name)
+    heading = f"{one.name}, with what the cohort teaches; written by kinertia cohort --learn"
+    write_then_rename(path, subject_text(tables, heading))
     return Person(one.name, path)
 
 
