@@ -32,6 +32,7 @@ from command_line import run
 from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.subject_file import SubjectFile
+from kinertia.studies.cohort_resources import LOG
 
 NAMES = ("Anna", "Ben")
 DISKS_KB = (200, 4000, 5600)
@@ -61,7 +62,9 @@ def ended(child: int) -> int:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    """All but the log, which tells of every run."""
+    kept = (path for path in folder.rglob("*") if path.is_file() and path.name != LOG)
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in kept}
 
 
 def made_once(study: Path) -> Callable[[SubjectFile], Fit]:
