@@ -131,6 +131,9 @@ def prepare_folder(cohort: Path) -> None:
     for folder in (cohort, cohort / "people", cohort / "failed"):
         folder.mkdir(parents=True, exist_ok=True)
         sweep(folder)
+    for log in (cohort / "failed").glob("*.log"):
+        if not log.with_suffix(".json").exists():  # of a person at work when the run was killed
+            log.unlink()
     write_then_rename(cohort / "cohort.json", json.dumps({"kinertia": VERSION, "results": "cohort"}) + "\n")
 
 
