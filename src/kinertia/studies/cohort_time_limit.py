@@ -31,7 +31,7 @@ def time_limit(seconds: float, log: Path, run: str) -> Iterator[None]:
         finally:
             faulthandler.cancel_dump_traceback_later()
             file.close()  # Windows removes no file that is open
-            log.unlink()
+            log.unlink(missing_ok=True)
 
 
 def was_ended(log: Path, run: str) -> bool:
