@@ -66,7 +66,7 @@ def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path):
     command += ["-o", str(out), "--slurm", str(tmp_path / "slurm.toml")]
     with slurm_here(tmp_path / "slurm") as found:
         found["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "env": found}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "env": found, "cwd": tmp_path}
         with subprocess.Popen(command, **pipes) as process:
             state = ""
             while "RUNNING" not in state and process.poll() is None:
@@ -76,3 +76,4 @@ def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path):
     assert process.returncode in (0, 1), printed
     assert pd.read_csv(out / "people.csv").status.tolist() == [process.returncode]
     assert (out / "people" / "Anna" / "report.html").is_file()
+    assert not list(tmp_path.glob("slurm-*.out"))

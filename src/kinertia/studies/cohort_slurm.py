@@ -13,6 +13,9 @@ from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
 from kinertia.studies.cohort_cluster import HOW, SCHEDULING
 
+_NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
+"""Otherwise SLURM leaves a file per job where the command was started."""
+
 
 @contextmanager
 def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
@@ -42,7 +45,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
             walltime=wanted.time,
             queue=wanted.partition,
             account=wanted.account,
-            job_extra_directives=list(wanted.directives),
+            job_extra_directives=[*wanted.directives, *([] if wanted.logs else _NO_LOGS)],
             job_script_prologue=list(wanted.before),
             interface=wanted.interface,
             log_directory=wanted.logs,
