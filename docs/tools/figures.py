@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from kinertia.model.skeleton import Pose
+from kinertia.report.measures_picture import measures_picture
 from kinertia.synthetic.walk import SyntheticTrial, centre_of_pressure, walk, walking_subject
 
 FOLDER = Path(__file__).resolve().parents[1] / "figures"
@@ -33,6 +34,7 @@ def main() -> None:
         figure = draw(trial)
         figure.savefig(FOLDER / f"{name}.svg", metadata={"Date": None}, bbox_inches="tight")
         plt.close(figure)
+    (FOLDER / "measures.svg").write_text(measures_picture(), encoding="utf-8", newline="\n")
 
 
 def frames(trial: SyntheticTrial) -> plt.Figure:

@@ -202,6 +202,9 @@ class Instruments(Table):
     clock_sd_ms: float | None = Field(
         default=None, gt=0.0, description="how far forces are late or early, from a synchronisation check, ms"
     )
+    gain_sd_percent: float | None = Field(
+        default=None, gt=0.0, le=20.0, description="how far vertical forces are off, from known weights, % of the force"
+    )
     same_plates: bool = Field(
         default=False, description="true: columns of the same name are the same plate in all force files (.mot, .sto)"
     )

@@ -40,6 +40,8 @@ def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes
         "posterior": None,
         "trials": (trial,),
         "file": None,
+        "expected": changes.get("literature", BODY),
+        "more_known": False,
     }
     return SimpleNamespace(**{**given, **changes})
 
@@ -153,6 +155,18 @@ def test_parameters_by_prior_deviations(away, expected):
     (verdict,) = [one for one in judged if "3 prior SDs from" in one.sentence]
     assert verdict.level == expected
     assert "mass of pelvis" in verdict.sentence or "com_x of thigh_r" in verdict.sentence
+
+
+def test_who_is_as_was_said_is_not_far_from_the_prior_for_being_unlike_the_literature():
+    measured = BodySegmentParameters.from_table(BODY.segments, BODY.table() + 0.05 * np.eye(2, 10))
+    posterior = SimpleNamespace(prior_sd=np.full((2, 10), 0.01))
+    (verdict,) = [
+        one
+        for one in verdicts(fit(estimate=measured, expected=measured, more_known=True, posterior=posterior))
+        if "3 prior SDs from" in one.sentence
+    ]
+    assert verdict.level == "pass"
+    assert "from the prior (" in verdict.sentence
 
 
 @pytest.mark.parametrize(("doubted", "expected"), [(1, "caution"), (2, "caution"), (3, "fail")])

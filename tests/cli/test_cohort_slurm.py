@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 
 import pandas as pd
 import pytest
@@ -68,9 +69,9 @@ def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path):
         found["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "env": found, "cwd": tmp_path}
         with subprocess.Popen(command, **pipes) as process:
-            state = ""
-            while "RUNNING" not in state and process.poll() is None:
-                state = subprocess.run(["squeue", "--noheader", "--format=%T"], **pipes).stdout
+            while not (out / "failed" / "Anna.log").exists():  # as long as somebody is at work
+                assert process.poll() is None
+                time.sleep(0.05)
             subprocess.run(["scancel", "1"], env=found, check=True)
             printed, _ = process.communicate(timeout=300)
     assert process.returncode in (0, 1), printed

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from kinertia.errors import PriorError
+from kinertia.estimation.estimate import named_by_source
 from kinertia.estimation.known_body import with_known_body
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.io.bsp_file import BspTable
 from kinertia.model.bsp import PARAMETERS
 from kinertia.settings import KnownSegment, PriorSettings
@@ -25,6 +27,15 @@ def ready():
 
 def informed(ready, settings=None, earlier=None, **segments):
     return with_known_body(ready, settings or PriorSettings(), earlier, segments)
+
+
+def test_warnings_name_the_prior_where_more_is_known(ready):
+    ready = replace(ready, uncertainty=GAIT27_UNCERTAINTY)
+    assert named_by_source(ready).source == "the literature"
+    known = informed(ready, thigh_r=KnownSegment(mass_kg="9 +- 0.3"))
+    assert named_by_source(known).source == "the prior"
+    alike = informed(ready, PriorSettings(sides_correlation=0.5))
+    assert named_by_source(alike).source == "the literature", "the mean is the same"
 
 
 def test_a_measured_mass_weighs_by_how_well_it_is_known(ready):

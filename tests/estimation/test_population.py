@@ -7,18 +7,21 @@ from kinertia.estimation.known_body import with_prosthesis
 from kinertia.estimation.population import UNKNOWN_SPREAD, population_prior
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.unlike import unlikeness
+from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.settings import Subject
-from kinertia.studies.populations import own_prior, run_person
+from kinertia.report.populations import rucksack_sentence
+from kinertia.settings import Instruments, Subject
+from kinertia.studies.populations import RucksackAccuracy, own_prior, run_person
+from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.populations import POPULATIONS
-from kinertia.synthetic.walk import walking_subject
+from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walk, walking_subject
 
 PRIOR = literature_prior(walking_subject().literature)
 SEGMENTS = PRIOR.mean.segments
 
 
 def subject(**values):
-    return Subject(name="A", sex="male", **{"mass_kg": 70.0, "height_m": 1.8, **values})
+    return Subject(**{"name": "A", "sex": "male", "mass_kg": 70.0, "height_m": 1.8, **values})
 
 
 def test_a_person_of_unknown_height_is_an_adult():
@@ -91,6 +94,42 @@ def test_a_prosthesis_leans_on_nobody():
     assert not prior.covariance[np.ix_(rows, others)].any()
     np.testing.assert_array_equal(prior.covariance[np.ix_(others, others)], PRIOR.covariance[np.ix_(others, others)])
     assert prior.sd[row, 0] == pytest.approx(0.4 * prior.mean.mass_kg[row])
+
+
+def test_unknown_deviations_are_those_of_the_one_group_whose_masses_are_known():
+    """Pavol's older people in the tables' deviations, with those of one person, after two tables."""
+    lengths = reference_lengths(HEIGHT_M, "male")
+    both = {f"{name}_{side}": length for name, length in lengths.items() for side in "rl"}
+    geometry = BodyGeometry((-0.1, 0.0, 0.0), (-0.05, -0.08, 0.0), both | {"torso": lengths["torso"]})
+    factors = []
+    for source in ("dumas", "deleva"):
+        away = []
+        for sex in ("male", "female"):
+            prior = literature_prior(literature_bsp(MASS_KG, HEIGHT_M, sex, geometry, source))
+            old = population_prior(prior, subject(population="elderly", sex=sex)).prior
+            limbs = [k for k, name in enumerate(prior.mean.segments) if name.endswith("_r")]
+            away.append(((old.mean.mass_kg - prior.mean.mass_kg) / prior.sd[:, 0])[limbs])
+        factors.append(np.sqrt(1.0 + np.mean(np.square(away))))
+    assert factors == pytest.approx([1.58, 1.33], abs=0.01)
+    assert pytest.approx(np.mean(factors), abs=0.05) == UNKNOWN_SPREAD
+
+
+def test_a_laboratorys_plates_are_as_good_as_it_states():
+    trial = walk(walking_subject(), 0.6, trapezoid=False)
+    carried = []
+    for percent in (None, 1e-6, 20.0):
+        faults = Faults("artefact", calibration=True, instruments=Instruments(gain_sd_percent=percent))
+        _, (recorded,) = measured([trial], faults, np.random.default_rng(5))
+        carried.append(recorded.trial.loads.force[:, :, 1].mean())
+    assert carried[1] == pytest.approx(trial.foot_loads[:, :, 1].mean(), rel=2e-3)
+    assert abs(carried[2] / carried[1] - 1.0) > 0.01
+
+
+def test_what_is_found_of_a_rucksack_is_told_of_either_laboratory():
+    found = [RucksackAccuracy(24, None, 0.8, 0.7, 0.96), RucksackAccuracy(24, 0.2, 0.5, 0.4, 0.95)]
+    text = rucksack_sentence(found)
+    assert "24 people. Nothing stated of the plates, one in twenty with a faulty gain: RMS error 0.80 kg" in text
+    assert "with gain_sd_percent = 0.2: RMS error 0.50 kg, stated deviation 0.40 kg, within the 95 % interval" in text
 
 
 @pytest.mark.parametrize("name", POPULATIONS)

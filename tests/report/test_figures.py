@@ -310,3 +310,13 @@ def test_events_of_the_demo_alternate(fit):
         kinds = [event.kind for event in gait_events(fit.trials[0].kinematics.trial) if event.side == side]
         assert kinds
         assert all(one != other for one, other in itertools.pairwise(kinds))
+
+
+def test_departures_are_from_the_prior_where_more_is_known_than_the_literature(fit):
+    told = replace(fit, posterior=replace(fit.posterior, prior_mean=fit.estimate))
+    assert not fit.more_known
+    assert told.more_known
+    np.testing.assert_array_equal(departures(told), np.zeros_like(departures(fit)))
+    assert "Change against the prior by the estimate" in change_figure(told).alt
+    of_before = replace(fit, posterior=replace(fit.posterior, prior_mean=None))
+    assert of_before.expected is fit.literature

@@ -89,7 +89,7 @@ def test_bars_hold(key):
 
     Where skin is of a kind that the estimate does not know, a joint's moments are covered a hair less.
     """
-    accuracy = run_accuracy({key: PROOF[key]}, {"walks": 6, "session": 8}.get(key, 12))[key]
+    accuracy = run_accuracy({key: PROOF[key]}, {"walks": 6, "session": 16}.get(key, 12))[key]
     for name in CLASSES:
         assert 0.92 < accuracy.classes[name].coverage < 0.98
         assert 0.85 < accuracy.classes[name].ratio < 1.15

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.checks.verdict import Level, Verdict, residual_verdicts, verdict_of_markers, worst_level
+from kinertia.checks.verdict import Level, Verdict, expected_source, residual_verdicts, verdict_of_markers, worst_level
 from kinertia.estimation.identifiability import INFORMED, MEASURED
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
@@ -87,12 +87,12 @@ def _with_convergence(fit: Fit, verdicts: Sequence[Verdict]) -> Level:
 
 
 def _segments(fit: Fit, name: str, columns: slice) -> Use:
-    """By what the data say about these parameters, and by how far they went from the literature."""
+    """By what the data say about these parameters, and by how far they went from the prior's mean."""
     impossible = impossible_segments(fit.estimate)
     if not fit.converged or impossible:
         why = _NOT_CONVERGED if not fit.converged else f"{len(impossible)} segments are physically impossible"
         return Use(name, "fail", why)
-    start = "the literature" if fit.file is None else "the model"
+    start = expected_source(fit).removesuffix("'s own values")
     if fit.posterior is None:
         return Use(name, "caution", "no error bars (two-level): nobody knows which of them the data show")
     estimated = fit.posterior.prior_sd[:, columns] > 0
@@ -110,8 +110,8 @@ def _segments(fit: Fit, name: str, columns: slice) -> Use:
 
 
 def _doubted(fit: Fit, columns: slice) -> list[str]:
-    """Segments with a parameter of this group far from where it started."""
+    """Segments with a parameter of this group far from the prior's mean."""
     assert fit.posterior is not None
     scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
-    away = np.abs(fit.estimate.table() - fit.literature.table()) / scale
+    away = np.abs(fit.estimate.table() - fit.expected.table()) / scale
     return [fit.estimate.segments[i] for i in np.flatnonzero((away[:, columns] > CONTRADICTION_SD).any(axis=1))]

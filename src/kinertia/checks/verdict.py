@@ -91,8 +91,8 @@ def _physics(bsp: BodySegmentParameters) -> Verdict:
 
 def _literature(fit: Fit) -> Verdict:
     """The estimate against what it was expected to be near: in prior SDs where there are any."""
-    change = fit.estimate.table() - fit.literature.table()
     if fit.posterior is None:
+        change = fit.estimate.table() - fit.literature.table()
         moved = np.linalg.norm(change[:, 1:4], axis=1)
         worst = int(np.argmax(moved))
         doubted, plain = [], True
@@ -100,6 +100,7 @@ def _literature(fit: Fit) -> Verdict:
         kind, limit = ("centre of mass", "centres of mass"), f"{CONTRADICTING_COM_M * 1e3:g} mm"
         farthest = f"{fit.estimate.segments[worst]}, {moved[worst] * 1e3:.0f} mm"
     else:
+        change = fit.estimate.table() - fit.expected.table()
         away = np.abs(change) / np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
         row, column = np.unravel_index(int(np.argmax(away)), away.shape)
         far = int((away > CONTRADICTION_SD).sum())
@@ -107,7 +108,7 @@ def _literature(fit: Fit) -> Verdict:
         plain = len(doubted) > MOST_DOUBTED_SEGMENTS or away[row, column] > PLAIN_CONTRADICTION_SD
         kind, limit = ("parameter", "parameters"), f"{CONTRADICTION_SD:g} prior SDs"
         farthest = f"{PARAMETERS[column]} of {fit.estimate.segments[row]}, {away[row, column]:.1f}"
-    source = "the literature" if fit.file is None else "the model's own values"
+    source = expected_source(fit)
     count = f"{far or 'no'} {kind[far > 1]} {'lie' if far > 1 else 'lies'}"
     said = f"{count} more than {limit} from {source} (farthest: {farthest})"
     if not far:
@@ -115,6 +116,13 @@ def _literature(fit: Fit) -> Verdict:
     if plain:
         return Verdict("fail", f"{said}: the data contradict the model")
     return Verdict("caution", f"{said}: take {' and '.join(doubted)} with care")
+
+
+def expected_source(fit: Fit) -> str:
+    """Where what the estimate was expected to be near is from."""
+    if fit.more_known:
+        return "the prior"
+    return "the literature" if fit.file is None else "the model's own values"
 
 
 def residual_verdicts(trial: TrialFit) -> list[Verdict]:

@@ -9,19 +9,30 @@ import typer
 
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
+from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject_draft import NO_FORCES, init_subject
+from kinertia.report.measures_picture import measures_picture
 
 
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder with the files of one person.")],
+    measures: Annotated[
+        bool, typer.Option("--measures", help="Write the sheet of girths and lengths to fill in, and no subject.toml.")
+    ] = False,
 ) -> None:
     """Write a first subject.toml from the files in a folder.
+
+    With --measures a sheet for girths and lengths of the person, measures.csv, and a picture of where to measure,
+    measures.svg. As many as you have time for are of use.
 
     [bold]Example[/]
 
     kinertia init data/subject01
     """
+    if measures:
+        _measures(folder)
+        return
     path = folder / "subject.toml"
     if path.exists():
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
@@ -31,3 +42,18 @@ def init(
         if line.startswith(NO_FORCES):
             out.print(line.removeprefix("# "), soft_wrap=True)
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
+
+
+def _measures(folder: Path) -> None:
+    sheet, picture = folder / "measures.csv", folder / "measures.svg"
+    if not folder.is_dir():
+        raise FileError(folder, "is no folder; give that of the person's files")
+    if sheet.exists():
+        raise FileError(sheet, "exists already and is left alone; remove it to write a new one")
+    write_then_rename(picture, measures_picture())
+    write_then_rename(sheet, measures_sheet())
+    out.print(
+        f"wrote {sheet}: fill in the column cm for what you measure, where {picture} shows; then name it in the "
+        'subject file, under [prior]: measures = "measures.csv"',
+        soft_wrap=True,
+    )

@@ -185,16 +185,16 @@ def populations(
     """
     results_folder(output, force)
     with shown_progress() as progress:
-        accuracies, rucksack = run_populations(people, seed, workers, lambda share: progress("people", share))
-    save_populations(accuracies, rucksack, seed, output)
+        accuracies, rucksacks = run_populations(people, seed, workers, lambda share: progress("people", share))
+    save_populations(accuracies, rucksacks, seed, output)
     if as_json:
-        print_json(populations_summary(accuracies, rucksack, seed))
+        print_json(populations_summary(accuracies, rucksacks, seed))
         return
     shown = plain_table(*POPULATION_HEADINGS)
     for row in population_rows(accuracies):
         shown.add_row(*row)
     out.print(shown)
-    out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksack)}")
+    out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksacks)}")
     out.print(f"\nresults in {output}: populations.html, populations.json, populations.md", soft_wrap=True)
 
 

@@ -15,6 +15,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
+from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
 from kinertia.estimation.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
 from kinertia.model.anatomy import segment_of
@@ -179,10 +180,17 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
     return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
 
 
+def named_by_source(ready: Prepared) -> ModelUncertainty:
+    """The uncertainty with the source of what the estimate leans on: the prior, where more is known than the start."""
+    expected = ready.uncertainty.whole(ready.prior.mean).table()
+    known = not np.array_equal(expected, ready.literature.table())
+    return replace(ready.uncertainty, source="the prior") if known else ready.uncertainty
+
+
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
     bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, ready.uncertainty)
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, named_by_source(ready))
     result = fitted.result
     parts = (fitted.skeletons, fitted.motions, fitted.foot_loads, result.reactions, result.moment_sd, ready.kinematics)
     estimates = [

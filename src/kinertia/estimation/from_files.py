@@ -16,12 +16,14 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.session import with_instruments
 from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.measures_file import BodyMeasures, read_measures
 from kinertia.io.population_file import read_population
 from kinertia.io.provenance import recordings
 from kinertia.io.recording import read_recording
 from kinertia.io.session_file import read_session
 from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
 from kinertia.model.marker_set import MarkerSet
+from kinertia.model.stadium_body import expect_yeadon
 from kinertia.trial.data import Recording
 
 
@@ -53,7 +55,8 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     session = () if known.session is None else read_session(known.session)
     if session:
         check_plates(wanted)
-    ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted))
+    measures = _measures(wanted)
+    ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted, measures))
     if known.model_copy(update={"date": None}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
@@ -63,14 +66,22 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     return with_instruments(ready, known, session, recordings(wanted))
 
 
-def _with_known_body(ready: Prepared, wanted: SubjectFile) -> Prepared:
+def _measures(wanted: SubjectFile) -> BodyMeasures | None:
+    """The sheet of girths and lengths, read before anything is computed."""
+    if wanted.prior.measures is None:
+        return None
+    expect_yeadon()
+    return read_measures(wanted.prior.measures)
+
+
+def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasures | None) -> Prepared:
     if wanted.prior == PriorFiles() and not wanted.segments:
         return ready
     if wanted.settings.method == "two-level":
         return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
     group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
-    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group)
+    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group, measures)
 
 
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:

@@ -14,11 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.errors import PriorError
+from kinertia.estimation.body_measures import with_measures
+from kinertia.estimation.gaussian_update import updated
+from kinertia.estimation.input_checks import known as known_value
 from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior, with_symmetry
 from kinertia.io.bsp_file import BspTable
+from kinertia.io.measures_file import BodyMeasures
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.measures import measures as all_measures
 from kinertia.settings import KnownSegment, PriorSettings
 
 _UNLIKE_SD = 3.0
@@ -35,6 +40,7 @@ def with_known_body(
     earlier: BspTable | None,
     segments: Mapping[str, KnownSegment],
     group: LearntPrior | None = None,
+    measures: BodyMeasures | None = None,
 ) -> Prepared:
     """A prepared person of whom more is known than mass, height and sex.
 
@@ -44,9 +50,11 @@ def with_known_body(
         earlier: an estimate with deviations, in place of the literature's.
         segments: measured parameters by segment.
         group: what was learnt of the person's group, in place of the literature's.
+        measures: girths and lengths of the person.
 
     Raises:
-        PriorError: both an earlier estimate and a group, a segment that the model has not, or either of another model.
+        PriorError: both an earlier estimate and a group, a segment that the model has not, either of another model, or
+            measures that cannot be used.
     """
     prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
     if group is not None:
@@ -63,6 +71,8 @@ def with_known_body(
     for name in (name for name, known in segments.items() if known.prosthesis):
         prior = with_prosthesis(prior, name)
         notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
+    if measures is not None:
+        prior = _with_measures(ready, prior, segments, measures, notes, warnings)
     measured = _measured(prior, segments)
     for (row, column), (value, sd) in measured.items():
         k = 10 * row + column
@@ -82,6 +92,34 @@ def with_known_body(
         measured = {**kept, **measured}
         notes.append("prior: the masses are kept")
     return replace(ready, prior=_given(prior, measured), notes=tuple(notes), warnings=tuple(warnings))
+
+
+def _with_measures(
+    ready: Prepared,
+    prior: BspPrior,
+    segments: Mapping[str, KnownSegment],
+    measures: BodyMeasures,
+    notes: list[str],
+    warnings: list[str],
+) -> BspPrior:
+    """The prior that girths and lengths have moved; adds to notes and warnings."""
+    if ready.file is not None:
+        raise PriorError("[prior] measures are of the built-in model's segments, which OpenSim models cut elsewhere")
+    body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
+    artificial = [name for name, known in segments.items() if known.prosthesis]
+    prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial)
+    total = f"{body.total_kg:.1f} +- {body.total_sd_kg:.1f} kg"
+    notes.append(
+        f"girths and lengths: {len(measures.values)} of {len(all_measures())} from {measures.name}, the others as "
+        f"expected of this mass, height and them; Yeadon's body of these has {total}, the person {body_kg:.1f} kg"
+    )
+    warnings += [f"{measures.name}: {doubt}" for doubt in body.doubts]
+    if abs(body.total_kg - body_kg) > _UNLIKE_SD * body.total_sd_kg:
+        warnings.append(
+            f"{measures.name}: Yeadon's body of these girths and lengths has {total}, the person {body_kg:.1f} kg; are "
+            "all of them in cm, and of this person?"
+        )
+    return prior
 
 
 def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
@@ -140,10 +178,9 @@ def _given(prior: BspPrior, measured: Mapping[tuple[int, int], tuple[float, floa
     """The prior once these parameters were measured."""
     if not measured:
         return prior
-    at = np.array([10 * row + column for row, column in measured])
+    at = [10 * row + column for row, column in measured]
     values, sd = np.array(list(measured.values())).T
-    table, covariance = prior.mean.table().ravel(), prior.covariance
-    gain = np.linalg.solve(covariance[np.ix_(at, at)] + np.diag(np.square(sd)), covariance[at]).T
-    left = covariance - gain @ covariance[at]
-    mean = BodySegmentParameters.from_table(prior.mean.segments, table + gain @ (values - table[at]))
-    return replace(prior, mean=mean, covariance=0.5 * (left + left.T))
+    seen = np.eye(prior.mean.table().size)[at]
+    table, covariance = updated(prior.mean.table().ravel(), prior.covariance, seen, values, np.diag(np.square(sd)))
+    mean = BodySegmentParameters.from_table(prior.mean.segments, table)
+    return replace(prior, mean=mean, covariance=covariance)

@@ -2,7 +2,8 @@
 
 The tables are of young adults of ordinary build (de Leva's men were 24 years old, body-mass index 24). Where numbers
 for others are known they go in, with their source; where they are not, nothing is invented: deviations are half as
-large again, as if a group's mean were as far from the tables as people are from one another, and somewhat more.
+large again. That is what one group shows whose numbers are known: together with the spread of people, the masses that
+Pavol found in the elderly are 1.58 times the tables' deviations from Dumas' values, and 1.33 times from de Leva's.
 
 - elderly: segment masses by Pavol, Owings and Grabiner (2002, J Biomech 35:707), whose table could be read in one
   transcription only; trunk and head together keep the tables' split between pelvis and torso, since trunks are cut in

@@ -109,9 +109,7 @@ class Prepared:
 
 
 @one_blas_thread
-def calibrate(
-    model: Gait27, trials: Sequence[Trial], subject: Subject, attached: Sequence[Attached] = ()
-) -> tuple[Skeleton, list[str]]:
+def calibrate(model: Gait27, trials: Sequence[Trial], carried: CarriedMass) -> tuple[Skeleton, list[str]]:
     """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials, and notes.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
@@ -119,7 +117,7 @@ def calibrate(
     """
     for trial in trials:
         check_visible(model.skeleton, trial)
-    check_force_masses(model.skeleton, CarriedMass.of(known(subject.mass_kg), attached), trials)
+    check_force_masses(model.skeleton, carried, trials)
     check_same_person(model.skeleton, trials)
     poses = first_poses(model.skeleton, trials)
     skeleton, _ = hold_uninformed(model.skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
@@ -173,14 +171,17 @@ def prepare(
         trial, doubts = _looked_at(item, static, marker_set)
         warnings += doubts
         turned.append(_turned(trial, marker_set))
-    model = build_gait27(static, marker_set, known(subject.height_m), known(subject.sex), settings.hip_centre)
+    height_m, sex = known(subject.height_m), known(subject.sex)
+    model = build_gait27(static, marker_set, height_m, sex, settings.hip_centre)
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [(with_upright_trunk(model.skeleton, trial), angle) for trial, angle in turned]
     trials = [trial for trial, _ in turned]
-    skeleton, notes = calibrate(model, trials, subject, attached)
+    carried = CarriedMass.of(known(subject.mass_kg), attached)
+    skeleton, notes = calibrate(model, trials, carried)
     warnings += unseen_body(skeleton)
-    body_kg = CarriedMass.of(known(subject.mass_kg), attached).body_kg
-    literature = literature_bsp(body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp)
+    literature = literature_bsp(
+        carried.body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
+    )
     expected = population_prior(literature_prior(literature), subject)
     calibration_s = (time.perf_counter() - started) / len(inputs)
 

@@ -250,6 +250,17 @@ class Fit:
         return pd.DataFrame(spatiotemporal_columns(self.trials))
 
     @property
+    def expected(self) -> BodySegmentParameters:
+        """What the estimate leant on: the prior's mean, which is the literature or the model unless more was known."""
+        stated = None if self.posterior is None else self.posterior.prior_mean
+        return self.literature if stated is None else stated
+
+    @property
+    def more_known(self) -> bool:
+        """Whether the prior's mean is another than the literature's or the model's."""
+        return not np.array_equal(self.expected.table(), self.literature.table())
+
+    @property
     def mass_kg(self) -> float:
         """Body mass as stated."""
         return known(self.subject.mass_kg)

@@ -34,7 +34,8 @@ class Provenance:
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     """The command with the hashes of all files that the subject file names."""
-    model, others = wanted.model, (wanted.instruments.session, wanted.prior.bsp, wanted.prior.population)
+    model, prior = wanted.model, wanted.prior
+    others = (wanted.instruments.session, prior.bsp, prior.population, prior.measures)
     paths = [path for path in (model.static, model.osim, model.markers, *others) if isinstance(path, Path)]
     for trial in wanted.trials:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]

@@ -171,6 +171,9 @@ class PriorFiles(PriorSettings):
     population: File | None = Field(
         default=None, description="what kinertia population learnt of the person's group, in place of the literature's"
     )
+    measures: File | None = Field(
+        default=None, description="girths and lengths of the person: the sheet of kinertia init --measures, filled in"
+    )
 
 
 class SubjectFile(Table):

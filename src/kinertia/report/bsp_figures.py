@@ -13,10 +13,10 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, base_layout, plain, small_multiples
-from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in, start_of
+from kinertia.report.wording import INTERVAL_SD, decimals, expected_of, fixed, read_in
 
 DEPARTURE_SD = 2.0
-"""Estimates further from where they started than this many prior SDs are pointed out."""
+"""Estimates further from the prior's mean than this many prior SDs are pointed out."""
 NAMES = (
     "mass",
     "CoM forward",
@@ -42,10 +42,10 @@ def segment_name(segment: str) -> str:
 
 
 def departures(fit: Fit) -> np.ndarray | None:
-    """(s, 10) estimate minus start in prior SDs, 0 where held; None after two-level, which has none."""
+    """(s, 10) estimate minus the prior's mean in prior SDs, 0 where held; None after two-level, which has none."""
     if fit.posterior is None:
         return None
-    result: np.ndarray | None = (fit.estimate.table() - fit.literature.table()) / _scale(fit.posterior)
+    result: np.ndarray | None = (fit.estimate.table() - fit.expected.table()) / _scale(fit.posterior)
     return result
 
 
@@ -67,7 +67,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
     With 95 % intervals of prior and estimate, where there are any (not after two-level). Segments that are held are
     left out. `truth`: of a synthetic person, as diamonds.
     """
-    posterior, start = fit.posterior, start_of(fit)
+    posterior, start = fit.posterior, expected_of(fit)
     shown, rows = _rows(fit)
     panels = []
     for k in columns:
@@ -75,7 +75,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
         scale = np.full(len(shown), 1 / factor)
         traces = _traces(fit, shown, k, scale)
         if truth is not None:
-            away = (truth.table() - fit.literature.table())[shown, k]
+            away = (truth.table() - fit.expected.table())[shown, k]
             texts = [f"{plain(segment_name(fit.estimate.segments[i]))}: truth" for i in shown]
             look = {"symbol": "diamond-open", "size": 10, "color": style.BLACK, "line": {"width": 1.5}}
             traces.append(_dots(away / scale, np.arange(len(shown)), texts) | {"marker": look, "name": "truth"})
@@ -87,7 +87,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
 
 def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
     """The same in prior SDs, so that feet can be read beside the trunk; None after two-level, which has none."""
-    away, posterior, start = departures(fit), fit.posterior, start_of(fit)
+    away, posterior, start = departures(fit), fit.posterior, expected_of(fit)
     if away is None or posterior is None:
         return None
     shown, rows = _rows(fit)
@@ -115,8 +115,8 @@ def _rows(fit: Fit) -> tuple[np.ndarray, dict[str, Any]]:
 
 def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict[str, Any]]:
     """Change of parameter k in units of `scale` per segment; what was held is left out."""
-    posterior, start = fit.posterior, start_of(fit)
-    before, after = fit.literature.table()[shown, k], fit.estimate.table()[shown, k]
+    posterior, start = fit.posterior, expected_of(fit)
+    before, after = fit.expected.table()[shown, k], fit.estimate.table()[shown, k]
     away, place = (after - before) / scale, np.arange(len(shown))
     names = [plain(segment_name(fit.estimate.segments[i])) for i in shown]
     if posterior is None:

@@ -40,7 +40,7 @@ FOLDER = "learnt"
 _DONE = "learnt.json"
 PARTS = 10
 """Of the people; each part's prior is learnt from the others."""
-_FILES = ("static", "osim", "markers", "forces", "loads", "session", "bsp", "population")
+_FILES = ("static", "osim", "markers", "forces", "loads", "session", "bsp", "population", "measures")
 """Keys of a subject file that name files."""
 
 

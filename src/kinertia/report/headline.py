@@ -17,7 +17,7 @@ from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
-from kinertia.report.wording import decimals, fixed, read_in, start_of
+from kinertia.report.wording import decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.rms import rms
 
 _LISTED_FAR = 12
@@ -39,7 +39,7 @@ class Words:
         judgements: `kinertia.checks.verdict.verdicts`.
         motion: how far the motion was changed.
         knowledge: what the data could and could not tell about the body segment parameters.
-        departures: estimates more than two prior SDs from what they started from.
+        departures: estimates more than two prior SDs from the prior's mean.
     """
 
     level: Level
@@ -147,7 +147,7 @@ def _departures(fit: Fit) -> tuple[str, ...]:
     if away is None or fit.posterior is None:
         return ()
     scale = fit.posterior.prior_sd
-    before, after, start = fit.literature.table(), fit.estimate.table(), start_of(fit)
+    before, after, start = fit.expected.table(), fit.estimate.table(), expected_of(fit)
     far = [(int(i), int(k)) for i, k in np.argwhere(np.abs(away) > DEPARTURE_SD)]
     far.sort(key=lambda place: -abs(away[place]))
     sentences = []

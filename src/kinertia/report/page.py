@@ -46,7 +46,7 @@ from kinertia.report.time_figures import (
     residual_figure,
 )
 from kinertia.report.truth import Truth, truth_rows
-from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, fixed, read_in, start_of
+from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.data import runs
 from kinertia.trial.rms import rms_length
 
@@ -80,6 +80,7 @@ def render(
         fit=fit,
         words=words(fit),
         start=start_of(fit),
+        expected=expected_of(fit),
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         asymmetry=asymmetry_sentences(fit),

@@ -37,27 +37,37 @@ def population_rows(accuracies: Sequence[PopulationAccuracy]) -> list[list[str]]
     return rows
 
 
-def rucksack_sentence(rucksack: RucksackAccuracy) -> str:
+def rucksack_sentence(rucksacks: Sequence[RucksackAccuracy]) -> str:
     """What is found of a rucksack that was declared with unknown mass."""
+    found = [
+        f"{_gain(one)}: RMS error {one.rms_kg:.2f} kg, stated deviation {one.sd_kg:.2f} kg, within the 95 % interval "
+        f"in {100 * one.coverage:.0f} %"
+        for one in rucksacks
+    ]
     return (
-        f"A rucksack of {RUCKSACK_KG:g} kg, declared with unknown mass, {rucksack.people} people: RMS error "
-        f"{rucksack.rms_kg:.2f} kg, stated deviation {rucksack.sd_kg:.2f} kg; within the 95 % interval in "
-        f"{100 * rucksack.coverage:.0f} %."
+        f"A rucksack of {RUCKSACK_KG:g} kg, declared with unknown mass, {rucksacks[0].people} people. "
+        f"{'; '.join(found)}."
     )
+
+
+def _gain(rucksack: RucksackAccuracy) -> str:
+    if rucksack.gain_sd_percent is None:
+        return "Nothing stated of the plates, one in twenty with a faulty gain"
+    return f"with gain_sd_percent = {rucksack.gain_sd_percent:g}"
 
 
 def _both(after: float, before: float, form: str) -> str:
     return f"{after:{form}} / {before:{form}}"
 
 
-def populations_markdown(accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy) -> str:
+def populations_markdown(accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy]) -> str:
     """The table, its caption, and the sentence of the rucksack."""
     lines = [HEADINGS, ("---",) * 2 + ("--:",) * (len(HEADINGS) - 2), *population_rows(accuracies)]
     table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-    return f"{table}\n\n{accuracies[0].people} people each. {CAPTION}\n\n{rucksack_sentence(rucksack)}\n"
+    return f"{table}\n\n{accuracies[0].people} people each. {CAPTION}\n\n{rucksack_sentence(rucksacks)}\n"
 
 
-def render_populations(accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy) -> str:
+def render_populations(accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy]) -> str:
     """The page."""
     figure = dot_figure(
         [f"{one.title}, {one.prior}" for one in accuracies],
@@ -75,29 +85,29 @@ def render_populations(accuracies: Sequence[PopulationAccuracy], rucksack: Rucks
     )
     parts = [
         Part("Errors against the truth", (CAPTION,), figure, headings=HEADINGS, rows=population_rows(accuracies)),
-        Part("A rucksack", (rucksack_sentence(rucksack),)),
+        Part("A rucksack", (rucksack_sentence(rucksacks),)),
     ]
     return render_parts("What does a wrong prior cost?", f"{accuracies[0].people} people of each population.", parts)
 
 
 def populations_summary(
-    accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy, seed: int
+    accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy], seed: int
 ) -> dict[str, Any]:
     """What `populations.json` says."""
     return {
         "kinertia": VERSION,
         "seed": seed,
         "populations": [asdict(one) for one in accuracies],
-        "rucksack": asdict(rucksack),
+        "rucksack": [asdict(one) for one in rucksacks],
     }
 
 
 def save_populations(
-    accuracies: Sequence[PopulationAccuracy], rucksack: RucksackAccuracy, seed: int, folder: str | Path
+    accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy], seed: int, folder: str | Path
 ) -> None:
     """Write `populations.html`, `populations.json` and `populations.md` into a folder."""
     with complete_folder(folder, "study populations") as work:
-        text = json.dumps(populations_summary(accuracies, rucksack, seed), indent=2)
+        text = json.dumps(populations_summary(accuracies, rucksacks, seed), indent=2)
         (work / "populations.json").write_text(text + "\n", encoding="utf-8")
-        (work / "populations.md").write_text(populations_markdown(accuracies, rucksack), encoding="utf-8")
-        (work / "populations.html").write_text(render_populations(accuracies, rucksack), encoding="utf-8")
+        (work / "populations.md").write_text(populations_markdown(accuracies, rucksacks), encoding="utf-8")
+        (work / "populations.html").write_text(render_populations(accuracies, rucksacks), encoding="utf-8")

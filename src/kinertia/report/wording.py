@@ -35,11 +35,17 @@ class Start:
 
 LITERATURE = Start("literature", "the literature", "the literature's", "literature values")
 MODEL = Start("model", "the model", "the model's", "the model's own values")
+PRIOR = Start("prior", "the prior", "the prior's", "prior values")
 
 
 def start_of(fit: Fit) -> Start:
     """An OpenSim model brings its own parameters, the built-in one has the literature's."""
     return LITERATURE if fit.file is None else MODEL
+
+
+def expected_of(fit: Fit) -> Start:
+    """What the prior's mean is called: where more is known of a person than the start, the prior."""
+    return PRIOR if fit.more_known else start_of(fit)
 
 
 def read_in(k: int) -> tuple[str, float]:

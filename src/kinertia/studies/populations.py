@@ -21,6 +21,8 @@ from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import calibration_prior
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.estimation.simultaneous.unlike import unlikeness
@@ -28,7 +30,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.kinematics import Kinematics
-from kinertia.settings import Attached, Subject
+from kinertia.settings import Attached, Instruments, Subject
 from kinertia.studies.accuracy import WALK_S
 from kinertia.studies.joint_accuracy import WITHIN
 from kinertia.studies.parallel import in_parallel
@@ -42,6 +44,8 @@ COLUMNS = {"mass": slice(0, 1), "CoM": slice(1, 4), "inertia": slice(4, 7)}
 """Of `BodySegmentParameters.table`; products of inertia are in none."""
 RUCKSACK = Attached(name="rucksack", segment="torso", mass_kg=None, com_mm=(-200.0, 300.0, 0.0), on_scale=False)
 RUCKSACK_KG = 10.0
+GAIN_SD_PERCENT = 0.2
+"""What a laboratory states that has put known weights on its plates: what the literature says of sound ones."""
 _PARTS = 4
 """Of a group; the prior of each part is learnt from the others."""
 
@@ -100,11 +104,13 @@ class RucksackAccuracy:
 
     Attributes:
         people: how many carried one.
+        gain_sd_percent: what the laboratory states of its plates, and is true of them; None: nothing.
         rms_kg, sd_kg: RMS error of its mass, and RMS of what the estimate says of it.
         coverage: share of people in which the mass is within its 95 % interval.
     """
 
     people: int
+    gain_sd_percent: float | None
     rms_kg: float
     sd_kg: float
     coverage: float
@@ -112,8 +118,10 @@ class RucksackAccuracy:
 
 def run_populations(
     people: int = 20, seed: int = 1, workers: int | None = None, progress: Callable[[float], None] = lambda share: None
-) -> tuple[list[PopulationAccuracy], RucksackAccuracy]:
-    """Every population with the adults' prior and with its own, and people with a rucksack."""
+) -> tuple[list[PopulationAccuracy], list[RucksackAccuracy]]:
+    """Every population with the adults' prior and with its own, and people with a rucksack on plates of whose gain the
+    laboratory states nothing, and something.
+    """
     cases = [(name, number) for name in (*POPULATIONS, RUCKSACK.name) for number in range(people)]
     drawn = in_parallel(partial(run_person, seed), cases, workers, progress)
     rows = []
@@ -122,29 +130,38 @@ def run_populations(
         adults, own = (list(each) for each in both)
         outcomes = {"adults'": adults, "own": own, "learnt from others": _with_learnt_prior(adults)}
         rows += [_summarised(population.title, prior, each) for prior, each in outcomes.items() if each]
-    carried = [one[0] for one in drawn[len(POPULATIONS) * people :]]
-    error, sd = (np.array([getattr(one, name)[-1, 0] for one in carried]) for name in ("errors", "sd"))
-    return rows, RucksackAccuracy(people, rms(error), rms(sd), float(np.mean(np.abs(error) < WITHIN * sd)))
+    carried = zip(*drawn[len(POPULATIONS) * people :], strict=True)
+    return rows, [_of_rucksack(gain, each) for gain, each in zip((None, GAIN_SD_PERCENT), carried, strict=True)]
+
+
+def _of_rucksack(gain_sd_percent: float | None, people: Sequence[PersonOutcome]) -> RucksackAccuracy:
+    error, sd = (np.array([getattr(one, name)[-1, 0] for one in people]) for name in ("errors", "sd"))
+    within = float(np.mean(np.abs(error) < WITHIN * sd))
+    return RucksackAccuracy(len(people), gain_sd_percent, rms(error), rms(sd), within)
 
 
 def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
-    """One person: with the adults' prior and with the own one; of the rucksack with the own one only."""
+    """One person: with the adults' prior and with the own one; with a rucksack: the two laboratories."""
     name, number = case
-    of_person, of_noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2))
-    subject = walking_subject()
+    of_person, of_noise = np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2)
+    subject, rng = walking_subject(), np.random.default_rng(of_person)
     adults = literature_prior(subject.literature)
     if name == RUCKSACK.name:
         skeleton, own = with_attached_prior(subject.skeleton, adults, [RUCKSACK], MASS_KG)
-        true = own.draw(of_person).table()
+        true = own.draw(rng).table()
         true[-1, 0] = RUCKSACK_KG
         person = replace(subject, skeleton=skeleton, bsp=BodySegmentParameters.from_table(own.mean.segments, true))
-        priors: Sequence[BspPrior] = (own,)
+        cases = [(own, Instruments()), (own, Instruments(gain_sd_percent=GAIN_SD_PERCENT))]
     else:
-        person = replace(subject, bsp=POPULATIONS[name].of(adults).draw(of_person))
-        priors = (adults, own_prior(name, adults))
+        person = replace(subject, bsp=POPULATIONS[name].of(adults).draw(rng))
+        cases = [(prior, Instruments()) for prior in (adults, own_prior(name, adults))]
     trial = walk(person, WALK_S, trapezoid=False)
-    laboratory = measured([trial], LABORATORY, of_noise)
-    return tuple(_outcome(trial, *laboratory, prior, adults) for prior in priors)
+    outcomes = []
+    for prior, instruments in cases:
+        laboratory = replace(LABORATORY, instruments=instruments)
+        recorded = measured([trial], laboratory, np.random.default_rng(of_noise))
+        outcomes.append(_outcome(trial, *recorded, prior, adults, instruments))
+    return tuple(outcomes)
 
 
 def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
@@ -185,13 +202,19 @@ def own_prior(name: str, adults: BspPrior) -> BspPrior:
 
 
 def _outcome(
-    trial: SyntheticTrial, skeleton: Skeleton, recorded: Sequence[Kinematics], prior: BspPrior, adults: BspPrior
+    trial: SyntheticTrial,
+    skeleton: Skeleton,
+    recorded: Sequence[Kinematics],
+    prior: BspPrior,
+    adults: BspPrior,
+    instruments: Instruments,
 ) -> PersonOutcome:
     bandwidth = Bandwidth.of(recorded)
     seen: Observations = observe(skeleton, recorded, prior.mass_kg, bandwidth)
-    result: SimultaneousResult = estimate_simultaneous(
-        skeleton, prior, calibration_prior(skeleton), seen.together, bandwidth.spacing_s
+    calibration = calibration_prior(
+        skeleton, replace(GAIT27_UNCERTAINTY, instruments=InstrumentPrior.stated(instruments))
     )
+    result: SimultaneousResult = estimate_simultaneous(skeleton, prior, calibration, seen.together, bandwidth.spacing_s)
     information = None
     if np.array_equal(prior.mean.table(), adults.mean.table()):
         information = person_information("", adults, prior, result.bsp, result.bsp_covariance)

@@ -7,19 +7,20 @@ skeleton. Only the latter three come out, as `Kinematics`; the estimator gets no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M
 from kinertia.estimation.simultaneous.plates import plate_middles, turned_loads
 from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
+from kinertia.settings import Instruments
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
 from kinertia.synthetic.skin_clusters import ClusterMotion
 from kinertia.synthetic.walk import SyntheticTrial
@@ -42,6 +43,7 @@ class Faults:
             the variance are the first and one third the second.
         amplitude: factor on that noise, but for the cameras'.
         calibration: joint centres, markers, plates and clock are off by errors drawn from the estimator's own prior.
+        instruments: what the laboratory states of plates and clock, which is then true of those errors.
         axes_rad: the axes of knees, ankles and elbows are tilted by this much, each in its own direction.
         hips_m: both hip centres are this far forward.
         wobbling: share of the thighs' mass that wobbles on springs.
@@ -53,6 +55,7 @@ class Faults:
     noise: Literal["study", "artefact", "clusters", "mixed"]
     amplitude: float = 1.0
     calibration: bool = False
+    instruments: Instruments = field(default_factory=Instruments)
     axes_rad: float = 0.0
     hips_m: float = 0.0
     wobbling: float = 0.0
@@ -73,7 +76,7 @@ def measured(
     instruments = _Instruments.with_faults(faults)
     if faults.calibration:
         skeleton = _misplaced(skeleton, rng)
-        instruments = _Instruments.draw(rng)
+        instruments = _Instruments.draw(rng, InstrumentPrior.stated(faults.instruments))
     if faults.hips_m:
         skeleton = skeleton.lock({name: faults.hips_m for name in HIP_OFFSETS if "_x_" in name})
     if faults.axes_rad:
@@ -138,13 +141,13 @@ class _Instruments:
     turn_rad: float = 0.0
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> _Instruments:
-        """From the prior of `fit_simultaneous`."""
-        plates = np.array([[prior.draw(rng) for prior in PLATE_PRIOR.values()] for _ in range(2)])
-        x, z = (FLOOR_PRIOR[name].draw(rng) for name in "xz")
+    def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> _Instruments:
+        """From a prior of `fit_simultaneous`."""
+        plates = np.array([[each.draw(rng) for each in prior.plate.values()] for _ in range(2)])
+        x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
-        late_s = CLOCK_PRIOR_S.draw(rng)
-        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], FLOOR_PRIOR["turn"].draw(rng))
+        late_s = prior.clock_s.draw(rng)
+        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], prior.floor["turn"].draw(rng))
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:

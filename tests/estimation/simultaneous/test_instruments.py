@@ -55,6 +55,9 @@ def test_what_the_laboratory_states_replaces_the_literature():
     stated = InstrumentPrior.stated(Instruments(plate_sd_mm=2.0, clock_sd_ms=1.0))
     assert (stated.plate["x"].sd, stated.plate["z"].faulty_share, stated.clock_s.sd) == (0.002, 0.0, 0.001)
     assert stated.plate["gain"] == PRIOR.plate["gain"]
+    gain = InstrumentPrior.stated(Instruments(gain_sd_percent=0.2))
+    assert (gain.plate["gain"].sd, gain.plate["gain"].faulty_share) == (0.002, 0.0)
+    assert (gain.plate["x"], gain.clock_s) == (PRIOR.plate["x"], PRIOR.clock_s)
     assert np.hypot(stated.plate["x"].sd, stated.floor["x"].sd) == pytest.approx(0.002, rel=0.01)
     assert (
         InstrumentPrior.stated(Instruments()) == replace(PRIOR) or InstrumentPrior.stated(Instruments()).session == ()

@@ -33,7 +33,7 @@ TRUNK_PLACE_SD_M = 0.08
 _VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
 _DISPLACED_M = 0.03
 CONTRADICTION_SD = 3.0
-"""A parameter this many prior SDs from the literature contradicts the model."""
+"""A parameter this many prior SDs from the prior's mean contradicts the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +48,7 @@ class Posterior:
         iterations: Gauss-Newton steps.
         base: which combinations of parameters these motions show, and which none ever shows.
         instruments: what these trials say of plates and clock.
+        prior_mean: of the body segment parameters; None in files of before, where it was not written.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -62,6 +63,7 @@ class Posterior:
     iterations: int
     base: BaseParameters
     instruments: InstrumentInformation
+    prior_mean: BodySegmentParameters | None = None
 
     @property
     def information(self) -> np.ndarray:
@@ -136,6 +138,7 @@ def fit_simultaneous(
             result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in together]
         ),
         result.instruments,
+        uncertainty.whole(prior.mean),
     )
     return SimultaneousFit(
         result,

@@ -135,6 +135,9 @@ class InstrumentPrior:
                 plate={**result.plate, **dict.fromkeys(_PLACE, place)},
                 floor={**result.floor, **dict.fromkeys(_PLACE, none)},
             )
+        if instruments.gain_sd_percent is not None:
+            gain = SoundOrFaulty.certain(instruments.gain_sd_percent / 100.0)
+            result = replace(result, plate={**result.plate, "gain": gain})
         if instruments.clock_sd_ms is not None:
             result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
         return result

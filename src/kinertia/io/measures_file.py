@@ -1,0 +1,77 @@
+"""The sheet of girths and lengths: `kinertia init --measures` writes it, the laboratory fills it in, a fit reads it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from kinertia.errors import FileError
+from kinertia.io.csv_file import read_csv
+from kinertia.model.measures import Measure, measures
+
+COLUMNS = ("measure", "level", "what", "cm", "sd_cm", "first")
+_LONGEST_CM, _SHORTEST_CM = 250.0, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMeasures:
+    """What was measured of a person.
+
+    Attributes:
+        name: of the file.
+        values: value and deviation (m) by name of the measure.
+    """
+
+    name: str
+    values: Mapping[str, tuple[float, float]]
+
+
+def measures_sheet() -> str:
+    """The empty sheet: one row for each measure, those first that say most for the time that they take."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for one in sorted(measures(), key=lambda one: not one.first):
+        table.writerow([one.name, one.level, one.what, "", f"{100 * one.sd_m:g}", "yes" if one.first else ""])
+    return text.getvalue()
+
+
+def read_measures(path: Path) -> BodyMeasures:
+    """Read a sheet. Rows without a value were not measured; a deviation that was taken out is the sheet's own.
+
+    Raises:
+        FileError: no such file, an unknown measure or one twice, no value at all, or one that cannot be; with the line.
+    """
+    known = {one.name: one for one in measures()}
+    values: dict[str, tuple[float, float]] = {}
+    for row in read_csv(path, ("measure", "cm"), "the sheet of kinertia init --measures"):
+        name = row.cells["measure"]
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else "; kinertia init --measures writes a sheet with all"
+            raise FileError(path, f"unknown measure '{name}'{hint}", row.line)
+        if not row.cells["cm"]:
+            continue
+        if name in values:
+            raise FileError(path, f"{name} stands there twice", row.line)
+        values[name] = (
+            _length_m(path, row.line, known[name], row.number("cm")),
+            (row.number("sd_cm") / 100.0 if row.cells.get("sd_cm") else known[name].sd_m),
+        )
+        if not values[name][1] > 0.0:
+            raise FileError(path, f"the sd of {name} must be positive", row.line)
+    if not values:
+        raise FileError(path, "no value in the column cm; fill in what was measured, or leave measures out of [prior]")
+    return BodyMeasures(path.name, values)
+
+
+def _length_m(path: Path, line: int, measure: Measure, value_cm: float) -> float:
+    if _SHORTEST_CM <= value_cm <= _LONGEST_CM:
+        return value_cm / 100.0
+    unit = "m" if value_cm < _SHORTEST_CM else "mm"
+    problem = f"{measure.name} is {value_cm:g} cm; expected {_SHORTEST_CM:g} to {_LONGEST_CM:g} cm; was it in {unit}?"
+    raise FileError(path, problem, line)

@@ -1,0 +1,97 @@
+"""The measurements of a person that Yeadon's body is built from: what they are called, and five people's.
+
+Yeadon (1990, J Biomech 23:67) builds the body from 95 of them, 58 where the two sides are taken as alike: 21 of trunk
+and head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is where one measures; the picture that
+`kinertia init --measures` draws shows it.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from kinertia.model.bsp import FloatArray
+
+_PEOPLE = "yeadon_people.csv"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measurement.
+
+    Attributes:
+        name: as in the sheet.
+        key: as in the package `yeadon`, of limbs on the left.
+        level: where, as in the picture.
+        kind: "length", "girth", "width" or "depth".
+        sd_m: how far a careful measurement may be off: set here, about twice what trained people repeat (1 % of a
+            girth is the usual target of courses in anthropometry), and more where a joint centre must be guessed.
+        first: whether it is one of those that say most for the time that they take.
+        what: in words.
+    """
+
+    name: str
+    key: str
+    level: str
+    kind: str
+    sd_m: float
+    first: bool
+    what: str
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Its names in the package, of limbs on both sides."""
+        other = {"a": "b", "j": "k"}.get(self.key[1])
+        return (self.key,) if other is None else (self.key, f"L{other}{self.key[2:]}")
+
+
+@dataclass(frozen=True, eq=False)
+class SamplePeople:
+    """The five people that come with the package `yeadon` (four men, a woman).
+
+    Attributes:
+        names: of the people.
+        measures_m: (5, 58) in the order of `measures`, the mean of both sides.
+        mass_kg: weighed, NaN of those who were not.
+    """
+
+    names: tuple[str, ...]
+    measures_m: FloatArray
+    mass_kg: FloatArray
+
+
+@cache
+def measures() -> tuple[Measure, ...]:
+    """All of them, from the hips up, then an arm and a leg downwards."""
+    return tuple(
+        Measure(row["name"], row["key"], row["level"], row["kind"], float(row["sd_mm"]) / 1e3, bool(row["first"]), text)
+        for row in _rows("measures.csv")
+        for text in [row["what"]]
+    )
+
+
+@cache
+def girths_with_widths() -> tuple[tuple[int, int], ...]:
+    """Places in `measures` of each girth and of the width or depth of the same cross-section."""
+    places = {measure.key: k for k, measure in enumerate(measures())}
+    pairs = [(key, f"{key[:-1]}{other}") for key in places if key.endswith("p") for other in "wd"]
+    return tuple((places[girth], places[width]) for girth, width in pairs if width in places)
+
+
+@cache
+def sample_people() -> SamplePeople:
+    """Their measurements."""
+    rows = {row.pop("key"): row for row in _rows(_PEOPLE)}
+    names = tuple(rows["mass"])
+    both = [[np.mean([float(rows[key][name]) for key in one.keys]) for one in measures()] for name in names]
+    mass = np.array([float(rows["mass"][name] or "nan") for name in names])
+    return SamplePeople(names, np.array(both) / 100.0, mass)
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with files("kinertia.model").joinpath("data", name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))

@@ -1,0 +1,168 @@
+"""The body as a stack of stadium solids (Yeadon 1990, J Biomech 23:67): masses, centres and inertias from measurements.
+
+The package `yeadon` makes the solids; here they become the segments of the built-in model. A solid stands between two
+levels at which girth and width were measured. How they map:
+
+- upper arm: shoulder to elbow joint centre (A0 to A2); forearm: elbow to finger nails (A2 to A7), the hand with it;
+- thigh: hip to knee joint centre (L0 to L3); shank: to the ankle (L3 to L5). All are cut across the limb's axis, which
+  is the segment's y axis; a centre of mass is on it, for Yeadon's limbs are round;
+- foot: L5 to L9. Yeadon's points its toes; turned about the ankle so that its axis is the foot's x axis and the instep
+  is up;
+- pelvis: the trunk from the level of the hip joint centres (T0) to that of the lumbar joint, whose height the static
+  trial gives: the solid that it is in is cut there, between cross-sections that change linearly from level to level;
+- torso: all above, with neck and head.
+
+Axes of the package are x to the left, y backwards, z up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from kinertia.errors import PriorError
+from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
+from kinertia.model.measures import measures
+
+KINDS = ("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "upper_arm_r", "forearm_r")
+"""Segments of a body whose sides are alike."""
+DENSITY_KG_M3 = MappingProxyType(
+    {
+        "head": 1110.0,
+        "shoulders": 1040.0,
+        "thorax": 920.0,
+        "abdomen": 1010.0,
+        "upper_arm": 1070.0,
+        "forearm": 1130.0,
+        "hand": 1160.0,
+        "thigh": 1050.0,
+        "shank": 1090.0,
+        "foot": 1100.0,
+    }
+)
+"""Dempster's, which the package takes unless told otherwise."""
+_TRUNK = ("abdomen", "abdomen", "thorax", "thorax", "shoulders", "head", "head", "head")
+_FOREARM = ("forearm", "forearm", "hand", "hand", "hand")
+_UPRIGHT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+_POINTED = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""The package's axes in those of a segment, and of the foot."""
+
+
+def expect_yeadon() -> None:
+    """Raise a PriorError that says how to install the package, unless it is there."""
+    if find_spec("yeadon") is None:
+        raise PriorError(
+            "girths and lengths need the package yeadon, which is not installed; install it: "
+            "pip install 'kinertia[measures]'"
+        )
+
+
+def stadium_bsp(
+    measures_m: FloatArray, lumbar_m: float, density_kg_m3: Mapping[str, float] = DENSITY_KG_M3
+) -> BodySegmentParameters:
+    """The segments `KINDS` of a person with these measurements.
+
+    The pelvis counts from the middle of the hip joint centres, upright; all others from where the model has them.
+    Centres of mass are on the segment's axis: girths say nothing of how far in front of it they are.
+
+    Args:
+        measures_m: (58,) in the order of `measures`.
+        lumbar_m: height of the lumbar joint above the hip joint centres.
+        density_kg_m3: of each part.
+
+    Raises:
+        PriorError: the package is missing, a level is not beyond the one before, or the lumbar joint is not in the
+            trunk below the nipples.
+    """
+    person = _person(tuple(measures_m.tolist()))
+    for solid in (solid for segment in person.segments for solid in segment.solids):
+        if not solid.height > 0.0:
+            level = solid.label.partition(": ")[2]
+            raise PriorError(f"the level after '{level}' is {-1e3 * solid.height:.0f} mm before it; check the lengths")
+    pelvis, torso = _cut_at(
+        _dense([*person.P.solids, *person.T.solids, *person.C.solids], _TRUNK, density_kg_m3), lumbar_m
+    )
+    leg = _dense(person.J2.solids, ("shank",) * 2 + ("foot",) * 4, density_kg_m3)
+    stacks = {
+        "pelvis": _upwards(pelvis),
+        "torso": _upwards(torso),
+        "thigh_r": _downwards(_dense(person.J1.solids, ("thigh",) * 3, density_kg_m3)),
+        "shank_r": _downwards(leg[:2]),
+        "foot_r": _downwards(leg[2:]),
+        "upper_arm_r": _downwards(_dense(person.A1.solids, ("upper_arm",) * 2, density_kg_m3)),
+        "forearm_r": _downwards(_dense(person.A2.solids, _FOREARM, density_kg_m3)),
+    }
+    mass, com, inertia = (np.array(each) for each in zip(*(stacks[kind] for kind in KINDS), strict=True))
+    axes = np.array([_POINTED if kind == "foot_r" else _UPRIGHT for kind in KINDS])
+    return BodySegmentParameters(
+        KINDS, mass, np.einsum("sij,sj->si", axes, com), axes @ inertia @ axes.transpose(0, 2, 1)
+    )
+
+
+@lru_cache(maxsize=1)
+def _person(measures_m: tuple[float, ...]) -> Any:
+    """The package's person, both sides alike; what it prints of cross-sections that cannot be is for us to say."""
+    expect_yeadon()
+    from yeadon import Human
+
+    both = {key: value for one, value in zip(measures(), measures_m, strict=True) for key in one.keys}
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return Human(both)
+
+
+def _dense(solids: Sequence[Any], parts: Sequence[str], density_kg_m3: Mapping[str, float]) -> list[tuple[Any, float]]:
+    """Each solid with its density: the package's own may have been changed, for they belong to all of its people."""
+    return [(solid, density_kg_m3[part]) for solid, part in zip(solids, parts, strict=True)]
+
+
+def _cut_at(trunk: Sequence[tuple[Any, float]], height_m: float) -> tuple[list[Any], list[Any]]:
+    """The solids below and above a height."""
+    from yeadon.solid import Stadium, StadiumSolid
+
+    bottom = 0.0
+    for k, (solid, density) in enumerate(trunk[:3]):
+        if bottom < height_m < bottom + solid.height:
+            share = (height_m - bottom) / solid.height
+            lower, upper = solid.stads
+            thickness, radius = (
+                (1.0 - share) * getattr(lower, name) + share * getattr(upper, name) for name in ("thickness", "radius")
+            )
+            middle = Stadium("Ls1: umbilicus", "thicknessradius", thickness, radius)
+            parts = (lower, middle, height_m - bottom), (middle, upper, bottom + solid.height - height_m)
+            below, above = ((StadiumSolid(solid.label, density, *part), density) for part in parts)
+            return [*trunk[:k], below], [above, *trunk[k + 1 :]]
+        bottom += solid.height
+        if height_m == bottom:
+            return list(trunk[: k + 1]), list(trunk[k + 1 :])
+    raise PriorError(
+        f"the lumbar joint is {1e3 * height_m:.0f} mm above the hip joint centres, the nipples {1e3 * bottom:.0f} mm "
+        "by the measures; check the heights of the trunk and the pelvis markers"
+    )
+
+
+def _upwards(stack: Sequence[tuple[Any, float]]) -> tuple[float, np.ndarray, np.ndarray]:
+    heights = [solid.height for solid, _ in stack]
+    return _joined(stack, np.cumsum([0.0, *heights[:-1]]))
+
+
+def _downwards(stack: Sequence[tuple[Any, float]]) -> tuple[float, np.ndarray, np.ndarray]:
+    return _joined(stack, -np.cumsum([solid.height for solid, _ in stack]))
+
+
+def _joined(stack: Sequence[tuple[Any, float]], bottoms_m: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """One body of solids whose lower ends are at these heights."""
+    factors = np.array([density / solid.density for solid, density in stack])
+    mass = factors * [solid.mass for solid, _ in stack]
+    com = np.zeros((len(stack), 3))
+    com[:, 2] = bottoms_m + [float(solid.rel_center_of_mass[2, 0]) for solid, _ in stack]
+    inertia = factors[:, None, None] * np.array([solid.rel_inertia for solid, _ in stack])
+    return combine(mass, com, inertia)

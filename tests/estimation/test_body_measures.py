@@ -1,0 +1,167 @@
+"""What girths and lengths make of the prior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.errors import PriorError
+from kinertia.estimation import body_measures
+from kinertia.estimation.body_measures import expected_measures, measured_body, with_measures
+from kinertia.estimation.from_files import prepare_subject
+from kinertia.estimation.prior import literature_prior
+from kinertia.io.measures_file import measures_sheet
+from kinertia.model.measures import measures, sample_people
+from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
+
+pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
+WALKER = walking_subject()
+PRIOR = literature_prior(WALKER.literature)
+NAMES = [one.name for one in measures()]
+MAN = sample_people().names.index("male3")
+MAN_KG, MAN_M = 80.1, 1.78
+
+
+def stated(chosen=lambda one: True, factor=1.0):
+    """The sheet of one of the five people."""
+    values = sample_people().measures_m[MAN]
+    return {one.name: (factor * value, one.sd_m) for one, value in zip(measures(), values, strict=True) if chosen(one)}
+
+
+def test_more_measurements_say_more():
+    few, many = (
+        measured_body(stated(which), {"leg_knee_length": 0.42}, 0.08, MAN_KG, MAN_M)
+        for which in (lambda one: one.first, lambda one: True)
+    )
+    sd = [np.sqrt(np.diag(body.covariance)) / np.abs(body.values.ravel()) for body in (few, many)]
+    assert np.all(sd[1] <= 1.02 * sd[0])
+    assert np.median(sd[1]) < 0.8 * np.median(sd[0])
+    assert not many.doubts
+    assert many.total_kg == pytest.approx(80.1, abs=0.5), "what the package says of him"
+    assert few.total_kg == pytest.approx(80.1, abs=2.0 * few.total_sd_kg)
+
+
+@pytest.mark.slow
+def test_people_are_expected_from_the_four_others_within_the_deviations(monkeypatch):
+    """Lengths and girths that were not measured, by those that were, of somebody who is not among the people."""
+    people, away = sample_people(), []
+    parts = [NAMES.index(name) for name in ("trunk_acromion_length", "head_crown_length", "leg_ankle_length")]
+    try:
+        for k, person in enumerate(people.measures_m):
+            rest = replace(
+                people,
+                names=people.names[:k] + people.names[k + 1 :],
+                measures_m=np.delete(people.measures_m, k, axis=0),
+                mass_kg=np.delete(people.mass_kg, k),
+            )
+            monkeypatch.setattr(body_measures, "sample_people", lambda rest=rest: rest)
+            body_measures._sample_shape.cache_clear()
+            own = body_measures._told(person, 0.08)
+            lengths = {name: person[NAMES.index(name)] for name in ("leg_knee_length", "leg_ankle_length")}
+            made = {one.name: (person[j], one.sd_m) for j, one in enumerate(measures()) if one.first}
+            height_m = person[parts].sum() / 0.961
+            body = measured_body(made, lengths, 0.08, body_measures._total_kg(own[:, 0]), height_m)
+            away.append((body.values - own).ravel() / np.sqrt(np.diag(body.covariance)))
+    finally:
+        body_measures._sample_shape.cache_clear()
+    assert np.mean(np.abs(away) < 1.96) > 0.95
+    assert np.mean(np.square(away)) < 1.0, "densities and cuts are the same here"
+
+
+def test_slopes_are_those_of_one_measure_at_a_time():
+    man = sample_people().measures_m[MAN]
+    values = body_measures._told(man, 0.08)
+    slopes = body_measures._slopes(man, 0.08, values)
+    for k in (*range(0, len(man), 7), NAMES.index("trunk_hip_girth")):
+        moved = man * np.exp(1e-4 * np.eye(len(man))[k])
+        alone = (body_measures._told(moved, 0.08) - values).ravel() / 1e-4
+        np.testing.assert_allclose(slopes[:, k], alone, atol=1e-9)
+
+
+def test_covariances_are_covariances():
+    mean, covariance = expected_measures(MAN_KG, MAN_M)
+    assert np.linalg.eigvalsh(covariance)[0] > 0.0
+    assert np.all(np.abs(np.exp(mean) / sample_people().measures_m[MAN] - 1.0) < 0.6)
+    body = measured_body({}, {"leg_knee_length": 0.42}, 0.08, MAN_KG, MAN_M)
+    assert np.linalg.eigvalsh(body.covariance)[0] > 0.0
+
+
+def test_the_prior_moves_towards_the_measured_body_and_keeps_what_girths_do_not_say():
+    expected, _ = expected_measures(MASS_KG, HEIGHT_M)
+    thick = {
+        name: (np.exp(expected[NAMES.index(name)]) * 1.08, 0.003)
+        for name in NAMES
+        if name.startswith("leg_") and "girth" in name
+    }
+    (prior, body), (plain, _) = (with_measures(PRIOR, WALKER.skeleton, each, MASS_KG, HEIGHT_M) for each in (thick, {}))
+    names = PRIOR.mean.segments
+    thigh, left = names.index("thigh_r"), names.index("thigh_l")
+    assert prior.mean.mass_kg[thigh] > plain.mean.mass_kg[thigh] + 0.2 * PRIOR.sd[thigh, 0]
+    assert prior.mean.inertia_kgm2[thigh, 1, 1] > 1.1 * plain.mean.inertia_kgm2[thigh, 1, 1], "girth squared, twice"
+    assert prior.sd[thigh, 0] < PRIOR.sd[thigh, 0]
+    np.testing.assert_array_equal(prior.mean.com_m[:, 2], PRIOR.mean.com_m[:, 2])
+    apart = np.zeros(len(PRIOR.covariance))
+    apart[10 * thigh], apart[10 * left] = 1.0, -1.0
+    before = apart @ PRIOR.covariance @ apart
+    assert apart @ prior.covariance @ apart == pytest.approx(before, rel=1e-6), "the mean of both sides says nothing"
+    assert prior.mean.physically_consistent().all()
+    assert body.total_kg == pytest.approx(MASS_KG, rel=0.2)
+
+
+def test_a_usual_person_stays_near_the_tables():
+    """Cuts and densities of tables and stadiums differ; that must not pass for knowledge of the person."""
+    expected, _ = expected_measures(MASS_KG, HEIGHT_M)
+    usual = {one.name: (value, one.sd_m) for one, value in zip(measures(), np.exp(expected), strict=True)}
+    prior, _ = with_measures(PRIOR, WALKER.skeleton, usual, MASS_KG, HEIGHT_M)
+    moved = (prior.mean.table() - PRIOR.mean.table()) / PRIOR.sd
+    assert np.abs(moved).max() < 2.0
+    assert np.sqrt(np.mean(np.square(moved[:, [0, 2, 4, 5, 6]]))) < 1.0
+    trunk = [PRIOR.mean.segments.index(name) for name in ("pelvis", "torso")]
+    whole = np.zeros(len(PRIOR.covariance))
+    whole[[10 * row for row in trunk]] = 1.0
+    assert whole @ prior.covariance @ whole < 0.9 * (whole @ PRIOR.covariance @ whole)
+
+
+def test_of_a_prosthesis_nothing_was_measured():
+    artificial = ("shank_l", "foot_l")
+    lone = replace(PRIOR, covariance=PRIOR.covariance * np.kron(np.eye(12), np.ones((10, 10))))
+    alone, _ = with_measures(lone, WALKER.skeleton, stated(), MASS_KG, HEIGHT_M, artificial)
+    rows = [PRIOR.mean.segments.index(name) for name in artificial]
+    np.testing.assert_allclose(alone.mean.table()[rows], PRIOR.mean.table()[rows], rtol=1e-12)
+
+
+def test_slips_are_named():
+    wrong = {**stated(), "leg_mid_girth": (0.25, 0.007), "trunk_rib_width": (0.45, 0.01)}
+    doubts = measured_body(wrong, {}, 0.08, MAN_KG, MAN_M).doubts
+    assert doubts[0].startswith("trunk_rib_width is 45 cm; mass, height and the other measures lead to expect about 28")
+    assert doubts[1].startswith("leg_mid_girth is 25 cm; mass, height and the other measures lead to expect about 5")
+    assert doubts[2].startswith("trunk_rib_girth is 1.88 times trunk_rib_width")
+
+
+def test_slips_are_the_likeliest_cause_of_a_body_that_cannot_be():
+    wrong = {name: stated()[name] for name in ("leg_mid_girth", "trunk_hip_girth")} | {"leg_calf_girth": (0.038, 0.005)}
+    with pytest.raises(PriorError, match=r"no body has these girths and lengths: .*leg_calf_girth is 3\.8 cm"):
+        measured_body(wrong, {}, 0.08, MAN_KG, MAN_M)
+
+
+def test_another_model_is_refused():
+    prior = literature_prior(replace(WALKER.literature, segments=tuple(f"body{k}" for k in range(12))))
+    with pytest.raises(PriorError, match="built-in model's segments; this model has no pelvis"):
+        with_measures(prior, WALKER.skeleton, stated(), MASS_KG, HEIGHT_M)
+
+
+def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(measured_walk, tmp_path):
+    text = (measured_walk / "subject.toml").read_text(encoding="utf-8")
+    for name in ("static.c3d", "walk.c3d"):
+        text = text.replace(f'"{name}"', f'"{(measured_walk / name).as_posix()}"')
+    sheet = measures_sheet().replace("between crotch and knee,,0.7", "between crotch and knee,60,0.7")
+    sheet = sheet.replace("the calf where it is largest,,0.5", "the calf where it is largest,15,0.5")
+    assert ",60,0.7," in sheet
+    (tmp_path / "measures.csv").write_text(sheet, encoding="utf-8")
+    path = tmp_path / "subject.toml"
+    path.write_text(f'{text}\n[prior]\nmeasures = "measures.csv"\n', encoding="utf-8")
+    ready = prepare_subject(path)
+    thigh = ready.prior.mean.segments.index("thigh_r")
+    assert ready.prior.mean.mass_kg[thigh] > ready.literature.mass_kg[thigh]
+    assert any("girths and lengths: 2 of 58 from measures.csv" in note for note in ready.notes)
+    assert any("leg_calf_girth is 15 cm" in warning for warning in ready.warnings)
