@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import random
 import shutil
 import subprocess
 import sys
@@ -12,11 +13,12 @@ import pandas as pd
 import psutil
 import pytest
 
+from cohort_faults import write_study
 from command_line import PROGRAM, run
 from kinertia.cli.cohort import _LOCK
+from kinertia.estimation.from_files import fit_subject
 from kinertia.io.file_lock import sole_use
-from kinertia.synthetic.laboratory import LabNoise, record, write_lab
-from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.report.files import save_fit
 
 
 @pytest.fixture
@@ -93,9 +95,7 @@ def test_bad_input_is_one_line(tmp_path, monkeypatch):
 @pytest.fixture
 def study(tmp_path):
     """Two people who can be fitted, and one without forces."""
-    subject = walking_subject()
-    for k, name in enumerate(("Anna", "Ben")):
-        write_lab(tmp_path / "study" / name, record(subject, walk(subject, 1.6), LabNoise(), np.random.default_rng(k)))
+    write_study(tmp_path / "study", ("Anna", "Ben"))
     shutil.copytree(tmp_path / "study" / "Anna", tmp_path / "study" / "Clara")
     path = tmp_path / "study" / "Clara" / "subject.toml"
     path.write_text(path.read_text(encoding="utf-8").replace('forces = "walk_grf.mot"', ""), encoding="utf-8")
@@ -109,7 +109,7 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while process.stderr.readline().strip() != "people":
             assert process.poll() is None
-        time.sleep(1.0)
+        time.sleep(random.Random(21).uniform(0.5, 2.0))
         children = psutil.Process(process.pid).children(recursive=True)
         workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
         assert workers
@@ -129,6 +129,11 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
         for column in ("literature", "estimate", "sd", "information"):
             np.testing.assert_array_equal(rows[column], own[column])
     assert not (out / "people" / "Clara").exists()
+    (tmp_path / "calm").mkdir()
+    save_fit(fit_subject(study / "Anna" / "subject.toml"), tmp_path / "calm", None)
+    calm, found = hashes(tmp_path / "calm"), hashes(out / "people" / "Anna")
+    with_seconds_and_command = {"fit.json", "fit.npz", "report.html", ".kinertia.json"}
+    assert {name for name in calm if calm[name] != found[name]} <= with_seconds_and_command
     before = hashes(out)
     again = run("cohort", study, "-o", out)
     assert again.status == 1

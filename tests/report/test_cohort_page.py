@@ -3,14 +3,14 @@
 import re
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from kinertia.io.provenance import VERSION
+from kinertia.report.cohort_instruments import drift
 from kinertia.report.cohort_page import PAGE, write_cohort_page
 from kinertia.report.cohort_tables import write_person, write_tables
 from kinertia.studies.cohort_record import Place, Record
-
-pytestmark = pytest.mark.slow
 
 
 def record(name, status=0, sentence=""):
@@ -34,6 +34,7 @@ def cohort(fit, tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_page_says_who_passed_and_who_is_far(cohort):
     write_cohort_page(cohort)
     page = (cohort / PAGE).read_text(encoding="utf-8")
@@ -47,7 +48,35 @@ def test_the_page_says_who_passed_and_who_is_far(cohort):
     assert "knee moment (N m/kg)" in page
 
 
+@pytest.mark.slow
 def test_a_cohort_of_whom_nobody_was_fitted_has_a_page(tmp_path):
     write_tables(tmp_path, [record("lost", 2, "no force plates")], with_csv=False)
     write_cohort_page(tmp_path)
     assert "1 people; 0 passed" in (tmp_path / PAGE).read_text(encoding="utf-8")
+
+
+def instrument(person, day, value, sd, prior_sd=0.01, with_session=False):
+    of = {"instrument": "plate 1", "unknown": "gain", "unit": "1", "with_session": with_session}
+    return {"person": person, "date": day, "value": value, "sd": sd, "prior_sd": prior_sd, **of}
+
+
+def test_a_day_is_what_its_people_say_together_with_one_prior():
+    """Two people of one Gaussian world: the exact posterior, not the mean of two that each lean on the prior."""
+    prior_sd, seen, noise = 0.01, (0.02, 0.03), 0.005
+    alone = 1.0 / noise**2 + 1.0 / prior_sd**2
+    rows = [instrument(f"p{k}", "2026-05-03", y / noise**2 / alone, alone**-0.5) for k, y in enumerate(seen)]
+    rows += [instrument("known", "2026-05-03", 9.0, 1e-6, with_session=True), instrument("when", None, 9.0, 1e-6)]
+    (part,) = drift(pd.DataFrame(rows))
+    (line,) = part.figure.data
+    total = 2.0 / noise**2 + 1.0 / prior_sd**2
+    assert line["x"] == ["2026-05-03"]
+    assert line["y"] == pytest.approx([100.0 * sum(seen) / noise**2 / total])
+    assert line["error_y"]["array"] == pytest.approx([196.0 * total**-0.5])
+    assert part.text == ("2 people on 1 day; of 1 no date is known.",)
+
+
+def test_without_a_date_the_page_says_who_could_say_it():
+    (part,) = drift(pd.DataFrame([instrument("a", None, 0.0, 0.01)]))
+    assert part.figure is None
+    assert "date = 2026-05-03 under [instruments]" in part.text[0]
+    assert not list(drift(pd.DataFrame([instrument("a", None, 0.0, 0.01)])[:0]))

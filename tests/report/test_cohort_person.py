@@ -20,7 +20,7 @@ def job(measured_walk, tmp_path):
     text = subject.read_text(encoding="utf-8").replace('markers = "walk.c3d"', 'markers = "static.c3d"')
     subject.write_text(text, encoding="utf-8")
     prepare_folder(tmp_path / "out")
-    return Job("A", subject, tmp_path / "out", inputs_of(read_subject(subject)), 1)
+    return Job("A", subject, tmp_path / "out", inputs_of(read_subject(subject)), 1, 60.0)
 
 
 def test_an_error_in_the_files_is_their_record(job):

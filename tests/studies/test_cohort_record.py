@@ -95,3 +95,11 @@ def test_results_that_stay_of_other_files_are_told(subject, tmp_path):
     assert (outcome.status, outcome.fitted) == (2, False)
     assert "did you mean 'mass_kg'" in outcome.sentence
     assert outcome.sentence.endswith("(results of other files are in people/Anna)")
+
+
+def test_logs_of_people_at_work_in_a_killed_run_are_swept(tmp_path):
+    prepare_folder(tmp_path)
+    for name in ("Anna.log", "Ben.log", "Ben.json"):
+        (tmp_path / "failed" / name).write_text("run x", encoding="utf-8")
+    prepare_folder(tmp_path)
+    assert sorted(path.name for path in (tmp_path / "failed").iterdir()) == ["Ben.json", "Ben.log"]

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from kinertia.cli.json_lines import JsonLines
 from kinertia.cli.options import Force, Output, Quiet, results_folder
-from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.cli.terminal import be_quiet, out, plain_table, shown_progress
+from kinertia.errors import SettingsError
 from kinertia.io.file_lock import sole_use
+from kinertia.io.slurm_file import SlurmFile, read_slurm
+from kinertia.report.cohort_learning import FOLDER as LEARNT
+from kinertia.report.cohort_learning import write_second_study
 from kinertia.report.cohort_page import write_cohort_page
 from kinertia.report.cohort_person import fit_person
 from kinertia.report.cohort_tables import write_tables
@@ -24,8 +30,10 @@ from kinertia.studies.cohort_cluster import (
     run_jobs,
     running_cluster,
 )
-from kinertia.studies.cohort_people import people_of
+from kinertia.studies.cohort_people import Person, people_of
 from kinertia.studies.cohort_record import Record, Standing, keep, prepare_folder, standings
+from kinertia.studies.cohort_resources import note_resources
+from kinertia.studies.cohort_slurm import slurm_cluster
 
 _LOCK = ".kinertia-cohort.lock"
 _MOST_SHOWN = 20
@@ -43,7 +51,22 @@ def cohort(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler that runs already; left out: this computer.")
     ] = None,
+    slurm: Annotated[
+        Path | None,
+        typer.Option(help="File (.toml) that says how to ask SLURM for workers: docs/cohort.md has one to edit."),
+    ] = None,
+    learn: Annotated[
+        bool,
+        typer.Option(
+            "--learn",
+            help="Fit everybody again with what the others teach of bodies, and of plates and clock of the day; the "
+            "results go to the folder learnt.",
+        ),
+    ] = False,
     csv: Annotated[bool, typer.Option("--csv", help="Write all tables as CSV, too.")] = False,
+    json_lines: Annotated[
+        bool, typer.Option("--json-lines", help="Print what happens as JSON, an object per line, and nothing else.")
+    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only say who would be fitted, what is missing, and roughly how long.")
     ] = False,
@@ -68,60 +91,139 @@ def cohort(
 
     kinertia cohort people.csv -o out --csv
 
+    kinertia cohort STUDY -o out --learn
+
     kinertia cohort STUDY -o out --scheduler tcp://node7:8786
+
+    kinertia cohort STUDY -o out --slurm slurm.toml
     """
     expect_extra()
+    if scheduler and slurm:
+        raise SettingsError("--scheduler and --slurm: give one of them")
+    where = _Where(scheduler, None if slurm is None else read_slurm(slurm))
+    lines = JsonLines(json_lines)
+    be_quiet(quiet or json_lines)
     people = people_of(study, output)
-    if not dry_run:
-        results_folder(output, force)
-        output.mkdir(parents=True, exist_ok=True)
-        with sole_use(output / _LOCK, "the folder of this cohort"):
-            prepare_folder(output)
-            everybody = _standing(people, output)
-            _say_due(everybody)
-            records = _fitted(everybody, output.resolve(), scheduler)
-            outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
-            write_tables(output, outcomes, csv)
-            write_cohort_page(output)
-        _report(outcomes, output)
-        raise typer.Exit(int(any(record.status for record in outcomes)))
-    everybody = _standing(people, output)
-    _report_plan(everybody, scheduler)
-    raise typer.Exit(int(any(one.problem for one in everybody)))
+    if dry_run:
+        everybody = _standing(people, output, lines)
+        _report_plan(everybody, where)
+        for one in everybody:
+            state = "lacking" if one.problem else "due" if one.due else "as before"
+            lines.say(
+                "plan", person=one.person.name, state=state, trials=one.trials, frames=one.frames, why=one.problem
+            )
+        raise typer.Exit(int(any(one.problem for one in everybody)))
+    results_folder(output, force)
+    output.mkdir(parents=True, exist_ok=True)
+    with sole_use(output / _LOCK, "the folder of this cohort"):
+        outcomes = _run(people, output, where, csv, lines)
+        if learn:
+            outcomes += _run_again(people, outcomes, output, where, csv, lines)
+    raise typer.Exit(int(any(record.status for record in outcomes)))
 
 
-def _standing(people: Sequence[Any], output: Path) -> list[Standing]:
+@dataclass(frozen=True)
+class _Where:
+    """Where it runs: on a scheduler's workers, on SLURM's, or, with neither, on this computer."""
+
+    scheduler: str | None
+    slurm: SlurmFile | None
+
+    @contextmanager
+    def client(self, people: int) -> Iterator[Any]:
+        """Of the cluster."""
+        if self.scheduler:
+            cluster = running_cluster(self.scheduler)
+        elif self.slurm is not None:
+            cluster = slurm_cluster(self.slurm, people)
+        else:
+            cluster = local_cluster(local_size(people))
+        with cluster as client:
+            yield client
+
+    def sentence(self, people: int) -> str:
+        """In words."""
+        if self.scheduler:
+            return f"On the cluster of {self.scheduler}"
+        if self.slurm is not None:
+            return f"On SLURM, in {min(self.slurm.workers, people)} jobs of {self.slurm.memory_gb:g} GB"
+        size = local_size(people)
+        each = f"each with one thread and at most {size.memory_bytes / 1024**3:.1f} GB of memory"
+        return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
+
+    def workers(self, people: int) -> int:
+        """How many; one where only the scheduler knows."""
+        if self.scheduler:
+            return 1
+        return local_size(people).workers if self.slurm is None else min(self.slurm.workers, people)
+
+
+def _run(people: Sequence[Person], output: Path, where: _Where, csv: bool, lines: JsonLines) -> list[Record]:
+    """Fit who is due, and write tables and page of everybody."""
+    prepare_folder(output)
+    everybody = _standing(people, output, lines)
+    _say_due(everybody)
+    records = _fitted(everybody, output.resolve(), where, lines)
+    outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
+    with shown_progress() as shown:
+        progress = lines.with_progress(shown)
+        write_tables(output, _each(outcomes, "tables", progress), csv)
+        progress("page", 0.0)
+        write_cohort_page(output)
+    _report(outcomes, output)
+    fitted, passed = sum(one.fitted for one in outcomes), sum(not one.status for one in outcomes)
+    lines.say("end", folder=str(output), people=len(outcomes), fitted=fitted, passed=passed)
+    return outcomes
+
+
+def _run_again(
+    people: Sequence[Person], outcomes: Sequence[Record], output: Path, where: _Where, csv: bool, lines: JsonLines
+) -> list[Record]:
+    """The same with what those who were fitted teach each other."""
+    there = {record.person for record in outcomes if record.fitted}
+    with shown_progress() as shown:
+        taught = [person for person in people if person.name in there]
+        second, notes = write_second_study(output, taught, lines.with_progress(shown))
+    for note in notes:
+        out.print(f"note: {note}", soft_wrap=True)
+        lines.say("note", sentence=note)
+    return _run(second, output / LEARNT, where, csv, lines)
+
+
+def _each(records: Sequence[Record], stage: str, progress: Callable[[str, float], None]) -> Iterator[Record]:
+    for k, record in enumerate(records):
+        progress(stage, k / len(records))
+        yield record
+
+
+def _standing(people: Sequence[Person], output: Path, lines: JsonLines) -> list[Standing]:
     everybody = []
-    with shown_progress() as progress:
+    with shown_progress() as shown:
+        progress = lines.with_progress(shown)
         for k, one in enumerate(standings(people, output), start=1):
             everybody.append(one)
             progress("looking for changes", k / len(people))
     return everybody
 
 
-def _fitted(everybody: Sequence[Standing], output: Path, scheduler: str | None) -> dict[str, Record]:
+def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: JsonLines) -> dict[str, Record]:
     """Records of all that were due, by name; nothing is started where nobody is."""
-    jobs = [
-        Job(one.person.name, one.person.subject.resolve(), output, one.inputs, one.trials)
-        for one in everybody
-        if one.due and one.person.subject is not None
-    ]
+    jobs = [Job.of(one, output) for one in everybody if one.due]
     records: dict[str, Record] = {}
     if not jobs:
         return records
-    with shown_progress() as progress, _cluster(scheduler, len(jobs)) as client:
+    with shown_progress() as shown, where.client(len(jobs)) as client:
+        progress = lines.with_progress(shown)
         progress("people", 0.0)
-        for record in run_jobs(client, fit_person, jobs):
+        for finished in run_jobs(client, fit_person, jobs):
+            record = finished.record
             keep(output, record)
+            note_resources(output, finished)
             records[record.person] = record
+            said = {name: getattr(record, name) for name in ("person", "status", "sentence", "seconds")}
+            lines.say("person", **said, memory_mb=finished.memory_mb, worker=finished.worker)
             progress("people", len(records) / len(jobs))
     return records
-
-
-@contextmanager
-def _cluster(scheduler: str | None, people: int) -> Iterator[Any]:
-    with running_cluster(scheduler) if scheduler else local_cluster(local_size(people)) as client:
-        yield client
 
 
 def _say_due(everybody: Sequence[Standing]) -> None:
@@ -130,16 +232,7 @@ def _say_due(everybody: Sequence[Standing]) -> None:
     out.print(f"{len(everybody)} people: {due} to fit, {kept} as before, {lacking} without what a fit needs")
 
 
-def _where(people: int, scheduler: str | None) -> str:
-    """Where it runs."""
-    if scheduler:
-        return f"On the cluster of {scheduler}"
-    size = local_size(people)
-    each = f"each with one thread and at most {size.memory_bytes / 1024**3:.1f} GB of memory"
-    return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
-
-
-def _report_plan(everybody: Sequence[Standing], scheduler: str | None) -> None:
+def _report_plan(everybody: Sequence[Standing], where: _Where) -> None:
     """Who, how much, what is missing, and roughly how long."""
     table = plain_table("person", "", "trials", "frames")
     for one in everybody:
@@ -149,10 +242,9 @@ def _report_plan(everybody: Sequence[Standing], scheduler: str | None) -> None:
     _say_due(everybody)
     due = [one for one in everybody if one.due]
     if due:
-        workers = 1 if scheduler else local_size(len(due)).workers
-        minutes = guessed_seconds(due, workers) / 60.0
-        shared = " of one processor, to be divided by the number of workers" if scheduler else ""
-        out.print(f"{_where(len(due), scheduler)}: very roughly {max(1, round(minutes))} min{shared}")
+        minutes = guessed_seconds(due, where.workers(len(due))) / 60.0
+        shared = " of one processor, to be divided by the number of workers" if where.scheduler else ""
+        out.print(f"{where.sentence(len(due))}: very roughly {max(1, round(minutes))} min{shared}")
 
 
 def _report(outcomes: Sequence[Record], output: Path) -> None:
@@ -166,5 +258,7 @@ def _report(outcomes: Sequence[Record], output: Path) -> None:
     passed = len(outcomes) - len(noted)
     out.print(f"{len(outcomes)} people: {fitted} fitted, {passed} of them with all checks passed")
     out.print(
-        f"results in {output}: cohort.parquet, trials.parquet, cycles.parquet, people.csv, people", soft_wrap=True
+        f"results in {output}: cohort.html, cohort.parquet, trials.parquet, cycles.parquet, instruments.parquet, "
+        "people.csv, people",
+        soft_wrap=True,
     )

@@ -14,7 +14,7 @@ from kinertia.errors import FileError, KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.population_file import PopulationFile, population_text, read_population
+from kinertia.io.population_file import population_text, read_population
 from kinertia.io.provenance import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.saved_fit import FIT_FILE, read_saved
@@ -47,16 +47,7 @@ def population(
     own_file(output, read_population, "kinertia population")
     people, files = _read(_folders(results), set(without or ()))
     learnt = learn(people)
-    names = tuple(person.name for person in people)
-    content = PopulationFile(
-        kinertia=VERSION,
-        people=names,
-        files=files,
-        segments=learnt.segments,
-        mean=tuple(learnt.mean.tolist()),
-        mean_sd=tuple(learnt.mean_sd.tolist()),
-        covariance=tuple(tuple(row) for row in learnt.covariance.tolist()),
-    )
+    content = learnt.as_file(VERSION, [person.name for person in people], files)
     write_then_rename(output, population_text(content))
     _report(learnt)
     out.print(f"written to {output}; name it in subject files: population = ... under [prior]", soft_wrap=True)

@@ -26,14 +26,15 @@ _COLOURS = {"pass": "green", "caution": "yellow", "fail": "bold red"}
 
 def print_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
     """Results for scripts, on standard output; what is not a finite number is null, which JSON has a word for."""
-    typer.echo(json.dumps(_finite(content), indent=2, allow_nan=False))
+    typer.echo(json.dumps(finite(content), indent=2, allow_nan=False))
 
 
-def _finite(content: Any) -> Any:
+def finite(content: Any) -> Any:
+    """The same with None for what is not a finite number."""
     if isinstance(content, Mapping):
-        return {name: _finite(value) for name, value in content.items()}
+        return {name: finite(value) for name, value in content.items()}
     if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
+        return [finite(value) for value in content]
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 

@@ -58,7 +58,7 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
         check_plates(wanted)
     measures = _measures(wanted)
     ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted, measures))
-    if known == InstrumentsFiles():
+    if known.model_copy(update={"date": None}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
         return replace(

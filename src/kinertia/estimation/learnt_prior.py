@@ -85,6 +85,18 @@ class LearntPrior:
         mean, mean_sd, covariance = (np.array(values) for values in (file.mean, file.mean_sd, file.covariance))
         return cls(file.segments, mean, mean_sd, covariance, len(file.people))
 
+    def as_file(self, version: str, people: Sequence[str], files: Sequence[str]) -> PopulationFile:
+        """What is written of it: with the version, the people's names and the SHA-256 of their files."""
+        return PopulationFile(
+            kinertia=version,
+            people=tuple(people),
+            files=tuple(files),
+            segments=self.segments,
+            mean=tuple(self.mean.tolist()),
+            mean_sd=tuple(self.mean_sd.tolist()),
+            covariance=tuple(tuple(row) for row in self.covariance.tolist()),
+        )
+
     def of(self, literature: BspPrior) -> BspPrior:
         """The prior of a person of the group, around the person's own literature values.
 

@@ -75,19 +75,7 @@ def doubts_about(path: Path) -> str:
     Raises:
         FileError: it is empty, no C3D file, shorter than what it announces, or its parameters cannot be told apart.
     """
-    with path.open("rb") as stream:
-        block = stream.read(_BLOCK)
-        if not block:
-            raise FileError(path, "the file is empty; expected a C3D file, export it again")
-        if len(block) < 2 or block[1] != 0x50:
-            raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
-        start = _BLOCK * (block[0] - 1)
-        if start < _BLOCK:
-            raise FileError(path, f"its parameters begin in block {block[0]}; expected 2 or later, export it again")
-        stream.seek(start)
-        section = stream.read(4)
-        if len(section) == 4:
-            section += stream.read(_BLOCK * section[2] - 4) if section[2] else b""
+    block, start, section = _sections(path)
     size = path.stat().st_size
     if len(block) < _BLOCK or len(section) < 4:
         needed = _BLOCK if len(block) < _BLOCK else start + _BLOCK
@@ -105,6 +93,38 @@ def doubts_about(path: Path) -> str:
         return "its numbers are DEC's"
     parameters, doubt = _parameters(path, section, order)
     return doubt or _header_doubt(header, start + _BLOCK * section[2]) or _doubt(header, parameters)
+
+
+def trial_date(path: Path) -> tuple[int, ...]:
+    """TRIAL:DATE of a C3D file, which some systems write: year, month, day; empty where it does not say.
+
+    Raises:
+        FileError: as `doubts_about`.
+    """
+    _, _, section = _sections(path)
+    if len(section) < 4 or section[3] not in _BYTE_ORDERS:
+        return ()
+    parameters, _ = _parameters(path, section, _BYTE_ORDERS[section[3]][0])
+    entry = parameters.get(("TRIAL", "DATE"))
+    return () if entry is None else tuple(int(number) for number in entry.numbers)
+
+
+def _sections(path: Path) -> tuple[bytes, int, bytes]:
+    """The first block, where the parameters begin, and the parameters."""
+    with path.open("rb") as stream:
+        block = stream.read(_BLOCK)
+        if not block:
+            raise FileError(path, "the file is empty; expected a C3D file, export it again")
+        if len(block) < 2 or block[1] != 0x50:
+            raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
+        start = _BLOCK * (block[0] - 1)
+        if start < _BLOCK:
+            raise FileError(path, f"its parameters begin in block {block[0]}; expected 2 or later, export it again")
+        stream.seek(start)
+        section = stream.read(4)
+        if len(section) == 4:
+            section += stream.read(_BLOCK * section[2] - 4) if section[2] else b""
+    return block, start, section
 
 
 def header_frames(path: Path) -> int:

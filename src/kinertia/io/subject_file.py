@@ -43,6 +43,7 @@
 
 from __future__ import annotations
 
+import datetime
 import difflib
 import json
 import os
@@ -169,6 +170,9 @@ class InstrumentsFiles(Instruments):
     """What the laboratory states of its instruments, and the file of its session."""
 
     session: File | None = Field(default=None, description="what kinertia instruments wrote of the same session")
+    date: datetime.date | None = Field(
+        default=None, description="day of the recording, 2026-05-03; left out: as the recordings say, if they do"
+    )
 
 
 class PriorFiles(PriorSettings):

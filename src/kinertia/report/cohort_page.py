@@ -17,6 +17,7 @@ from markupsafe import Markup, escape
 
 from kinertia.io.output_folder import write_then_rename
 from kinertia.report import style
+from kinertia.report.cohort_instruments import COLUMNS, drift
 from kinertia.report.figure import Figure
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.result_page import Part, render_parts
@@ -50,6 +51,7 @@ def write_cohort_page(folder: Path) -> None:
     if (people["status"] <= AGAINST).any():
         bsp = _read(folder, "cohort", ("person", "segment", "parameter", "literature", "estimate", "sd"))
         parts += [*_changes(bsp), _residuals(folder), _outliers(bsp), *_mean_curves(folder)]
+        parts += drift(_read(folder, "instruments", COLUMNS))
     passed = int((people["status"] == PASSED).sum())
     lead = f"{len(people)} people; {passed} passed every check. Each one's report is in people/NAME/report.html."
     write_then_rename(folder / PAGE, render_parts("Cohort", lead, parts))

@@ -11,11 +11,13 @@ from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.provenance import VERSION, command_line, provenance_of
+from kinertia.io.recording_date import session_date
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.report.cohort_tables import write_person
 from kinertia.report.files import save_fit
 from kinertia.studies.cohort_cluster import Job
 from kinertia.studies.cohort_record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
+from kinertia.studies.cohort_time_limit import no_end, time_limit, was_ended
 
 
 def fit_person(job: Job) -> Record:
@@ -27,17 +29,12 @@ def fit_person(job: Job) -> Record:
     if job.kinertia != VERSION:
         versions = f"the worker has Kinertia {VERSION}, the command {job.kinertia}: install the same on both"
         return job.record(FAILED, versions, settled=False)
+    log = Place(job.cohort, job.person).log
+    if was_ended(log, job.run):
+        return job.record(FAILED, no_end(job.limit_s, log), settled=False)
     try:
-        wanted = read_subject(job.subject)
-        try:
-            fit = fit_subject(wanted)
-        except KinertiaError as error:
-            return job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
-        judged = verdicts(fit)
-        against = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
-        record = job.record(AGAINST if against else PASSED, against, True, time.perf_counter() - started)
-        _save(fit, wanted, job, record)
-        return record
+        with time_limit(job.limit_s, log, job.run):
+            return _fitted(job, started)
     except KinertiaError as error:  # of files that changed in between, or of the folder for the results
         return job.record(BAD_INPUT, str(error), settled=False)
     except OSError as error:
@@ -48,13 +45,28 @@ def fit_person(job: Job) -> Record:
         return _failed(job, error)
 
 
+def _fitted(job: Job, started: float) -> Record:
+    """How the fit ended, its results in their place."""
+    wanted = read_subject(job.subject)
+    try:
+        fit = fit_subject(wanted)
+    except KinertiaError as error:
+        return job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
+    judged = verdicts(fit)
+    against = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
+    record = job.record(AGAINST if against else PASSED, against, True, time.perf_counter() - started)
+    _save(fit, wanted, job, record)
+    return record
+
+
 def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
     """Results, rows of the tables and the record, in one folder that appears at once."""
     folder = Place(job.cohort, job.person).results
     command = command_line(["kinertia", "fit", str(job.subject), "-o", str(folder)])
     with complete_folder(folder, "cohort") as work:
         save_fit(fit, work, provenance_of(wanted, command))
-        write_person(work, job.person, fit)
+        with_session = wanted.instruments.session is not None
+        write_person(work, job.person, fit, session_date(wanted), with_session)
         (work / RECORD).write_text(record.text(), encoding="utf-8")
 
 
@@ -68,7 +80,7 @@ def _unchanged(job: Job) -> bool:
 
 def _failed(job: Job, error: Exception) -> Record:
     """Kinertia's own failure, with a log beside its record."""
-    log = Place(job.cohort, job.person).failure.with_suffix(".log")
+    log = Place(job.cohort, job.person).log
     last_line = traceback.format_exception_only(error)[-1].strip()
     sentence = f"Kinertia failed, which it should not on any input ({last_line}); please send {log} to its developers"
     write_then_rename(log, "".join(traceback.format_exception(error)))

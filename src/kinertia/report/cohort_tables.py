@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +52,11 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "quantity": "string",
         **dict.fromkeys(("value", "sd"), "double"),
     },
+    "instruments": {
+        **dict.fromkeys(("person", "date", "instrument", "unknown", "unit"), "string"),
+        **dict.fromkeys(("value", "sd", "prior_sd"), "double"),
+        "with_session": "bool",
+    },
     "people": {
         "person": "string",
         "status": "int64",
@@ -62,18 +68,27 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Columns of every table with their types, as pyarrow names them."""
-OF_A_PERSON = ("cohort", "trials", "cycles")
+OF_A_PERSON = ("cohort", "trials", "cycles", "instruments")
 _ROWS_AT_ONCE, _PEOPLE_AT_ONCE = 50_000, 200
 """Whichever is reached first ends a piece of a table. A file keeps a line on each column of each piece, which for ten
 thousand people with a piece each would be more than the numbers; and small tables that wait take more memory than
 their rows."""
 
 
-def write_person(folder: Path, person: str, fit: Fit) -> None:
-    """Write a person's rows of the tables, into the folder of the person's results."""
+def write_person(folder: Path, person: str, fit: Fit, day: date | None = None, with_session: bool = False) -> None:
+    """Write a person's rows of the tables, into the folder of the person's results.
+
+    Args:
+        folder: of the person.
+        person: name.
+        fit: its result.
+        day: of the recording, if it is known.
+        with_session: whether the fit knew what others say of plates and clock.
+    """
     from pyarrow import parquet
 
-    for name, columns in zip(OF_A_PERSON, (_bsp(fit), _trials(fit), _cycles(fit)), strict=True):
+    of_person = (_bsp(fit), _trials(fit), _cycles(fit), _instruments(fit, day, with_session))
+    for name, columns in zip(OF_A_PERSON, of_person, strict=True):
         rows = len(next(iter(columns.values())))
         parquet.write_table(_table(name, {"person": [person] * rows, **columns}), folder / f"{name}.parquet")
 
@@ -105,7 +120,8 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
         folder: that `kinertia cohort` has written.
 
     Returns:
-        by name: "cohort" (body segment parameters), "trials", "cycles" and "people", who is in it and how it ended.
+        by name: "cohort" (body segment parameters), "trials", "cycles", "instruments" (plates and clock), and
+        "people", who is in it and how it ended.
 
     Raises:
         FileError: no cohort is there.
@@ -158,6 +174,16 @@ def _trials(fit: Fit) -> dict[str, Any]:
 def _cycles(fit: Fit) -> dict[str, Any]:
     """The rows of the person's `cycles.csv`."""
     return cycle_columns(fit.trials, fit.mass_kg, "estimate", MOST_STRIDES)
+
+
+def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, Any]:
+    """What the person's trials say of plates and clock; nothing by the two-level method."""
+    calibration = {} if fit.posterior is None else fit.posterior.calibration
+    rows = [(name.split(": ", 1), entry) for name, entry in calibration.items() if ": " in name]
+    of_entries = {key: [entry[key] for _, entry in rows] for key in ("unit", "value", "sd", "prior_sd")}
+    names = {"instrument": [name[0] for name, _ in rows], "unknown": [name[1] for name, _ in rows]}
+    said = {"date": None if day is None else day.isoformat(), "with_session": with_session}
+    return {**{name: [value] * len(rows) for name, value in said.items()}, **names, **of_entries}
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:

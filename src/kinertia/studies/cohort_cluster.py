@@ -1,4 +1,4 @@
-"""The processes that fit a cohort: Dask's, on this computer or on a cluster that runs already.
+"""The processes that fit a cohort: Dask's, on this computer or on a cluster that runs already (SLURM: `cohort_slurm`).
 
 What is to be done where, and again where a process was killed, is Dask's to say. One process works on one person at a
 time, with one thread of the linear algebra library, as Dask sets it for its workers.
@@ -10,15 +10,17 @@ import logging
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from uuid import uuid4
 
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.provenance import VERSION
 from kinertia.studies.cohort_record import FAILED, Record, Standing, one_line
+from kinertia.studies.cohort_resources import Finished, measured
 
 HOW = "pip install 'kinertia[cohort]'"
 _NEEDED = ("dask", "distributed", "pyarrow")
@@ -26,8 +28,19 @@ PERSON_MEMORY_BYTES = 2 * 1024**3
 """What a fit is given at least: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
 RETRIES = 2
 """How often a person is tried again whose process was killed."""
+SCHEDULING = MappingProxyType(
+    {
+        "distributed.scheduler.allowed-failures": RETRIES,
+        # a process that is killed takes with it what waits there, too: let it wait with the scheduler
+        "distributed.scheduler.worker-saturation": 1.0,
+        "logging": {"distributed": "critical"},
+    }
+)
+"""Settings of Dask for schedulers of our own."""
 _SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
 """Of one processor, for a rough guess before anything was measured: see `docs/long-trials.md`."""
+_LEAST_LIMIT_S, _PATIENCE = 900.0, 50.0
+"""A fit is given so long, and so many times the guess: what takes longer has no end."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +53,9 @@ class Job:
         cohort: folder of the cohort's results, as workers see it.
         inputs: SHA-256 of what goes into the fit.
         trials: how many.
+        limit_s: after which its process is ended.
         kinertia: version of the command, which has to be the worker's.
+        run: which run of the command it is of.
     """
 
     person: str
@@ -48,7 +63,17 @@ class Job:
     cohort: Path
     inputs: str
     trials: int
+    limit_s: float
     kinertia: str = VERSION
+    run: str = ""
+
+    @classmethod
+    def of(cls, one: Standing, cohort: Path) -> Job:
+        """To fit a person who is due, into the folder of the cohort."""
+        if one.person.subject is None:
+            raise ValueError(f"{one.person.name} is not due")
+        limit_s = _LEAST_LIMIT_S + _PATIENCE * guessed_seconds([one], 1)
+        return cls(one.person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s)
 
     def record(self, status: int, sentence: str, settled: bool, seconds: float = 0.0) -> Record:
         """How it ended; `settled` where the same input always ends so."""
@@ -93,14 +118,8 @@ def local_cluster(size: ClusterSize) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
-    settings = {
-        "distributed.scheduler.allowed-failures": RETRIES,
-        # a process that is killed takes with it what waits there, too: let it wait with the scheduler
-        "distributed.scheduler.worker-saturation": 1.0,
-        "logging": {"distributed": "critical"},
-    }
     with (
-        dask.config.set(settings),
+        dask.config.set(SCHEDULING),
         LocalCluster(
             n_workers=size.workers,
             threads_per_worker=1,
@@ -136,7 +155,7 @@ def running_cluster(address: str) -> Iterator[Any]:
         yield client
 
 
-def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Job]) -> Iterator[Record]:
+def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Job]) -> Iterator[Finished]:
     """How each job ended, as they end.
 
     Args:
@@ -151,13 +170,15 @@ def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Jo
 
     run = uuid4().hex  # what two runs on one cluster submit must not be taken for the same
     of_key = {f"kinertia-{run}-{k}": job for k, job in enumerate(jobs)}
-    futures = [client.submit(fit_person, job, key=key, pure=False) for key, job in of_key.items()]
+    futures = [
+        client.submit(measured, fit_person, replace(job, run=run), key=key, pure=False) for key, job in of_key.items()
+    ]
     for future in as_completed(futures):
         job = of_key[future.key]
         if future.status == "finished":
             yield future.result()
         elif future.status == "error":
-            yield job.record(FAILED, _told(future.exception()), settled=False)
+            yield Finished(job.record(FAILED, _told(future.exception()), settled=False))
         else:
             raise KinertiaError("the Dask scheduler is gone; what is finished is kept: run the command again")
         future.release()

@@ -76,6 +76,11 @@ class Place:
         """The record of a person without results."""
         return self.cohort / "failed" / f"{self.person}.json"
 
+    @property
+    def log(self) -> Path:
+        """What Kinertia's developers need of a failure."""
+        return self.cohort / "failed" / f"{self.person}.log"
+
     def record(self, inputs: str) -> Record | None:
         """What an earlier run of this version said of these inputs; None where none did.
 
@@ -126,16 +131,19 @@ def prepare_folder(cohort: Path) -> None:
     for folder in (cohort, cohort / "people", cohort / "failed"):
         folder.mkdir(parents=True, exist_ok=True)
         sweep(folder)
+    for log in (cohort / "failed").glob("*.log"):
+        if not log.with_suffix(".json").exists():  # of a person at work when the run was killed
+            log.unlink()
     write_then_rename(cohort / "cohort.json", json.dumps({"kinertia": VERSION, "results": "cohort"}) + "\n")
 
 
 def keep(cohort: Path, record: Record) -> None:
     """Note how the fit of a person ended who has no results; results bring their own record, and end the other."""
-    failure = Place(cohort, record.person).failure
+    place = Place(cohort, record.person)
     if not record.fitted:
-        write_then_rename(failure, record.text())
+        write_then_rename(place.failure, record.text())
         return
-    for path in (failure, failure.with_suffix(".log")):
+    for path in (place.failure, place.log):
         path.unlink(missing_ok=True)
 
 
@@ -159,7 +167,7 @@ def inputs_of(wanted: SubjectFile) -> str:
 
     Where the files are and what they are called changes nothing, nor do comments.
     """
-    content = json.dumps(_contents(wanted.model_dump()), sort_keys=True)
+    content = json.dumps(_contents(wanted.model_dump()), sort_keys=True, default=str)  # a date
     return hashlib.sha256(content.encode()).hexdigest()
 
 

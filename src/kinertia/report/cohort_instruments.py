@@ -1,0 +1,87 @@
+"""A laboratory's instruments over time, on the page of a cohort: what each day's people say of plates and clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
+from kinertia.report import style
+from kinertia.report.panels import Panel, plain, small_multiples
+from kinertia.report.result_page import Part
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = ("person", "date", "instrument", "unknown", "unit", "value", "sd", "prior_sd", "with_session")
+_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
+_WITHIN = 1.96
+_UNDATED = (
+    "No date is known: the recordings say none (C3D files may in TRIAL:DATE, Qualisys files in TIME_STAMP), nor do "
+    "the subject files (date = 2026-05-03 under [instruments])."
+)
+
+
+def drift(rows: pd.DataFrame) -> Iterator[Part]:
+    """A panel per unknown, in it a line per instrument over the days; a day's people count by what they know.
+
+    Args:
+        rows: of the table of instruments, `COLUMNS`. Fits that knew what others of their session say are left out: days
+            would count people twice.
+    """
+    rows = rows[~rows["with_session"]]
+    dated = rows.dropna(subset=["date"])
+    if not len(dated):
+        if len(rows):
+            yield Part("Instruments over time", (_UNDATED,))
+        return
+    names = sorted(dated["instrument"].unique())
+    colours = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
+    panels = [_panel(str(unknown), colours, of) for unknown, of in dated.groupby("unknown", sort=False)]
+    people, days = dated["person"].nunique(), dated["date"].nunique()
+    without = rows["person"].nunique() - people
+    said = f"{people} people on {days} day{'s' if days > 1 else ''}"
+    text = (f"{said}; of {without} no date is known." if without else f"{said}.",)
+    figure = small_multiples(panels, "Plates and clock over time, one panel for each kind of error.", {"type": "date"})
+    caption = (
+        "How far plates and clock are off by all people of a day together, with 95 % intervals. The estimate starts "
+        "from instruments that are sound: days on which little is known lean towards zero. Every number: "
+        "instruments.parquet."
+    )
+    yield Part("Instruments over time", text, figure, caption)
+
+
+def _panel(unknown: str, colours: Mapping[str, str], rows: pd.DataFrame) -> Panel:
+    factor, shown = SHOWN_UNIT[str(rows["unit"].iloc[0])]
+    traces = [
+        _line(str(instrument), colours[str(instrument)], factor, of)
+        for instrument, of in rows.groupby("instrument", sort=True, observed=True)
+    ]
+    return Panel(f"{unknown} ({shown})", traces)
+
+
+def _line(instrument: str, colour: str, factor: float, rows: pd.DataFrame) -> dict[str, Any]:
+    """Value of each day and its error bar: what all its people's trials say, with one prior."""
+    days, means, bars, texts = [], [], [], []
+    for day, of in rows.groupby("date", sort=True):
+        value, sd, prior_sd = (of[name].to_numpy() for name in ("value", "sd", "prior_sd"))
+        information = 1.0 / np.square(sd)
+        total = information.sum() - (len(of) - 1) / float(np.mean(prior_sd)) ** 2
+        days.append(str(day))
+        means.append(float(factor * (information @ value) / total))
+        bars.append(float(factor * _WITHIN / np.sqrt(total)))
+        texts.append(f"{len(of)} people")
+    return {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "x": days,
+        "y": means,
+        "error_y": {"type": "data", "array": bars, "thickness": 1, "width": 3},
+        "line": {"color": colour, "width": 1},
+        "marker": {"color": colour, "size": 7},
+        "name": plain(instrument),
+        "text": texts,
+        "hovertemplate": "%{x}: %{y:.2f}, %{text}<extra>%{fullData.name}</extra>",
+    }

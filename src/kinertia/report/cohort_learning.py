@@ -1,0 +1,244 @@
+"""What a cohort teaches its own people: subject files for a second fit, each person left out of what is taught.
+
+Of bodies it is the group's prior (`estimation.learnt_prior`), learnt for a tenth of the people at a time from all
+others. Of plates and clock it is what the people of one day say (`estimation.session`), out of which a fit leaves its
+own. The second fits are a cohort of their own, whose subject files name both; what changes in them is what makes a
+person due again, as ever.
+"""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from kinertia.errors import KinertiaError, PriorError
+from kinertia.estimation.from_files import check_plates
+from kinertia.estimation.input_checks import known
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, information_of, learn
+from kinertia.estimation.session import person_instruments, session_instruments
+from kinertia.io.file_names import path_from
+from kinertia.io.output_folder import write_then_rename
+from kinertia.io.population_file import population_text
+from kinertia.io.provenance import VERSION, recordings, sha256
+from kinertia.io.recording_date import session_date
+from kinertia.io.session_file import PersonInstruments, session_text
+from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
+from kinertia.io.subject_text import subject_text
+from kinertia.io.toml_lines import read_toml
+from kinertia.report.saved_fit import read_saved
+from kinertia.studies.cohort_people import Person
+from kinertia.studies.cohort_record import RECORD, Place
+from kinertia.studies.parallel import in_parallel
+
+FOLDER = "learnt"
+_DONE = "learnt.json"
+PARTS = 10
+"""Of the people; each part's prior is learnt from the others."""
+_FILES = ("static", "osim", "markers", "forces", "loads", "session", "bsp", "population", "measures")
+"""Keys of a subject file that name files."""
+
+
+@dataclass
+class _Known:
+    """One person of the first fits.
+
+    Attributes:
+        name, subject: of the cohort's list.
+        wanted: what the subject file says.
+        body: what the person's trials say of the body; None where that cannot be taken.
+        instruments: the same of plates and clock.
+        entries: for the subject file of the second fit, by table and key.
+    """
+
+    name: str
+    subject: Path
+    wanted: SubjectFile
+    body: PersonInformation | None
+    instruments: PersonInstruments | None
+    entries: dict[str, dict[str, str]] = field(default_factory=dict)
+
+
+def write_second_study(
+    cohort: Path, people: Sequence[Person], progress: Callable[[str, float], None]
+) -> tuple[list[Person], list[str]]:
+    """Learn from the results of these people, and write the subject files of their second fits.
+
+    Args:
+        cohort: folder of the first fits; everything goes to a folder in it.
+        people: who has results there, and so a subject file.
+        progress: called as the work goes on.
+
+    Returns:
+        the people of the second study, and sentences on what could not be learnt, and of whom.
+
+    Raises:
+        KinertiaError: nothing can be learnt at all.
+    """
+    folder = cohort / FOLDER
+    cause = _cause(cohort, people)
+    if (before := _learnt_before(folder, cause)) is not None:
+        return [Person(person.name, _subject_of(folder, person.name)) for person in people], before
+    notes: list[str] = []
+    everybody = []
+    for k, person in enumerate(people):
+        progress("reading results", k / len(people))
+        everybody.append(_read(cohort, person, notes))
+    (folder / _DONE).unlink(missing_ok=True)
+    for name in ("priors", "sessions", "subjects"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        for old in (folder / name).glob("*.toml"):
+            old.unlink()
+    _teach_bodies(folder / "priors", [one for one in everybody if one.body is not None], notes, progress)
+    _teach_instruments(folder / "sessions", everybody, notes)
+    if not any(one.entries for one in everybody):
+        raise KinertiaError(f"nothing can be learnt from these people: {'; '.join(notes)}")
+    second = [_second(folder, one) for one in everybody]
+    write_then_rename(folder / _DONE, json.dumps({"kinertia": VERSION, "cause": cause, "notes": notes}) + "\n")
+    return second, notes
+
+
+def _cause(cohort: Path, people: Sequence[Person]) -> str:
+    """SHA-256 of all that the lesson is from: first fits by their records, subject files by place and text."""
+    parts = []
+    for person in people:
+        subject = known(person.subject)
+        record = sha256(Place(cohort, person.name).results / RECORD)
+        parts.append([person.name, str(subject.resolve()), sha256(subject), record])
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def _learnt_before(folder: Path, cause: str) -> list[str] | None:
+    """What an earlier run of this version noted of the same lesson; None where there was none."""
+    try:
+        done = json.loads((folder / _DONE).read_text(encoding="utf-8"))
+        return list(done["notes"]) if (done["kinertia"], done["cause"]) == (VERSION, cause) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _subject_of(folder: Path, name: str) -> Path:
+    return folder / "subjects" / f"{name}.toml"
+
+
+def _read(cohort: Path, person: Person, notes: list[str]) -> _Known:
+    subject = known(person.subject)
+    wanted = read_subject(subject)
+    fit = read_saved(Place(cohort, person.name).results).fit
+    of_person = _Known(person.name, subject, wanted, None, None)
+    try:
+        if wanted.prior.bsp is not None or wanted.prior.population is not None:
+            raise PriorError(f"{person.name}: [prior] names a prior of its own")
+        of_person.body = information_of(fit)
+    except KinertiaError as error:
+        notes.append(f"not in the group's prior, nor fitted with it: {error}")
+    try:
+        if wanted.instruments.session is None and fit.posterior is not None:
+            check_plates(wanted)
+            of_person.instruments = person_instruments(fit, recordings(wanted))
+    except KinertiaError as error:
+        notes.append(f"{person.name}: plates and clock are not shared: {error}")
+    return of_person
+
+
+def _teach_bodies(
+    folder: Path, people: Sequence[_Known], notes: list[str], progress: Callable[[str, float], None]
+) -> None:
+    """Write a prior for each part of the people, learnt from the others."""
+    parts = [list(people[k::PARTS]) for k in range(min(PARTS, len(people)))]
+    others = [_others(part, people) for part in parts]
+    if min(map(len, others), default=0) < FEWEST_PEOPLE:
+        found = f"{len(people)} people whose fits can teach"
+        notes.append(f"no prior was learnt: {found}; each one's takes at least {FEWEST_PEOPLE} others")
+        return
+    bodies = [[one.body for one in of if one.body is not None] for of in others]
+    try:
+        learnt = in_parallel(learn, bodies, None, partial(progress, "learning"))
+    except PriorError as error:
+        notes.append(f"no prior was learnt: {error}")
+        return
+    for k, (part, of, prior) in enumerate(zip(parts, others, learnt, strict=True)):
+        path = folder / f"{k + 1}.toml"
+        write_then_rename(path, _population(of, prior))
+        for one in part:
+            one.entries["prior"] = {"population": str(path.resolve())}
+
+
+def _others(part: Sequence[_Known], people: Sequence[_Known]) -> list[_Known]:
+    """Everybody who shares no recording with anybody of the part."""
+    own = {name for one in part for name in recordings(one.wanted)}
+    return [one for one in people if not own & set(recordings(one.wanted))]
+
+
+def _population(people: Sequence[_Known], learnt: LearntPrior) -> str:
+    files = [name for one in people for name in recordings(one.wanted)]
+    return population_text(learnt.as_file(VERSION, [one.name for one in people], files))
+
+
+def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str]) -> None:
+    """Write what the people of each day say of their plates and clock together."""
+    days: dict[tuple[datetime.date, str], list[_Known]] = {}
+    undated = 0
+    for one in people:
+        if one.instruments is None:
+            continue
+        day = session_date(one.wanted)
+        if day is None:
+            undated += 1
+        else:
+            days.setdefault((day, _stated(one.wanted.instruments)), []).append(one)
+    if undated:
+        notes.append(f"{undated} people without a date ([instruments] date): their plates and clock are not shared")
+    for k, ((day, _), of_day) in enumerate(sorted(days.items(), key=lambda item: item[0])):
+        said = {one.name: one.instruments for one in of_day if one.instruments is not None}
+        sharing = [one for one in of_day if _stood_on_others(said, one.name)]
+        if not sharing:
+            continue
+        session = session_instruments(list(said.values()), of_day[0].wanted.instruments)
+        notes += [f"{day}: {sentence}" for sentence in session.contradictions]
+        path = folder / f"{day}-{k + 1}.toml"
+        write_then_rename(path, session_text(VERSION, session.values, session.people))
+        for one in sharing:
+            one.entries["instruments"] = {"session": str(path.resolve())}
+
+
+def _stated(instruments: InstrumentsFiles) -> str:
+    """What the laboratory states, which is the same for all people of a session."""
+    return instruments.model_dump_json(exclude={"session", "date"})
+
+
+def _stood_on_others(said: Mapping[str, PersonInstruments], name: str) -> bool:
+    """Whether somebody else of the day stood on one of this person's plates."""
+    others = {plate for other, one in said.items() if other != name for plate in one.plates}
+    return bool(others & set(said[name].plates))
+
+
+def _second(folder: Path, one: _Known) -> Person:
+    """The person's subject file with what was learnt, and with paths that hold from everywhere."""
+    content = read_toml(one.subject, "a subject file").content
+    tables = {name: _from_everywhere(value, one.subject.parent) for name, value in content.items()}
+    tables["subject"] = {**tables["subject"], "name": one.wanted.subject.name}
+    for table, entries in one.entries.items():
+        tables[table] = {**tables.get(table, {}), **entries}
+    path = _subject_of(folder, one.name)
+    heading = f"{one.name}, with what the cohort teaches; written by kinertia cohort --learn"
+    write_then_rename(path, subject_text(tables, heading))
+    return Person(one.name, path)
+
+
+def _from_everywhere(value: Any, folder: Path) -> Any:
+    """A table of a subject file with absolute paths."""
+    if isinstance(value, list):
+        return [_from_everywhere(one, folder) for one in value]
+    if not isinstance(value, dict):
+        return value
+    absolute = dict(value)
+    for key in _FILES:
+        if isinstance(value.get(key), str) and (path := path_from(folder, value[key])).is_file():
+            absolute[key] = str(path.resolve())
+    return absolute

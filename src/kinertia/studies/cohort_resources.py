@@ -1,0 +1,68 @@
+"""What fits of a cohort take: seconds and memory of each person, in a log that every run goes on with."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TypeVar
+
+from kinertia.io.spreadsheet import inert
+from kinertia.studies.cohort_record import Record
+
+LOG = "resources.csv"
+_COLUMNS = ("ended", "person", "status", "seconds", "memory_mb", "worker")
+
+Work = TypeVar("Work")
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A job that has ended.
+
+    Attributes:
+        record: how.
+        worker: computer and number of the process; empty where that was lost.
+        memory_mb: most that the process has held until then; NaN where the system does not say.
+    """
+
+    record: Record
+    worker: str = ""
+    memory_mb: float = math.nan
+
+
+def measured(fit_person: Callable[[Work], Record], job: Work) -> Finished:
+    """Do a job, on the worker, and say what it took."""
+    record = fit_person(job)
+    return Finished(record, f"{platform.node()}:{os.getpid()}", _most_memory_mb())
+
+
+def note_resources(cohort: Path, finished: Finished) -> None:
+    """Add a line to the log: when a person's fit ended (UTC), how, seconds, memory and worker."""
+    path, record = cohort / LOG, finished.record
+    new = not path.exists()
+    memory = "" if math.isnan(finished.memory_mb) else f"{finished.memory_mb:.0f}"
+    ended = datetime.now(UTC).isoformat(timespec="seconds")
+    row = (ended, record.person, record.status, record.seconds, memory, finished.worker)
+    with path.open("a", encoding="utf-8", newline="") as stream:
+        lines = csv.writer(stream, lineterminator="\n")
+        if new:
+            lines.writerow(_COLUMNS)
+        lines.writerow([inert(cell) for cell in row])
+
+
+def _most_memory_mb() -> float:
+    if sys.platform == "win32":
+        from psutil import Process  # Dask needs it, too
+
+        return float(Process().memory_info().peak_wset) / 1e6
+    import resource
+
+    unit = 1.0 if sys.platform == "darwin" else 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6

@@ -1,0 +1,60 @@
+"""Workers that SLURM starts, by dask-jobqueue: each a job with one core that fits one person at a time."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from shutil import which
+from typing import Any
+
+from kinertia.errors import KinertiaError
+from kinertia.io.slurm_file import SlurmFile
+from kinertia.studies.cohort_cluster import HOW, SCHEDULING
+
+_NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
+"""Otherwise SLURM leaves a file per job where the command was started."""
+
+
+@contextmanager
+def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
+    """A client of workers that SLURM starts as it has room; its jobs end with the block.
+
+    Args:
+        wanted: what to ask for.
+        people: how many are to be fitted; never more workers.
+
+    Raises:
+        KinertiaError: dask-jobqueue or SLURM is not here.
+    """
+    if find_spec("dask_jobqueue") is None:
+        raise KinertiaError(f"--slurm needs dask-jobqueue, which is not installed; install: {HOW}")
+    if which("sbatch") is None:
+        raise KinertiaError("--slurm: there is no sbatch here; run the command on a login node of the cluster")
+    import dask
+    from dask_jobqueue import SLURMCluster
+    from distributed import Client
+
+    with (
+        dask.config.set(SCHEDULING),
+        SLURMCluster(
+            cores=1,
+            processes=1,
+            memory=f"{wanted.memory_gb:g}GB",
+            walltime=wanted.time,
+            queue=wanted.partition,
+            account=wanted.account,
+            job_extra_directives=[*wanted.directives, *([] if wanted.logs else _NO_LOGS)],
+            job_script_prologue=list(wanted.before),
+            interface=wanted.interface,
+            log_directory=wanted.logs,
+            scheduler_options={"dashboard_address": None},
+            silence_logs=logging.CRITICAL,
+            **({} if wanted.python is None else {"python": wanted.python}),
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        jobs = min(wanted.workers, people)
+        cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # another job for each that SLURM ends
+        yield client

@@ -1,0 +1,54 @@
+"""An end to a fit that has none: its process is ended from outside of Python, and a log says where it was.
+
+A reader of files may hang in compiled code, which lets nothing else of its process run: neither the thread that Dask
+has for it, nor one that would watch. The watchdog of `faulthandler` needs neither. Dask starts another process in its
+place and tries the person again there, which the log then prevents.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_ENDED = "Timeout ("
+"""As faulthandler begins."""
+
+
+@contextmanager
+def time_limit(seconds: float, log: Path, run: str) -> Iterator[None]:
+    """End this process if the block takes longer; `log` then says where it was, and in which run.
+
+    One block at a time in a process.
+    """
+    with log.open("w", encoding="utf-8") as file:
+        file.write(_heading(run))
+        file.flush()
+        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+            file.close()  # Windows removes no file that is open
+            log.unlink(missing_ok=True)
+
+
+def was_ended(log: Path, run: str) -> bool:
+    """Whether a block of this run was ended that had this log."""
+    try:
+        return log.read_text(encoding="utf-8").startswith(_heading(run) + _ENDED)
+    except OSError:
+        return False
+
+
+def no_end(seconds: float, log: Path) -> str:
+    """What to say of it."""
+    return (
+        f"its fit had no end after {seconds / 60.0:.0f} min, and its process was ended; look for what is unusual in "
+        f"its files, and send {log} to Kinertia's developers, which says where it was; the next run tries again"
+    )
+
+
+def _heading(run: str) -> str:
+    return f"run {run}\n"

@@ -1,0 +1,98 @@
+"""Cohorts whose command, scheduler, disk or reader of files fails: a rerun finishes all, byte for byte."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from cohort_faults import HANGING, fit_person_unless_hanging, write_study
+from command_line import run
+from kinertia.io.subject_file import read_subject
+from kinertia.studies.cohort_cluster import ClusterSize, Job, local_cluster, run_jobs
+from kinertia.studies.cohort_record import Place, inputs_of, prepare_folder
+
+TESTS = Path(__file__).resolve().parents[1]
+COMMAND = [sys.executable, "-c", "from kinertia.cli.start import main; main()", "cohort"]
+posix = pytest.mark.skipif(sys.platform == "win32", reason="needs fork and kill -9")
+
+
+def with_tests():
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(TESTS), *sys.path])}
+
+
+def may_mount():
+    asked = ["unshare", "-rm", "true"]
+    return bool(shutil.which("unshare")) and subprocess.run(asked, capture_output=True).returncode == 0
+
+
+@posix
+@pytest.mark.slow
+def test_killed_at_20_random_moments_and_on_full_disks_all_are_finished_byte_for_byte(tmp_path):
+    apart = ["unshare", "-rm"] if may_mount() else []
+    command = [*apart, sys.executable, TESTS / "cohort_kills.py", tmp_path, "20", "21"]
+    done = subprocess.run(command, capture_output=True, text=True, env=with_tests())
+    assert done.returncode == 0, done.stderr
+    early, with_people, *disks = json.loads(done.stdout)
+    assert early >= 10, "most kills must fall before a run has ended"
+    assert with_people >= 3, "kills must also fall after people were finished"
+    if not apart:
+        pytest.skip("full disks need a file system of one's own (unshare -rm)")
+    assert [status for status, _ in disks] == [2, 1, 2]
+    assert all("No space left on device" in words for _, words in disks)
+
+
+@pytest.mark.slow
+def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fitted(tmp_path):
+    study, cohort = write_study(tmp_path / "study", ("Anna", HANGING)), tmp_path / "out"
+    prepare_folder(cohort)
+    jobs = []
+    for name, limit_s in ((HANGING, 2.0), ("Anna", 600.0)):
+        subject = study / name / "subject.toml"
+        jobs.append(Job(name, subject, cohort, inputs_of(read_subject(subject)), 1, limit_s))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", with_tests()["PYTHONPATH"])
+        with local_cluster(ClusterSize(1, 2 * 1024**3)) as client:
+            ended = list(run_jobs(client, fit_person_unless_hanging, jobs))
+    records = {one.record.person: one.record for one in ended}
+    assert records["Anna"].fitted
+    lost = records[HANGING]
+    assert (lost.status, lost.inputs) == (70, "")
+    assert "had no end after 0 min, and its process was ended" in lost.sentence
+    assert "in hang" in Place(cohort, HANGING).log.read_text(encoding="utf-8")
+    assert not Place(cohort, HANGING).results.exists()
+
+
+@posix
+@pytest.mark.slow
+def test_a_scheduler_that_is_killed_ends_the_command_and_the_next_run_finishes(tmp_path):
+    study, out = write_study(tmp_path / "study", ("Anna",)), tmp_path / "out"
+    start = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard", "--host", "127.0.0.1"]
+    start += ["--port", "0", "--no-jupyter", "--scheduler-file", str(tmp_path / "scheduler.json")]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(start, **quiet) as scheduler:
+        while not (tmp_path / "scheduler.json").exists():
+            assert scheduler.poll() is None
+            time.sleep(0.05)
+        address = json.loads((tmp_path / "scheduler.json").read_text(encoding="utf-8"))["address"]
+        # nobody works there, so that the moment is before the end
+        command = [*COMMAND, str(study), "-o", str(out), "--scheduler", address]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            while process.stderr.readline().strip() != "people":
+                assert process.poll() is None
+            time.sleep(0.5)
+            scheduler.kill()
+            _, errors = process.communicate(timeout=120)
+    assert process.returncode == 2, errors
+    assert "the Dask scheduler is gone; what is finished is kept: run the command again" in errors
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+        outcome = run("cohort", study, "-o", out, "--scheduler", cluster.scheduler_address)
+    assert outcome.status in (0, 1), outcome.err
+    assert pd.read_csv(out / "people.csv").status.tolist() == [outcome.status]
