@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import json
 import random
 import shutil
 import subprocess
@@ -53,6 +54,10 @@ def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk,
     assert "On this computer, in 1 process, each with one thread" in printed
     assert "very roughly 1 min" in printed
     assert not (tmp_path / "out").exists()
+    planned = json.loads(run("cohort", lacking, "-o", tmp_path / "out", "--dry-run", "--json").out)["people"]
+    assert [(one["person"], one["state"], one["trials"]) for one in planned][-1] == ("Clara", "due", 1)
+    assert [one["state"] for one in planned[:2]] == ["lacking", "lacking"]
+    assert "no subject file" in planned[0]["why"]
 
 
 def test_who_cannot_be_fitted_is_in_the_list_of_people(lacking, tmp_path):
@@ -65,7 +70,10 @@ def test_who_cannot_be_fitted_is_in_the_list_of_people(lacking, tmp_path):
     assert "not fitted: Ben: " in outcome.out
     assert len(pd.read_parquet(out / "cohort.parquet")) == 0
     before = hashes(out)
-    assert run("cohort", lacking, "-o", out).status == 1
+    again = run("cohort", lacking, "-o", out, "--json")
+    assert again.status == 1
+    ended = json.loads(again.out)["people"]
+    assert [(one["person"], one["status"], one["fitted"]) for one in ended] == [("Anna", 2, False), ("Ben", 2, False)]
     assert hashes(out) == before
 
 

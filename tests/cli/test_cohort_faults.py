@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 
 from cohort_faults import HANGING, fit_person_unless_hanging, write_study
-from command_line import run
+from command_line import PROGRAM, run
 from kinertia.io.subject_file import read_subject
 from kinertia.studies.cohort_cluster import ClusterSize, Job, local_cluster, run_jobs
 from kinertia.studies.cohort_record import Place, inputs_of, prepare_folder
 
 TESTS = Path(__file__).resolve().parents[1]
-COMMAND = [sys.executable, "-c", "from kinertia.cli.start import main; main()", "cohort"]
+COMMAND = [*PROGRAM, "cohort"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs fork and kill -9")
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from cohort_faults import write_study
-from command_line import run
+from command_line import PROGRAM, run
 from kinertia.errors import FileError
 from kinertia.io.slurm_file import read_slurm
 
@@ -63,7 +63,7 @@ def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path):
         pytest.skip(reason)
     study, out = write_study(tmp_path / "study", ("Anna",)), tmp_path / "out"
     (tmp_path / "slurm.toml").write_text('workers = 1\nmemory_gb = 1\ntime = "00:10:00"\n', encoding="utf-8")
-    command = [sys.executable, "-c", "from kinertia.cli.start import main; main()", "cohort", str(study)]
+    command = [*PROGRAM, "cohort", str(study)]
     command += ["-o", str(out), "--slurm", str(tmp_path / "slurm.toml")]
     with slurm_here(tmp_path / "slurm") as found:
         found["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)

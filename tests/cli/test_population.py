@@ -1,5 +1,6 @@
 """`kinertia population`: from people's results to a file that the fits of others start from."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +39,10 @@ def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
     outcome = run("population", cohort, "--without", "p3", "-o", tmp_path / "population.toml")
     assert outcome.status == 0, outcome.err
     assert "5 people" in outcome.out
+    content = json.loads(run("population", cohort, "--without", "p3", "-o", tmp_path / "again.toml", "--json").out)
+    assert content["people"] == 5
+    assert [*content["parameters"][0]] == ["segment", "parameter", "mean", "mean_sd", "spread", "learnt"]
+    assert len(content["parameters"]) == 12 * 10
     text = (tmp_path / "population.toml").read_text(encoding="utf-8")
     assert '"hash2"' in text
     assert '"hash3"' not in text

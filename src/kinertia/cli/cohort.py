@@ -12,6 +12,7 @@ import typer
 
 from kinertia.cli.json_lines import JsonLines
 from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import be_quiet, out, plain_table, shown_progress
 from kinertia.errors import SettingsError
 from kinertia.io.file_lock import sole_use
@@ -72,7 +73,10 @@ def cohort(
     ] = False,
     force: Force = False,
     quiet: Quiet = False,
-) -> None:
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print how it ended for everybody as JSON, for scripts, and nothing else.")
+    ] = False,
+) -> Outcome:
     """Fit everybody of a study, in parallel; go on where the last run ended.
 
     Results of each person go to out/people/NAME, as kinertia fit writes them;
@@ -98,8 +102,12 @@ def cohort(
     kinertia cohort STUDY -o out --slurm slurm.toml
     """
     expect_extra()
-    if scheduler and slurm:
-        raise SettingsError("--scheduler and --slurm: give one of them")
+    for one, other, both in (
+        ("--scheduler", "--slurm", scheduler and slurm),
+        ("--json", "--json-lines", as_json and json_lines),
+    ):
+        if both:
+            raise SettingsError(f"{one} and {other}: give one of them")
     where = _Where(scheduler, None if slurm is None else read_slurm(slurm))
     lines = JsonLines(json_lines)
     be_quiet(quiet or json_lines)
@@ -107,19 +115,35 @@ def cohort(
     if dry_run:
         everybody = _standing(people, output, lines)
         _report_plan(everybody, where)
-        for one in everybody:
-            state = "lacking" if one.problem else "due" if one.due else "as before"
-            lines.say(
-                "plan", person=one.person.name, state=state, trials=one.trials, frames=one.frames, why=one.problem
-            )
-        raise typer.Exit(int(any(one.problem for one in everybody)))
+        plan = [_planned(one) for one in everybody]
+        for each in plan:
+            lines.say("plan", **each)
+        return Outcome({"people": plan}, int(any(one.problem for one in everybody)))
     results_folder(output, force)
     output.mkdir(parents=True, exist_ok=True)
     with sole_use(output / _LOCK, "the folder of this cohort"):
         outcomes = _run(people, output, where, csv, lines)
         if learn:
             outcomes += _run_again(people, outcomes, output, where, csv, lines)
-    raise typer.Exit(int(any(record.status for record in outcomes)))
+    fitted = [{**_ended(record), "fitted": record.fitted} for record in outcomes]
+    return Outcome({"folder": str(output), "people": fitted}, int(any(record.status for record in outcomes)))
+
+
+def _planned(one: Standing) -> dict[str, Any]:
+    """What is to be done for a person, for scripts."""
+    state = "lacking" if one.problem else "due" if one.due else "as before"
+    return {
+        "person": one.person.name,
+        "state": state,
+        "trials": one.trials,
+        "frames": one.frames,
+        "why": one.problem,
+    }
+
+
+def _ended(record: Record) -> dict[str, Any]:
+    """How a person's fit ended, for scripts."""
+    return {name: getattr(record, name) for name in ("person", "status", "sentence", "seconds")}
 
 
 @dataclass(frozen=True)
@@ -220,8 +244,7 @@ def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: J
             keep(output, record)
             note_resources(output, finished)
             records[record.person] = record
-            said = {name: getattr(record, name) for name in ("person", "status", "sentence", "seconds")}
-            lines.say("person", **said, memory_mb=finished.memory_mb, worker=finished.worker)
+            lines.say("person", **_ended(record), memory_mb=finished.memory_mb, worker=finished.worker)
             progress("people", len(records) / len(jobs))
     return records
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from kinertia.cli.options import Quiet, own_file
+from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
@@ -31,7 +32,7 @@ def population(
         list[str] | None, typer.Option(help="Person to leave out, by name; may be given several times.")
     ] = None,
     quiet: Quiet = False,
-) -> None:
+) -> Outcome:
     """Learn the mean body and the spread of a group from the fits of its people.
 
     Each person's trials say little about most parameters, all together say
@@ -51,6 +52,21 @@ def population(
     write_then_rename(output, population_text(content))
     _report(learnt)
     out.print(f"written to {output}; name it in subject files: population = ... under [prior]", soft_wrap=True)
+    return Outcome({"file": str(output), "people": learnt.people, "parameters": _parameters(learnt)})
+
+
+def _parameters(learnt: LearntPrior) -> list[dict[str, Any]]:
+    """What was learnt of each parameter, in the literature's deviations."""
+    names = [(segment, parameter) for segment in learnt.segments for parameter in PARAMETERS]
+    columns = (learnt.mean, learnt.mean_sd, np.sqrt(np.diag(learnt.covariance)), learnt.learnt)
+    return [
+        {
+            "segment": segment,
+            "parameter": parameter,
+            **dict(zip(("mean", "mean_sd", "spread", "learnt"), row, strict=True)),
+        }
+        for (segment, parameter), row in zip(names, np.transpose(columns).tolist(), strict=True)
+    ]
 
 
 def _folders(results: list[Path]) -> list[Path]:

@@ -38,7 +38,7 @@ _TITLE_LETTERS = 36
 _DOTS_PER_INCH = 600
 _FORMATS = (".svg", ".pdf", ".eps", ".png", ".tif", ".tiff")
 _DASHES = {"dot": ":", "dash": "--"}
-_MARKERS = {"circle": "o", "diamond": "D", "line-ns-open": "|"}
+_MARKERS = {"circle": "o", "diamond": "D", "square": "s"}
 _STYLE: Any = {
     "font.size": 7,
     "axes.titlesize": 7,
