@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize_scalar
 
+from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.prepare import calibrate
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
@@ -54,7 +55,8 @@ def main(shared: Path) -> None:
     present = {s: [m for m in labels if m in walk.markers.labels] for s, labels in marker_set.foot_labels().items()}
     trial = build_trial(walk, present)
     subject = Subject(name="walker", sex="male", mass_kg=72.6, height_m=1.803)
-    skeleton = calibrate(build_gait27(static, marker_set, subject.height_m, subject.sex), [trial], subject)[0]
+    model = build_gait27(static, marker_set, subject.height_m, subject.sex)
+    skeleton, _ = calibrate(model, [trial], CarriedMass.of(subject.mass_kg, []))
     kinematics = solve_kinematics(skeleton, trial, 0.0, 8.0)
     write_standing(skeleton, static)
     write_walk(kinematics, trial)

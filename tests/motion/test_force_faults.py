@@ -64,6 +64,13 @@ def test_the_sign_of_one_plate(walk, axis, plate):
     assert one_plate_trouble(with_force(walk, lambda force: force * np.prod(signs, axis=0))) == ""
 
 
+@pytest.mark.parametrize("newton", [-50.0, 50.0])
+def test_a_wrong_zero_is_not_called_a_wrong_sign(walk, newton):
+    """Along the walk; across it a foot pushes to one side all the time, and both look alike."""
+    zero = np.array([newton, 0.0, 0.0])
+    assert one_plate_trouble(with_force(walk, lambda force: force + zero * (force[..., 1:2] > 0.0))) == ""
+
+
 def one_plate_trouble(walk):
     marker_set = choose_marker_set(walk.markers.labels)
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}

@@ -1,11 +1,7 @@
 """The pages against the program: every example runs, every table says what is there, every link leads somewhere."""
 
-import os
 import re
 import shlex
-import subprocess
-import sys
-from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -142,46 +138,6 @@ def test_results_page_names_every_file_and_column(fit_of):
     assert set(_column("results.md", "<!-- keys of a trial -->")) == set(fitted.trial)
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """The built site."""
-    for module in ("material", "mkdocstrings_handlers.python", "latex2mathml"):
-        pytest.importorskip(module, reason='needs the documentation tools: pip install -e ".[docs]"')
-    folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
-    done = subprocess.run(
-        command, cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder
-
-
-def test_site_has_every_page_and_no_equation_left_over(site):
-    for page in PAGES[:-1]:
-        built = (site / f"{page.stem}.html").read_text(encoding="utf-8")
-        assert "arithmatex" not in built
-    method = (site / "method.html").read_text(encoding="utf-8")
-    assert method.count('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block">') >= 5
-
-
-def test_site_fetches_nothing_from_the_network(site):
-    for page in site.glob("*.html"):
-        built = page.read_text(encoding="utf-8")
-        for tag in re.findall(r"<(?:script|link|img|iframe)[^>]*>", built):
-            assert not re.search(r'(?:src|href)="(?:https?:)?//', tag), f"{page.name}: {tag}"
-    for style in site.rglob("*.css"):
-        assert not re.search(r"url\([\"']?https?:", style.read_text(encoding="utf-8")), style.name
-
-
 def test_the_house_is_drawn_from_the_contract():
     assert house.PICTURE.read_text(encoding="utf-8") == house.drawn()
     assert house.PAGE.read_text(encoding="utf-8") == house.filled(house.PAGE.read_text(encoding="utf-8"))
-
-
-def test_site_tells_of_every_exported_name(site):
-    import kinertia
-
-    api_page = "".join(page.read_text(encoding="utf-8") for page in (site / "api").glob("*.html"))
-    for name in kinertia.__all__:
-        assert re.search(rf'id="kinertia\.[\w.]*{name}"', api_page), name
-    assert Path(site / "search" / "search_index.js").is_file()

@@ -120,7 +120,7 @@ def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, st
     """Which single plate has a horizontal force of the wrong sign, where others have it right; empty where none.
 
     With its sign turned, the forces must move the body much more as the markers show: more than with that of any other
-    plate, or of all.
+    plate, or of all, or with another zero.
 
     Args:
         plates: as read.
@@ -133,21 +133,22 @@ def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, st
     for axis, k in _HORIZONTAL.items():
         shown = _middled([(part.pelvis[:, k] + part.centre[:, k]) / 2 for part in parts])
         caused = _middled([part.caused[:, k] for part in parts])
-        by_plate = np.stack(
-            [_middled([_impulse(plates, p, k, part) for part in parts]) for p in range(len(plates.names))]
-        )
-        left = {None: float(np.std(caused - shown)), -1: float(np.std(-caused - shown))}
-        left |= {p: float(np.std(caused - 2.0 * by_plate[p] - shown)) for p in range(len(plates.names))}
-        best, *others = sorted(left, key=lambda one: left[one])
-        if best is None or best < 0 or left[best] > _ONE_TURNED * left[None] or left[None] < _LEAST_TURNED_M_S:
-            continue
-        if left[best] > _CLEARLY_BEST * left[others[0]]:
+        off = caused - shown
+        turned = [
+            off - 2.0 * _middled([_impulse(plates, p, k, part) for part in parts]) for p in range(len(plates.names))
+        ]
+        as_read, *of_plates = (float(np.std(each)) for each in (off, *turned))
+        best = int(np.argmin(of_plates))
+        zero_off = np.concatenate([_without_trend(part.time, part.caused[:, k] - part.centre[:, k]) for part in parts])
+        rivals = [float(np.std(caused + shown)), float(np.std(zero_off)), *np.delete(of_plates, best)]
+        least = min(_ONE_TURNED * as_read, _CLEARLY_BEST * min(rivals))
+        if of_plates[best] > least or as_read < _LEAST_TURNED_M_S:
             continue
         return (
             f"the horizontal force of {plates.names[best]} along {axis} has the wrong sign, and that of the other "
-            f"plates has not: with it, what the forces cause differs from the velocity of the body by {left[None]:.2f} "
-            f"m/s (RMS), and by {left[best]:.2f} m/s once it is turned; turn the sign of that axis of this plate (or "
-            "correct the order of its corners) before export"
+            f"plates has not: with it, what the forces cause differs from the velocity of the body by {as_read:.2f} "
+            f"m/s (RMS), and by {of_plates[best]:.2f} m/s once it is turned; turn the sign of that axis of this plate "
+            "(or correct the order of its corners) before export"
         )
     return ""
 

