@@ -54,10 +54,11 @@ class BlockBand:
 
     def backward(self, right: np.ndarray, after: np.ndarray | None = None) -> np.ndarray:
         """Solve L^T x = right; right is (b, k, m), and `after` (k, m) the solution's next block where it goes on."""
-        result, known = np.empty_like(right), after
-        for i in range(len(right) - 1, -1, -1):
-            left = right[i] if known is None else right[i] - self.below[i].T @ known
-            result[i] = _solved(self.diagonal[i], left, transposed=True)
+        result, known = right.copy(), after
+        for i in range(len(result) - 1, -1, -1):
+            if known is not None:
+                _subtract_product(result[i], self.below[i].T, known)
+            _solve_in_place(self.diagonal[i], result[i], transposed=True)
             known = result[i]
         return result
 
@@ -68,7 +69,8 @@ class BlockBand:
         diagonal, below, next_one = np.empty_like(self.diagonal), np.empty_like(self.below), after
         unit = np.eye(self.diagonal.shape[1])
         for i in range(len(diagonal) - 1, -1, -1):
-            half = _solved(self.diagonal[i], unit)
+            half = unit.copy()
+            _solve_in_place(self.diagonal[i], half)
             diagonal[i] = half.T @ half
             if next_one is not None:
                 carried = self.below[i] @ half
@@ -89,19 +91,13 @@ def _cholesky(matrix: np.ndarray) -> np.ndarray:
     return result
 
 
-def _solved(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-    """L^-1 right, or L^-T right."""
-    result: np.ndarray = dtrsm(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed)).T
-    return result
-
-
-def _solve_in_place(lower: np.ndarray, right: np.ndarray) -> None:
-    """L^-1 right, in its place."""
-    dtrsm(1.0, lower.T, right.T, side=1, lower=0, overwrite_b=1)
+def _solve_in_place(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
+    """L^-1 right, or L^-T right, in the place of `right`, whose rows must lie one after the other."""
+    dtrsm(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed), overwrite_b=1)
 
 
 def _subtract_product(target: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
-    """Take left @ right off the target, in its place."""
+    """Take left @ right off the target, in its place; its rows must lie one after the other."""
     dgemm(-1.0, right.T, left.T, beta=1.0, c=target.T, overwrite_c=1)
 
 
