@@ -1,10 +1,11 @@
 """What a cohort costs beside its single fits, and how memory grows with its people: writes docs/cohort-speed.md.
 
-    python benchmarks/cohort.py                 # 200 people and 50: an hour on two quiet cores
-    python benchmarks/cohort.py --people 8 --fewer 4 --dry-run
+    python benchmarks/cohort.py                 # 50 people and 200: some 20 minutes on two quiet cores
+    python benchmarks/cohort.py --people 8 --fewer 4 --sample 4 --dry-run
 
 Synthetic people, each with a body drawn from the literature's prior, walk past two plates; their files are written as a
-laboratory's. Single fits run one after the other in one process that does what a worker does; the cohort is the
+laboratory's. Single fits are those of a sample of the people, before, between and after the cohorts, in a process that
+does what a worker does: one after the other, and in as many processes at once as the cohort has. The cohort is the
 command, from its start to its end. Memory is that of all its processes together, looked at twice a second.
 """
 
@@ -35,12 +36,11 @@ from measured_trials import table
 from synthetic_walks import FIRST_SEED
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "cohort-speed.md"
-PEOPLE, FEWER = 200, 50
+PEOPLE, FEWER, SAMPLE = 200, 50, 20
 WALK_S = 2.5
 ALLOWED = 1.15
 DATA_SET_PEOPLE, DATA_SET_FRAMES = 273, 24_000_000
-SECONDS_PER_FRAME, PAGE = 4.24e-3, "long-trials.md"
-"""Of ten minutes of gait, as that page has them: a person of the data set has a quarter of an hour."""
+PAGE = "long-trials.md"
 _LOOK_S = 0.5
 
 
@@ -72,19 +72,45 @@ def write_people(folder: Path, count: int) -> Path:
     return folder
 
 
-def single_fits(study: Path, out: Path) -> list[float]:
-    """Seconds of each person in this process, results and rows of the tables included."""
+@dataclass(frozen=True)
+class Singles:
+    """Seconds of single fits of the same people, results and rows of the tables included.
+
+    Attributes:
+        alone: one after the other.
+        at_once: in as many processes side by side as a cohort has.
+    """
+
+    alone: list[float]
+    at_once: list[float]
+
+
+def fit_singly(study: Path, out: Path, numbers: list[int]) -> list[float]:
+    """Seconds of these people in this process."""
     prepare_folder(out)
+    everybody = list(standings(people_of(study, out), out))
+    fit_person(Job.of(everybody[numbers[0]], out))  # what is loaded and compiled once
     seconds = []
-    for number, one in enumerate(standings(people_of(study, out), out)):
-        job = Job.of(one, out)
-        if number == 0:
-            fit_person(job)  # what is loaded and compiled once
+    for number in numbers:
         began = time.perf_counter()
-        record = fit_person(job)
+        record = fit_person(Job.of(everybody[number], out))
         seconds.append(time.perf_counter() - began)
         assert record.fitted, record.sentence
     return seconds
+
+
+def single_fits(study: Path, numbers: list[int], workers: int) -> Singles:
+    """Of these people, each way in processes of its own."""
+    parts = [part for part in (numbers[k::workers] for k in range(workers)) if part]
+    return Singles(_in_processes(study, [numbers]), _in_processes(study, parts))
+
+
+def _in_processes(study: Path, parts: list[list[int]]) -> list[float]:
+    command = [sys.executable, __file__, "--alone", str(study), "--numbers"]
+    running = [subprocess.Popen([*command, json.dumps(part)], stdout=subprocess.PIPE) for part in parts]
+    outputs = [process.communicate()[0] for process in running]
+    assert not any(process.returncode for process in running)
+    return [seconds for output in outputs for seconds in json.loads(output)]
 
 
 def cohort(study: Path, out: Path, people: int) -> Run:
@@ -121,11 +147,16 @@ def _own_mb(process: psutil.Process) -> float:
         return 0.0
 
 
-def document(singles: list[float], runs: list[Run], workers: int) -> str:
+def seconds_per_frame() -> float:
+    """Of ten minutes of gait, as that page has them: a person of the data set has a quarter of an hour."""
+    lines = (DOCUMENT.parent / PAGE).read_text(encoding="utf-8").splitlines()
+    row = next(line for line in lines if line.startswith("| 10 min |"))
+    return 1e-3 * float(row.strip("| ").split("|")[-1])
+
+
+def document(singles: Singles, runs: list[Run], workers: int) -> str:
     """The text of the page."""
     fewer, all_of_them = runs
-    ideal_s = sum(singles) / workers
-    ratio = all_of_them.wall_s / ideal_s
     rows = [
         [
             str(run.people),
@@ -137,30 +168,42 @@ def document(singles: list[float], runs: list[Run], workers: int) -> str:
         for run in runs
     ]
     headings = ["people", "seconds", "seconds per person", "most memory (MB)", "second half (MB)"]
-    per_person_s = sum(singles) / len(singles)
-    frames_h, people_h = DATA_SET_FRAMES * SECONDS_PER_FRAME / 3600.0, DATA_SET_PEOPLE * per_person_s / 3600.0
+    ideals, count = {}, all_of_them.people
+    for name, seconds in (("alone", singles.alone), ("at once", singles.at_once)):
+        each_s = sum(seconds) / len(seconds)
+        ideals[name] = each_s, each_s * count / workers
+    ratio, ratio_at_once = (all_of_them.wall_s / ideal_s for _, ideal_s in ideals.values())
+    frame_s = seconds_per_frame()
+    frames_h, people_h = DATA_SET_FRAMES * frame_s / 3600.0, DATA_SET_PEOPLE * ideals["alone"][0] / 3600.0
     total_h = ratio * (frames_h + people_h)
     listed = ", ".join(f"{total_h / cores:.1f} h on {cores} cores" for cores in sorted({2, workers, 64}))
     return f"""# Speed of cohorts
 
-{len(singles)} synthetic people, {WALK_S:g} s of gait each (markers and plates at 100 Hz), as files; {workers} processes
-on {os.cpu_count()} cores. This page is written by `python benchmarks/cohort.py`; do not edit it by hand.
+{fewer.people} and {all_of_them.people} synthetic people, {WALK_S:g} s of gait each (markers and plates at 100 Hz), as
+files; {workers} processes on {os.cpu_count()} cores. This page is written by `python benchmarks/cohort.py`; do not edit
+it by hand.
 
 {table(headings, rows)}
 
-- Single fits one after the other take {sum(singles):.0f} s, {per_person_s:.2f} s each, results included; divided by
-  {workers}: {ideal_s:.0f} s. The cohort, tables and page included, takes {ratio:.2f} times that
-  ({"within" if ratio <= ALLOWED else "more than"} {ALLOWED:g}).
+- Single fits, results included, take {ideals["alone"][0]:.2f} s one after the other ({len(singles.alone)} people,
+  before, between and after the cohorts). For {count} people, divided by {workers}: {ideals["alone"][1]:.0f} s. The
+  cohort, tables and page included, takes {ratio:.2f} times that ({_judged(ratio)}).
+- The same fits in {workers} processes side by side, which share the computer's memory and caches as a cohort's do, take
+  {ideals["at once"][0]:.2f} s each. Of that the cohort takes {ratio_at_once:.2f} times ({_judged(ratio_at_once)}).
 - From {fewer.people} to {all_of_them.people} people the most memory of all processes together goes from
   {fewer.most_mb:.0f} to {all_of_them.most_mb:.0f} MB.
 
 ## {DATA_SET_FRAMES // 1_000_000} million frames
 
 The largest public data set has {DATA_SET_PEOPLE} people and {DATA_SET_FRAMES // 1_000_000} million frames,
-{DATA_SET_FRAMES // DATA_SET_PEOPLE} of each. At {1e3 * SECONDS_PER_FRAME:.2f} ms a frame ([long trials]({PAGE}), ten
+{DATA_SET_FRAMES // DATA_SET_PEOPLE} of each. At {1e3 * frame_s:.2f} ms a frame ([long trials]({PAGE}), ten
 minutes) the frames take {frames_h:.1f} h of one core, what each person costs besides {people_h:.1f} h, and both
 {ratio:.2f} times as long in a cohort: {listed}. This is arithmetic; nobody has run it.
 """
+
+
+def _judged(ratio: float) -> str:
+    return f"{'within' if ratio <= ALLOWED else 'more than'} {ALLOWED:g}"
 
 
 def main() -> None:
@@ -168,21 +211,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
     parser.add_argument("--people", type=int, default=PEOPLE)
     parser.add_argument("--fewer", type=int, default=FEWER)
+    parser.add_argument("--sample", type=int, default=SAMPLE, help="people whose single fits are timed, three at least")
     parser.add_argument("--dry-run", action="store_true", help="print the page, and write none")
-    parser.add_argument("--alone", help="study: its single fits in this process, as JSON")
+    parser.add_argument("--alone", help="study: single fits in this process, as JSON")
+    parser.add_argument("--numbers", type=json.loads, help="of whom, as JSON")
     given = parser.parse_args()
-    if given.alone:
-        with tempfile.TemporaryDirectory() as folder:
-            print(json.dumps(single_fits(Path(given.alone), Path(folder) / "out")))
-        return
     with tempfile.TemporaryDirectory() as folder:
-        studies = [write_people(Path(folder) / f"study{count}", count) for count in (given.fewer, given.people)]
-        alone = [sys.executable, __file__, "--alone", str(studies[1])]
-        singles = json.loads(subprocess.run(alone, check=True, stdout=subprocess.PIPE).stdout)
-        counts = (given.fewer, given.people)
-        runs = [cohort(study, study.with_suffix(".out"), count) for study, count in zip(studies, counts, strict=True)]
-        text = document(singles, runs, local_size(given.people).workers)
-    print(json.dumps([asdict(run) for run in runs]), file=sys.stderr)
+        if given.alone:
+            print(json.dumps(fit_singly(Path(given.alone), Path(folder) / "out", given.numbers)))
+            return
+        few, study = (write_people(Path(folder) / f"study{count}", count) for count in (given.fewer, given.people))
+        workers = local_size(given.people).workers
+        spread = np.linspace(0, given.people - 1, given.sample).round().astype(int).tolist()
+        rounds, runs = [single_fits(study, spread[::3], workers)], []
+        for k, (one, count) in enumerate(((few, given.fewer), (study, given.people)), start=1):
+            runs.append(cohort(one, one.with_suffix(".out"), count))
+            rounds.append(single_fits(study, spread[k::3], workers))
+        singles = Singles(*([s for one in rounds for s in getattr(one, name)] for name in ("alone", "at_once")))
+        text = document(singles, runs, workers)
+    print(json.dumps({**asdict(singles), "runs": [asdict(run) for run in runs]}), file=sys.stderr)
     print(text)
     if not given.dry_run:
         DOCUMENT.write_text(text, encoding="utf-8")

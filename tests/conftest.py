@@ -46,6 +46,10 @@ def pytest_sessionstart(session):
         compile_once(lambda stage, share: print(f"{stage} (a minute)") if share == 0.0 else None)
 
 
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: item.get_closest_marker("first") is None)
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of measured trials that are not part of the package."""

@@ -248,7 +248,7 @@ def run(folder: Path, seed: int, first: int, cases: int, commands: int) -> int:
     os.chdir(folder)
     write_files(folder)
     sound = {name: (folder / name.replace("table", "walk")).read_bytes() for name in READERS}
-    c3d.read_apart, ezc3d_library._SECONDS = forked, 1.0  # nobody waits for a library that hangs
+    c3d.read_apart, ezc3d_library._SECONDS = forked, 0.2  # of ten milliseconds; nobody waits for a library that hangs
     used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * 4096
     resource.setrlimit(resource.RLIMIT_AS, (used + BYTES, used + BYTES))
     accepted = 0

@@ -1,16 +1,21 @@
-"""Invented results of every study, of `plan` and of `crossval`: small ones, for tests of their pages and tables."""
+"""Small results of every study, of `plan`, `crossval` and a cohort, for tests of their pages and tables."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
+from pathlib import Path
 
 import numpy as np
 
+from kinertia.estimation.result import Fit
+from kinertia.io.provenance import VERSION
 from kinertia.model.bsp import PARAMETERS
+from kinertia.report.cohort_tables import write_person, write_tables
 from kinertia.studies.accuracy import CLASSES, ClassAccuracy, ScenarioAccuracy
+from kinertia.studies.cohort_record import Place, Record
 from kinertia.studies.cross_validation import Explained, HeldOut
 from kinertia.studies.faults import FaultOutcome, Finding, SoundWalk
 from kinertia.studies.joint_accuracy import JOINTS, JointAccuracy
 from kinertia.studies.plan import Plan
-from kinertia.studies.populations import PopulationAccuracy, RucksackAccuracy
+from kinertia.studies.populations import MeanAccuracy, PopulationAccuracy, PopulationsStudy, RucksackAccuracy
 from kinertia.studies.sensitivity import CONDITIONS as NOISES
 from kinertia.studies.sensitivity import Sensitivity
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Draw, Errors, Table1
@@ -41,13 +46,16 @@ ACCURACIES = {
     )
     for name in ("one", "two")
 }
-POPULATIONS = [
-    PopulationAccuracy(
-        "children", prior, 4, *2 * [{"mass": 0.3, "CoM": 0.01, "inertia": 0.01}], 0.93, 1.2, 2.4, unlike=0.25
-    )
-    for prior in ("adults'", "their own")
-]
-RUCKSACKS = [RucksackAccuracy(4, None, 0.9, 1.0, 1.0), RucksackAccuracy(4, 0.3, 0.4, 0.5, 1.0)]
+POPULATIONS_STUDY = PopulationsStudy(
+    tuple(
+        PopulationAccuracy(
+            "children", prior, 4, *2 * [{"mass": 0.3, "CoM": 0.01, "inertia": 0.01}], 0.93, 1.2, 2.4, unlike=0.25
+        )
+        for prior in ("adults'", "their own")
+    ),
+    (MeanAccuracy("children", 4, 60, 0.3, 1.1, 0.95, 0.96),),
+    (RucksackAccuracy(4, None, 0.9, 1.0, 1.0), RucksackAccuracy(4, 0.3, 0.4, 0.5, 1.0)),
+)
 
 
 def sensitivity() -> Sensitivity:
@@ -86,3 +94,25 @@ def variants() -> dict[str, Table1]:
 
     draws = (draw(0, 2.0, CONDITIONS), draw(1, 4.0, NOISY))
     return {title: Table1(("a",) * 49, np.ones(49), draws, 1, title) for title in (LONG, LONG_GROUND)}
+
+
+def person_record(name: str, status: int = 0, sentence: str = "") -> Record:
+    """How one person of a cohort ended."""
+    return Record(name, status, sentence, "9f", VERSION, 1, 1.0)
+
+
+def write_cohort(fit: Fit, folder: Path) -> None:
+    """Eight people alike but for small differences, of whom one has a heavy thigh; two without results."""
+    records = []
+    for k, name in enumerate(["Anna", "Ben", "Zoë &", "D", "E", "F", "G", "H"]):
+        table = fit.estimate.table() * (1.0 + 0.001 * k)
+        if name == "Zoë &":
+            table[2, 0] += 5.0
+        person = replace(fit, estimate=type(fit.estimate).from_table(fit.estimate.segments, table))
+        Place(folder, name).results.mkdir(parents=True)
+        write_person(Place(folder, name).results, name, person)
+        failed = "walk: residual force 12.3 N is beyond 10 N; look" if k == 1 else ""
+        records.append(person_record(name, int(k == 1), failed))
+    for k in range(2):
+        records.append(person_record(f"lost{k}", 2, f"/a/b{k}.toml, line {k}: trial 'w{k}': no force plates"))
+    write_tables(folder, records, with_csv=False)

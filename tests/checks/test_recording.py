@@ -14,7 +14,7 @@ from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import walk, walking_subject
-from kinertia.trial.data import Markers
+from kinertia.trial.data import Markers, PlateLoads
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,15 @@ def test_left_and_right_swapped_look_like_walking_backwards(lab, marker_set):
 @pytest.mark.parametrize(("mass_kg", "level"), [(72.6, "pass"), (76.0, "caution"), (90.0, "fail")])
 def test_mass_on_the_scale(lab, marker_set, mass_kg, level):
     check = check_recording(lab.walk, marker_set, mass_kg)
-    assert f"stated mass {mass_kg:.1f} kg" in sentences(check, level)
+    said = sentences(check, level)
+    assert f"stated mass {mass_kg:.1f} kg" in said
+    assert ("on no plate (a handrail, a walker, crutches" in said) == (level != "pass")
+
+
+def test_more_than_the_scale_says_is_no_handrail(lab, marker_set):
+    said = sentences(check_recording(lab.walk, marker_set, 69.0), "caution")
+    assert "stated mass 69.0 kg" in said
+    assert "handrail" not in said
 
 
 def test_no_forces_and_no_measured_frame(lab, marker_set):
@@ -167,6 +175,24 @@ def test_static_trial_without_a_landmark(lab, marker_set):
     check = check_recording(without(lab.static, "V.Sacral"), marker_set)
     assert "no model can be built from this static trial" in sentences(check, "fail")
     assert "V.Sacral" in sentences(check, "fail")
+
+
+@pytest.mark.parametrize(
+    ("markers", "forces"),
+    [
+        ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+        ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
+    ],
+)
+def test_mass_on_one_belt_is_that_of_two_plates(measured_recording, markers, forces):
+    """While both feet stand on it, the sum of their loads is known, which is all that weighs."""
+    two = measured_recording(markers, forces)
+    plates = two.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    one = replace(two, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+    by_two, by_one = (check_recording(recording).mass for recording in (two, one))
+    assert by_one.over == by_two.over == "whole strides"
+    assert by_one.mass_kg == pytest.approx(by_two.mass_kg, rel=0.005)
 
 
 WALKS = {

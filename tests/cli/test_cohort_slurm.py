@@ -8,10 +8,13 @@ import time
 import pandas as pd
 import pytest
 
+import fake_slurm
 from cohort_faults import write_study
 from command_line import PROGRAM, run
-from kinertia.errors import FileError
-from kinertia.io.slurm_file import read_slurm
+from kinertia.errors import FileError, KinertiaError
+from kinertia.io.slurm_file import SlurmFile, read_slurm
+from kinertia.studies.cohort_cluster import Job, run_jobs
+from kinertia.studies.cohort_slurm import slurm_cluster
 
 
 def test_the_file_says_what_to_ask_for(tmp_path):
@@ -53,8 +56,52 @@ def test_without_slurm_it_says_what_to_do(tmp_path, measured_walk, monkeypatch):
     assert "On SLURM, in 1 jobs of 4 GB" in " ".join(outcome.out.split())
 
 
+@pytest.fixture
+def slurm_that(tmp_path, monkeypatch):
+    """Commands of SLURM on the path, with what becomes of each job; looked at often."""
+    if sys.platform == "win32":
+        pytest.skip("SLURM is not Windows'")
+
+    def that(*answers):
+        folder = fake_slurm.fake_slurm(tmp_path / "bin", list(answers))
+        monkeypatch.setenv("PATH", os.pathsep.join([str(folder), os.environ["PATH"]]))
+        monkeypatch.setattr("kinertia.studies.cohort_slurm_jobs.LOOK_S", 0.1)
+        return folder
+
+    return that
+
+
+def test_jobs_that_sbatch_refuses_are_told_at_once(slurm_that):
+    slurm_that("refused")
+    with pytest.raises(KinertiaError, match=f"sbatch takes no job: {fake_slurm.REFUSAL}"):  # noqa: SIM117
+        with slurm_cluster(SlurmFile(partition="long"), 1):
+            pytest.fail("there is no cluster")
+
+
 @pytest.mark.slow
-def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path):
+@pytest.mark.parametrize("kept", [True, False])
+def test_jobs_of_which_none_reports_are_given_up_with_what_they_said(slurm_that, tmp_path, kept):
+    folder = slurm_that("ends", "refused", "ends")
+    wanted = SlurmFile(workers=2, logs=str(tmp_path / "logs") if kept else None)
+    words = (
+        r"\d SLURM jobs ended before their workers reported .*1 more were not taken by sbatch.* and none did; likely "
+    )
+    words += f".*log says: {fake_slurm.LAST_WORDS}" if kept else '.*logs = "slurm-logs"'
+    with pytest.raises(KinertiaError, match=words), slurm_cluster(wanted, 5) as client:
+        list(run_jobs(client, len, [Job("Anna", tmp_path, tmp_path, "", 1, 60.0)]))
+    assert len(list(folder.glob("*.job"))) >= 6
+
+
+@pytest.mark.slow
+def test_a_job_that_ends_before_its_worker_reports_is_asked_for_again(slurm_that):
+    folder = slurm_that("ends", "ends", "runs")
+    with slurm_cluster(SlurmFile(workers=1, memory_gb=1.0), 5) as client:
+        assert client.submit(abs, -3).result(timeout=120) == 3
+    assert len(list(folder.glob("*.job"))) == 3
+
+
+@pytest.mark.slow
+def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path, monkeypatch):
     if sys.platform != "linux":
         pytest.skip("needs SLURM, which is Linux's")
     from slurm_here import lacking, slurm_here
@@ -66,15 +113,29 @@ def test_a_cohort_runs_on_a_real_slurm_also_when_a_job_is_ended(tmp_path):
     command = [*PROGRAM, "cohort", str(study)]
     command += ["-o", str(out), "--slurm", str(tmp_path / "slurm.toml")]
     with slurm_here(tmp_path / "slurm") as found:
+        _dies_once_and_is_replaced(found, tmp_path, monkeypatch)
         found["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "env": found, "cwd": tmp_path}
         with subprocess.Popen(command, **pipes) as process:
             while not (out / "failed" / "Anna.log").exists():  # as long as somebody is at work
                 assert process.poll() is None
                 time.sleep(0.05)
-            subprocess.run(["scancel", "1"], env=found, check=True)
+            queue = ["squeue", "--noheader", "--format=%A"]
+            (job,) = subprocess.run(queue, env=found, check=True, capture_output=True, text=True).stdout.split()
+            subprocess.run(["scancel", job], env=found, check=True)
             printed, _ = process.communicate(timeout=300)
     assert process.returncode in (0, 1), printed
     assert pd.read_csv(out / "people.csv").status.tolist() == [process.returncode]
     assert (out / "people" / "Anna" / "report.html").is_file()
     assert not list(tmp_path.glob("slurm-*.out"))
+
+
+def _dies_once_and_is_replaced(found, folder, monkeypatch):
+    """The first job ends before there is a worker."""
+    for name in ("PATH", "SLURM_CONF"):
+        monkeypatch.setenv(name, found[name])
+    monkeypatch.setattr("kinertia.studies.cohort_slurm_jobs.LOOK_S", 1.0)
+    dies_once = f"test -e {folder}/died || {{ touch {folder}/died; exit 1; }}"
+    with slurm_cluster(SlurmFile(workers=1, memory_gb=1.0, before=(dies_once,)), 1) as client:
+        assert client.submit(abs, -3).result(timeout=120) == 3
+    assert (folder / "died").exists()

@@ -117,3 +117,5 @@ def test_compare_prints_json_for_scripts(demo_run, tmp_path):
     assert [row["segment"] for row in rows] == table.segment.tolist()[-len(rows) :]
     assert rows[0]["change"] == pytest.approx(rows[0]["other"] - rows[0]["first"])
     assert {row["sd"] for row in rows} == {None}, "two-level has no error bars"
+    told = run("compare", demo_run[1], demo_run[1] / "two-level", "-o", tmp_path / "out").out
+    assert "two-level against out: no error bars, differences only" in " ".join(told.split())

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from kinertia.errors import PriorError, SettingsError
+from kinertia.errors import KinertiaError, PriorError, SettingsError
 from kinertia.estimation.attached import with_attached
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import ForceMass
+from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.known_body import with_known_body
 from kinertia.estimation.prepare import Prepared, prepare
 from kinertia.estimation.prior import literature_prior
@@ -22,6 +23,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics, residual
 from kinertia.settings import Attached, KnownSegment, PriorSettings, Settings, Subject
 from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import MASS_KG, walk, walking_subject
 
 PACK = {"name": "rucksack", "segment": "torso", "com_mm": [-200, 300, 0], "on_scale": False}
@@ -133,6 +135,21 @@ def test_an_unknown_mass_is_found_within_its_error_bar_and_moments_are_better_fo
     assert np.sqrt(np.mean(np.square(errors))) < 1.5, "beside 11 kg of prior deviation"
     after, before = np.mean(moments, axis=0)
     assert after < before
+
+
+@pytest.mark.slow
+def test_a_rucksack_that_nobody_declared_is_named(tmp_path):
+    """Files of a person who walks with 10 kg on the back, which the scale did not weigh."""
+    pack = with_attached(ready(Attached(mass_kg=10.0, **PACK)))
+    person = replace(walking_subject(), skeleton=pack.skeleton, bsp=pack.prior.mean)
+    write_lab(
+        tmp_path / "lab",
+        record(person, walk(person, 2.5, trapezoid=False), LabNoise(), np.random.default_rng(0)),
+    )
+    with pytest.raises(
+        KinertiaError, match=r"stated mass 72\.6 kg: if something was worn or carried that the scale did"
+    ):
+        fit_subject(tmp_path / "lab" / "subject.toml")
 
 
 @pytest.mark.parametrize(

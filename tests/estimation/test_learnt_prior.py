@@ -6,14 +6,21 @@ import numpy as np
 import pytest
 
 from kinertia.errors import PriorError
-from kinertia.estimation.learnt_prior import BETWEEN, WITHIN, PersonInformation, learn
+from kinertia.estimation.learnt_prior import BETWEEN, WITHIN, learn
+from kinertia.estimation.person_information import PersonInformation, information_of
 from kinertia.estimation.prior import literature_prior
+from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import walking_subject
 
-PRIOR = literature_prior(walking_subject().literature)
-SEGMENTS = PRIOR.mean.segments[:4]
+WHOLE = literature_prior(walking_subject().literature)
+SEGMENTS = WHOLE.mean.segments[:4]
 SIZE = 10 * len(SEGMENTS)
-R = (PRIOR.covariance / np.outer(PRIOR.sd, PRIOR.sd))[:SIZE, :SIZE]
+PRIOR = replace(
+    WHOLE,
+    mean=type(WHOLE.mean).from_table(SEGMENTS, WHOLE.mean.table()[:4]),
+    covariance=WHOLE.covariance[:SIZE, :SIZE],
+)
+R = PRIOR.covariance / np.outer(PRIOR.sd, PRIOR.sd)
 
 
 def group(rng, count, mean=None, within=WITHIN):
@@ -25,7 +32,7 @@ def group(rng, count, mean=None, within=WITHIN):
     for k, person in enumerate(truth):
         seen = rng.standard_normal((12, SIZE)) / np.sqrt(SIZE) / 0.3
         noisy = seen @ person + rng.standard_normal(12)
-        people.append(PersonInformation(f"p{k}", SEGMENTS, seen.T @ seen, seen.T @ noisy, R))
+        people.append(PersonInformation(f"p{k}", PRIOR, seen.T @ seen, seen.T @ noisy))
     return mean, truth, people
 
 
@@ -59,36 +66,68 @@ def test_where_people_say_nothing_the_mean_stays_and_bars_grow():
     silent = [replace(one, information=np.zeros((SIZE, SIZE)), right=np.zeros(SIZE)) for one in people]
     learnt = learn(silent)
     np.testing.assert_allclose(learnt.mean, 0.0, atol=1e-12)
-    np.testing.assert_allclose(learnt.covariance, (BETWEEN + WITHIN) * R, atol=1e-6)
+    np.testing.assert_allclose(np.diag(learnt.covariance), BETWEEN + WITHIN, rtol=1e-6)
+    alone = [k for k in range(SIZE) if k % 10 < 4]  # inertia goes with the mean's mass
+    expected = (BETWEEN + WITHIN) * R[np.ix_(alone, alone)]
+    np.testing.assert_allclose(learnt.covariance[np.ix_(alone, alone)], expected, atol=0.02)
+    assert learnt.covariance[0, 4] > 0.4 * BETWEEN
     assert np.abs(learnt.learnt).max() < 1e-6
 
 
 @pytest.mark.slow
-def test_a_start_elsewhere_ends_at_the_same():
-    _, _, people = group(np.random.default_rng(1), 40)
-    one, other = learn(people), learn(people, start=learn(people[1:]))
-    np.testing.assert_allclose(one.mean, other.mean, atol=0.02)
+def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
+    """What one walk shows of a body, by a fit; bodies and noise are drawn, 60 people to learn from and 40 more."""
+    seen = information_of(fit)
+    prior, sd, rng = seen.literature, seen.literature.sd.ravel(), np.random.default_rng(3)
+    obese = POPULATIONS["obese"].of(prior)
+    values, vectors = np.linalg.eigh(seen.information)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+
+    def relative(body):
+        return (body.table() - prior.mean.table()).ravel() / sd
+
+    truth = [relative(obese.draw(rng)) for _ in range(100)]
+    people = [
+        replace(seen, name=f"p{k}", right=seen.information @ body + root @ rng.standard_normal(len(sd)))
+        for k, body in enumerate(truth)
+    ]
+    learnt, shift = learn(people[:60]), relative(obese.mean)
+    error, informed = learnt.mean - shift, learnt.mean_sd < 0.5
+    assert informed.sum() > 20
+    assert np.mean(np.abs(error) < 1.96 * learnt.mean_sd) > 0.9
+    assert np.mean(np.abs(error[informed]) < 1.96 * learnt.mean_sd[informed]) > 0.9
+    assert np.sqrt(np.mean(error[informed] ** 2)) < 0.4 * np.sqrt(np.mean(shift[informed] ** 2))
+
+    adults, spread = np.zeros(len(sd)), prior.covariance / np.outer(sd, sd)
+    priors = [(adults, spread), (learnt.mean, learnt.covariance), (shift, spread)]
+    errors, within = np.zeros((3, 40, len(sd))), []
+    for i, (person, body) in enumerate(zip(people[60:], truth[60:], strict=True)):
+        for j, (mean, covariance) in enumerate(priors):
+            after, deviations = estimate(person, mean, covariance)
+            errors[j, i] = (after - body) * sd
+            if j == 1:
+                within.append(np.abs(after - body) < 1.96 * deviations)
+    assert 0.93 < np.mean(within) < 0.98
+    by_kind = errors.reshape(3, 40, -1, 10)
+    for columns, most in ((slice(0, 1), 0.95), (slice(1, 4), 0.98), (slice(4, 7), 0.75)):
+        single, after, bound = np.sqrt(np.mean(np.square(by_kind[..., columns]), axis=(1, 2, 3)))
+        assert bound < after < most * single
 
 
 def test_the_prior_of_a_person_is_about_his_own_literature():
     _, _, people = group(np.random.default_rng(2), 20)
     learnt = learn(people)
-    part = replace(
-        PRIOR,
-        mean=type(PRIOR.mean).from_table(SEGMENTS, PRIOR.mean.table()[:4]),
-        covariance=PRIOR.covariance[:SIZE, :SIZE],
-    )
-    own = learnt.of(part)
-    np.testing.assert_allclose((own.mean.table() - part.mean.table()).ravel(), learnt.mean * part.sd.ravel())
-    np.testing.assert_allclose(own.sd.ravel(), np.sqrt(np.diag(learnt.covariance)) * part.sd.ravel())
+    own = learnt.of(PRIOR)
+    np.testing.assert_allclose((own.mean.table() - PRIOR.mean.table()).ravel(), learnt.mean * PRIOR.sd.ravel())
+    np.testing.assert_allclose(own.sd.ravel(), np.sqrt(np.diag(learnt.covariance)) * PRIOR.sd.ravel())
     with pytest.raises(PriorError, match="learn it from fits with the same model"):
-        learnt.of(PRIOR)
+        learnt.of(WHOLE)
 
 
 def test_too_few_people_or_two_models_are_refused():
     _, _, people = group(np.random.default_rng(3), 6)
     with pytest.raises(PriorError, match="4 people; a group's mean and spread take at least 5"):
         learn(people[:4])
-    other = replace(people[0], name="x", segments=("a", "b", "c", "d"))
+    other = replace(people[0], name="x", literature=WHOLE)
     with pytest.raises(PriorError, match="x was estimated with another model than p0"):
         learn([*people, other])

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import osim_models
-from command_line import run
+from command_line import fitted, run
 from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
 
@@ -104,8 +104,12 @@ def test_residuals_markers_and_parameters(fit_with_model, name):
 
 
 @pytest.mark.slow
-def test_walks_and_squats_pooled(fit_with_model):
-    folder = fit_with_model("subject4", True)
+def test_walks_and_squats_pooled(shared_data, tmp_path):
+    """Of the squats, the first two."""
+    subject = tmp_path / "subject4.toml"
+    text = osim_models.subject_file(shared_data, osim_models.PEOPLE["subject4"], True)
+    subject.write_text(f"{text}window_s = [0.0, 5.0]\n")
+    folder = fitted(tmp_path / "out", subject).folder
     assert_targets(folder)
     summary = json.loads((folder / "fit.json").read_text())
     assert [trial["name"] for trial in summary["trials"]] == ["walking1", "walking2", "squats1"]

@@ -1,8 +1,11 @@
 """People whom the tables do not describe: who they are by age and build, and what becomes of the prior."""
 
+import shutil
+
 import numpy as np
 import pytest
 
+from kinertia.estimation.from_files import prepare_subject
 from kinertia.estimation.known_body import with_prosthesis
 from kinertia.estimation.population import UNKNOWN_SPREAD, population_prior
 from kinertia.estimation.prior import literature_prior
@@ -63,9 +66,30 @@ def test_what_is_stated_is_a_note():
     np.testing.assert_allclose(result.prior.covariance, UNKNOWN_SPREAD**2 * PRIOR.covariance)
 
 
-def test_somebody_short_may_be_a_child():
-    (warning,) = population_prior(PRIOR, subject(height_m=1.2, mass_kg=25.0)).warnings
-    assert "height 1.2 m: the tables are of adults; give age_years" in warning
+def test_somebody_short_is_likely_a_child():
+    result = population_prior(PRIOR, subject(height_m=1.2, mass_kg=25.0))
+    (warning,) = result.warnings
+    assert "child (height 1.2 m; if not, give age_years or population under [subject]), of whom the tables" in warning
+    assert result.prior.sd[0, 1] == pytest.approx(UNKNOWN_SPREAD * PRIOR.sd[0, 1])
+    assert not population_prior(PRIOR, subject(height_m=1.3, mass_kg=45.0, age_years=40.0)).warnings
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ("height_m = 1.803\nage_years = 7", "child (7 years), of whom the tables are not"),
+        ("height_m = 1.382", "obese (body-mass index 38.0 kg/m2), of whom the tables are not"),
+        ("height_m = 1.382\nage_years = 7", "child (7 years), of whom the tables are not"),
+        ("height_m = 1.803\nage_years = 30", ""),
+    ],
+)
+def test_files_of_somebody_whom_the_tables_do_not_describe_say_so(demo_run, tmp_path, entries, words):
+    lab = shutil.copytree(demo_run[1] / "lab", tmp_path / "lab")
+    text = (lab / "subject.toml").read_text(encoding="utf-8")
+    (lab / "subject.toml").write_text(text.replace("height_m = 1.803", entries), encoding="utf-8")
+    told = [warning for warning in prepare_subject(lab / "subject.toml").warnings if "of whom the tables" in warning]
+    assert [words in warning for warning in told] == ([True] if words else [])
 
 
 def test_of_somebody_of_unknown_height_nothing_is_said():

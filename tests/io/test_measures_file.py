@@ -3,7 +3,7 @@
 import pytest
 
 from kinertia.errors import FileError
-from kinertia.io.measures_file import COLUMNS, measures_sheet, read_measures
+from kinertia.io.measures_file import COLUMNS, is_measures_sheet, measures_sheet, read_measures
 from kinertia.model.measures import girths_with_widths, measures, sample_people
 
 
@@ -22,6 +22,24 @@ def test_the_sheet_has_every_measure_once_and_the_quick_ones_first():
     assert len({key for one in measures() for key in one.keys}) == 95
     assert sample_people().measures_m.shape == (5, len(names))
     assert len(girths_with_widths()) == 11
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "known"),
+    [
+        ("measures.csv", measures_sheet(), True),
+        ("Anna, spring.CSV", "\ufeff\r\n" + measures_sheet().replace(",", ";"), True),
+        ("measures.csv", '"Measure","cm"\n', True),
+        ("norms.csv", "quantity,percent,mean,sd\n", False),
+        ("measures.csv", "", False),
+        ("measures.txt", measures_sheet(), False),
+    ],
+)
+def test_a_sheet_is_told_by_its_heading(tmp_path, name, text, known):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    assert is_measures_sheet(tmp_path / name) == known
+    assert not is_measures_sheet(tmp_path)
+    assert not is_measures_sheet(tmp_path / "nowhere.csv")
 
 
 def test_a_filled_in_sheet_is_read_with_what_it_leaves_out(tmp_path):

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from kinertia.errors import FileError
+from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Settings
@@ -201,3 +202,18 @@ def test_forces_nearby_are_looked_for_unless_told_not_to(tmp_path):
     (tmp_path / "forces" / "walk.mot").write_text("ground_force_vx ground_force_vy\n")
     assert tomllib.loads(init_subject(folder))["trial"][0]["forces"] == "../forces/walk.mot"
     assert "forces" not in tomllib.loads(init_subject(folder, nearby=False))["trial"][0]
+
+
+def test_a_sheet_of_measures_is_taken_up(tmp_path, measured_walk):
+    for name in ("static.c3d", "walk.c3d"):
+        shutil.copyfile(measured_walk / name, tmp_path / name)
+    assert "prior" not in tomllib.loads(init_subject(tmp_path))
+    (tmp_path / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
+    text = init_subject(tmp_path)
+    assert tomllib.loads(text)["prior"] == {"measures": "measures.csv"}
+    assert draft(tmp_path, completed(text)).prior.measures == (tmp_path / "measures.csv").resolve()
+    (tmp_path / "spring.csv").write_text(measures_sheet(), encoding="utf-8")
+    assert '# measures = "measures.csv"  # FILL IN' in init_subject(tmp_path), "which of two is not for us to say"
+    (tmp_path / "static.c3d").rename(tmp_path / "stand.c3d")
+    (tmp_path / "scaled.osim").touch()
+    assert "measures =" not in init_subject(tmp_path), "a model cuts its segments elsewhere"

@@ -148,6 +148,11 @@ def test_inline_tables_and_dotted_keys(folder):
         assert caught.value.line == line
 
 
+def test_speeds_of_two_belts(folder):
+    text = GOOD.replace("window_s = [0.4, 2]", "belt_speed_m_s = { right = 1.2, left = 1 }")
+    assert read(folder, text).trials[0].belt_speed_m_s == (1.2, 1.0)
+
+
 def test_byte_order_mark_and_windows_line_ends(folder):
     (folder / "subject.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
     assert read_subject(folder / "subject.toml").subject.sex == "female"
@@ -192,6 +197,8 @@ CASES = [
     ("cutoff_hz = 6", 'cutoff_hz = "6"', 23, 'must be "gcv" or a positive frequency in Hz'),
     ('force_cutoff_hz = "none"', 'force_cutoff_hz = "raw"', 25, 'must be "auto", "none" or a positive frequency in Hz'),
     ("cutoff_hz = 6", "cutoff_hz = true", 23, 'must be "gcv" or a positive frequency in Hz'),
+    ("window_s = [0.4, 2]", "belt_speed_m_s = { right = 1.2 }", 14, "of two belts { right = 1.2, left = 0.6 }"),
+    ("window_s = [0.4, 2]", "belt_speed_m_s = { right = 1.2, left = 25 }", 14, "of two belts"),
     ("window_s = [0.4, 2]", "belt_speed_m_s = 25", 14, "belt_speed_m_s = 25: must be the speed of a treadmill"),
     ("[0.4, 2]", "[2, 0.4]", 14, "window_s = [2, 0.4]: must be [start, end] in seconds"),
     ("[0.4, 2]", "[2]", 14, "must be [start, end] in seconds"),

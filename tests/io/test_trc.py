@@ -1,4 +1,3 @@
-import time
 from pathlib import Path
 
 import numpy as np
@@ -62,18 +61,6 @@ def test_real_files_as_opensim_reads_them(shared_data, opensim, name):
         row = table.getRowAtIndex(frame)
         theirs = np.array([row.getElt(0, k).to_numpy() for k in range(row.ncol())])
         np.testing.assert_allclose(scale * markers.positions[frame], theirs, atol=1e-6, equal_nan=True)
-
-
-def test_reads_quickly(shared_data):
-    path = shared_data / "rajagopal_walk" / "motion_capture_walk.trc"
-    best = min(_seconds(path) for _ in range(3))
-    assert best < 0.1
-
-
-def _seconds(path):
-    start = time.perf_counter()
-    read_trc(path)
-    return time.perf_counter() - start
 
 
 def test_rounded_times_are_put_back_on_their_grid(shared_data):

@@ -109,6 +109,26 @@ def test_lengths_on_a_belt_that_speeds_up(walked, trial):
     assert np.abs(np.array(by_feet) / expected - 1).max() > 0.03
 
 
+def test_lengths_on_two_belts(walked, trial, measured):
+    """Each stride is as long as over ground, whether the speeds are stated or told by each foot."""
+    strides, feet = strides_of(walked.skeleton, measured), feet_under_pelvis(walked.skeleton, measured)
+    expected = [one.stride_length_m for one in spatiotemporal(feet, strides)]
+    speeds = (1.4, 0.7)
+    heel = {
+        side: feet.heel[side] - speed * feet.time[:, None] * [1.0, 0.0, 0.0]
+        for side, speed in zip(FEET, speeds, strict=True)
+    }
+    slid = replace(feet, heel=heel)
+    # this walker's standing heels slide by 0.02 and 0.05 m/s, which cannot be told from a belt
+    for belt, slides in ((None, 0.04), (Belt(np.zeros(1), np.array([speeds])), 0.001)):
+        lengths = [one.stride_length_m for one in spatiotemporal(slid, strides, belt)]
+        np.testing.assert_allclose(lengths, expected, rtol=slides)
+    exchanged = [
+        one.stride_length_m for one in spatiotemporal(slid, strides, Belt(np.zeros(1), np.array([speeds[::-1]])))
+    ]
+    assert np.abs(np.array(exchanged) / expected - 1).min() > 0.3
+
+
 @pytest.mark.parametrize("turned", [0.0, 30.0])
 @pytest.mark.parametrize("belt_m_s", [0.0, 1.2])
 def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, belt_m_s, turned):

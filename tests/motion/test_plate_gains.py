@@ -39,3 +39,16 @@ def test_a_wrong_gain(walk, gain):
     (sentence,) = told(replace(walk, plates=wrong))
     apart = float(sentence.partition(" by the other (")[2].partition(" %")[0]) / 100
     assert 1 + apart == pytest.approx(max(gain, 1 / gain), abs=0.04)
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+def test_a_crutch_beside_one_foot_is_named_beside_the_gain(walk, foot):
+    """It carries a tenth of the weight whenever that foot stands: no plate tells it from a gain."""
+    plates = walk.plates
+    loaded = (plates.force[:, foot, 1] > 0.0)[:, None]
+    support = np.zeros_like(plates.force)
+    support[:, foot] = 0.1 * float(plates.force[..., 1].max()) * loaded * np.array([0.0, 1.0, 0.0])
+    support[:, foot] = np.minimum(support[:, foot], np.maximum(plates.force[:, foot], 0.0))
+    said = told(replace(walk, plates=replace(plates, force=plates.force - support)))
+    assert len(said) == 1
+    assert f"on no plate over {plates.names[foot]} (a handrail, a crutch)" in said[0]

@@ -138,6 +138,7 @@ def test_page_fits_a_phone_and_then_a_desktop(browser, demo_run):
         assert len(set(panel_places(page))) == beside
         assert columns_seen(page) == columns
         assert covered_legends(page) == []
+        assert cut_titles(page) == []
         assert wider_than_their_place(page) == []
     assert page.locator(".modebar-btn").count() == 0
     assert report.errors == []
@@ -172,6 +173,15 @@ def covered_legends(page):
             return [...plot.querySelectorAll(".legendtext")].filter(
                 text => clash(text) || box(text).right > box(plot).right + 1).map(text => plot.id + text.textContent);
         })"""
+    )
+
+
+def cut_titles(page):
+    """Titles of panels that leave their figure."""
+    return page.locator(".plot").evaluate_all(
+        """plots => plots.flatMap(plot => [...plot.querySelectorAll(".annotation")].filter(
+            title => title.getBoundingClientRect().right > plot.getBoundingClientRect().right + 1
+        ).map(title => title.textContent))"""
     )
 
 

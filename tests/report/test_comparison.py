@@ -37,7 +37,10 @@ def test_what_changed_beyond_its_error_bars_is_found(fit):
 def test_without_error_bars_nothing_is_called_changed(fit, two_level):
     assert not any(one.changed for one in differences(fit, two_level))
     assert remarks({"a": fit, "b": two_level}) == ["no error bars, so nothing is marked as changed: b (two-level)"]
-    assert "No error bars: differences only." in render_comparison({"a": fit, "b": two_level})
+    page = render_comparison({"a": fit, "b": two_level})
+    assert '<p class="headline">No error bars: differences only.</p>' in page, "neither pass nor caution"
+    assert "<td>no</td>" not in page
+    assert "<td>no</td>" in render_comparison({"a": fit, "again": fit})
 
 
 @pytest.mark.slow

@@ -39,6 +39,12 @@ def test_curves_are_those_of_the_report(fit):
     assert axes.get_xlim() == (0, 100)
 
 
+def test_no_title_is_broken_inside_its_unit(fit):
+    titles = [axes.get_title(loc="left") for axes in drawing(cycle_figure(fit, "moment")).axes]
+    assert "Trunk moment, bending right +\n(N m/kg)" in titles
+    assert all("(N m/kg)" in title for title in titles)
+
+
 def test_error_bars_are_those_of_the_report(fit):
     axes, traces = panel(change_figure(fit), "CoM forward (mm)")
     (estimate,) = [one for one in traces if one["name"] == "estimate, 95 %"]

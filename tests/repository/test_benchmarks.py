@@ -110,8 +110,9 @@ def test_page_of_field_trials(fit_of):
 
 def test_page_of_cohorts_says_what_was_measured():
     runs = [cohort.Run(50, 90.0, 1000.0, 990.0), cohort.Run(200, 330.0, 1010.0, 1005.0)]
-    text = cohort.document([3.0] * 200, runs, 2)
+    text = cohort.document(cohort.Singles([3.0] * 20, [3.2] * 20), runs, 2)
     assert "| 200 | 330 | 1.65 | 1010 | 1005 |" in text
-    assert "takes 1.10 times that\n  (within 1.15)" in text
+    assert "takes 1.10 times that (within 1.15)" in text
+    assert "takes 1.03 times (within 1.15)" in text
     assert "goes from\n  1000 to 1010 MB" in text
     assert "24 million frames" in text

@@ -7,9 +7,9 @@ import pytest
 
 from kinertia.io.belt_file import read_belt
 from kinertia.trial.belt import Belt
-from kinertia.trial.foot_ways import belt_doubts
+from kinertia.trial.foot_ways import belt_doubts, foot_ways
 from kinertia.trial.plate_assignment import build_trial
-from walk_on_plates import FEET, walk
+from walk_on_plates import ALL_STEPS, FEET, walk
 
 STEPS = [("r", 0), ("l", 0), ("r", 1)]
 
@@ -69,3 +69,45 @@ def test_a_constant():
     belt = read_belt(1.5)
     assert belt.way_m(3.0, 5.0) == pytest.approx(3.0)
     assert read_belt(None) is None
+
+
+@pytest.fixture(scope="module")
+def split():
+    """A walk over ground, and the same with a belt of 1.4 m/s under the right foot and of 0.6 under the left."""
+    on_floor = walk(ALL_STEPS)
+    speed = {"r": 1.4, "l": 0.6}
+    markers, plates = on_floor.markers, on_floor.plates
+    side = np.array(["r" if label in FEET["r"] else "l" for label in markers.labels])
+    way = np.stack([speed[s] * markers.time for s in side], axis=1)
+    positions = markers.positions - way[..., None] * [1.0, 0.0, 0.0]
+    moment = plates.moment.copy()
+    for p, (foot, _) in enumerate(ALL_STEPS):
+        moment[:, p] -= np.cross(speed[foot] * plates.time[:, None] * [1.0, 0.0, 0.0], plates.force[:, p])
+    on_belts = replace(on_floor, markers=replace(markers, positions=positions), plates=replace(plates, moment=moment))
+    return on_floor, on_belts
+
+
+@pytest.mark.parametrize("stated", [None, (1.4, 0.6)])
+def test_two_belts(split, stated):
+    """Each foot stands on its own, whether their speeds are stated or told by the feet."""
+    on_floor, on_belts = split
+    trial = build_trial(replace(on_belts, belt=read_belt(stated)), FEET)
+    np.testing.assert_array_equal(trial.measured, build_trial(on_floor, FEET).measured)
+    ways, expected = foot_ways(on_belts.markers, FEET, read_belt(stated)), foot_ways(on_floor.markers, FEET)
+    for way, sound in zip(ways, expected, strict=True):
+        np.testing.assert_allclose([one[:2] for one in way.stands], [one[:2] for one in sound.stands], atol=0.011)
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ((1.4, 0.6), ""),
+        ((0.6, 1.4), "right and left look exchanged"),
+        ((1.4, 2.2), "under the left foot is 2.20 m/s"),
+        (1.4, "the stated speed of the belt is 1.40 m/s on average, but standing feet go 0.6"),
+    ],
+)
+def test_two_speeds_that_are_not_the_belts_are_doubted(split, stated, words):
+    doubts = belt_doubts(split[1].markers, FEET, read_belt(stated))
+    assert bool(doubts) == bool(words)
+    assert all(words in one for one in doubts)

@@ -1,13 +1,14 @@
 """Loads that are not under the feet, or not when they stand, are named by their cause; sound ones never are."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import Markers
+from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from recorded_walks import WALKS
 from walk_on_plates import ALL_STEPS
@@ -106,6 +107,26 @@ def test_rates(walk, factor):
     assert times == pytest.approx(factor, rel=0.1)
 
 
+def test_a_walk_on_one_long_plate(walk):
+    """A load that goes from foot to foot is no long stance."""
+    recording, feet = walk
+    plates = recording.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    one = replace(recording, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
+    assert load_places_trouble(one, feet) == ""
+
+
+def test_squats_on_one_plate(measured_recording):
+    """The load is between the feet all the time: not of another trial, but both feet on one plate."""
+    squats = measured_recording("subject4/squats1.trc", "subject4/squats1_grf.mot")
+    feet = read_marker_set(Path(__file__).parents[1] / "subject4.toml").foot_labels()
+    plates = squats.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    one = replace(squats, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
+    assert load_places_trouble(one, feet) == ""
+    assert any("both feet are on it" in doubt for doubt in load_places_doubts(one, feet))
+
+
 @pytest.mark.parametrize("stride_m", [1.2, 0.9])
 def test_a_made_up_walk(stride_m):
     recording = simple_walk(ALL_STEPS, stride_m=stride_m)
@@ -129,6 +150,24 @@ def test_plates_that_are_exchanged():
     trouble = load_places_trouble(replace(recording, plates=wrong), SIMPLE_FEET)
     assert "the loads of plate 1 and plate 2" in trouble
     assert "exchanged" in trouble
+
+
+@pytest.mark.parametrize("apart_m", [0.5, -0.4])
+@pytest.mark.parametrize(
+    "files",
+    [("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"), WALKS["gait2354"]],
+)
+def test_belts_that_are_exchanged(measured_recording, files, apart_m):
+    """Each load lies on the other belt, and goes there as it would on its own."""
+    run = measured_recording(*files)
+    feet = choose_marker_set(run.markers.labels).foot_labels()
+    offset_m = np.array([[0.0, 0.0, apart_m], [0.0, 0.0, -apart_m]])
+    trouble = load_places_trouble(moved(run, offset_m), feet)
+    assert "the plates or belts are exchanged" in trouble
+    first_mm = float(trouble.partition("along X and ")[2].partition(" mm")[0])
+    assert first_mm == pytest.approx(1e3 * apart_m, abs=40)
+    one_off = load_places_trouble(moved(run, np.array([[0.0, 0.0, apart_m], [0.0, 0.0, 0.0]])), feet)
+    assert "exchanged" not in one_off
 
 
 def test_both_feet_on_a_plate():

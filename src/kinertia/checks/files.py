@@ -31,7 +31,7 @@ class RecordingFiles:
     loads: Path | None = None
     window_s: tuple[float, float] | None = None
     length_unit: str | None = None
-    belt_speed_m_s: float | Path | None = None
+    belt_speed_m_s: float | tuple[float, float] | Path | None = None
 
     @property
     def title(self) -> str:

@@ -131,7 +131,8 @@ def _off_plate(force: FloatArray, moment: FloatArray, corners: FloatArray) -> tu
 
 
 def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
-    """Body mass by the mean vertical force over whole strides in the middle of the longest measured window.
+    """Body mass by the mean vertical force over whole strides in the middle of the longest measured window, on a single
+    belt of the longest in which both feet's together is known: of several plates a drifting zero looks like a foot.
 
     Landings and leavings of one foot are a stride apart (or several, where steps missed the plates), those of opposite
     feet a step; where one foot never touches the ground, they are hops. Gait repeats itself, so that the strides may
@@ -140,7 +141,7 @@ def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:
     """
     if not trial.measured.any():
         return None
-    start, end = trial.windows()[0]
+    start, end = (trial.carried_windows() if len(trial.loads.plates) == 1 else trial.windows())[0]
     strides, steps = periods(trial.loads)
     fitting = [period for period in strides if period <= end - start]
     stepping = [period for period in steps if period <= end - start]

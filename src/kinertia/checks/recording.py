@@ -12,7 +12,7 @@ from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_
 from kinertia.checks.verdict import Verdict
 from kinertia.errors import KinertiaError, MarkerSetError, TrialError
 from kinertia.estimation.doubts import Doubt, motion_doubts, static_doubts, trial_doubts
-from kinertia.estimation.force_mass import CONTRADICTING_MASS, unit_hint
+from kinertia.estimation.force_mass import CONTRADICTING_MASS, UNMEASURED_HINT, unit_hint
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
@@ -317,6 +317,7 @@ def _weight(mass: ForceMass | None, scale_kg: float | None) -> list[Verdict]:
     return [
         Verdict(
             "fail" if abs(off) > CONTRADICTING_MASS else "caution",
-            f"{sentence}; check the mass, and the gain and zero of the plates",
+            f"{sentence}; check the mass, and the gain and zero of the plates"
+            + (f", {UNMEASURED_HINT}" if off < 0 else ""),
         )
     ]

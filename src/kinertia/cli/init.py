@@ -24,7 +24,8 @@ def init(
 ) -> Outcome:
     """Write a first subject.toml from the files in a folder.
 
-    With --measures a sheet for girths and lengths of the person, measures.csv, and a picture of where to measure,
+    A sheet of girths and lengths that is there is taken up. With --measures
+    an empty one, measures.csv, and a picture of where to measure,
     measures.svg. As many as you have time for are of use.
 
     [bold]Example[/]
@@ -56,8 +57,8 @@ def _measures(folder: Path) -> Outcome:
     write_then_rename(picture, measures_picture())
     write_then_rename(sheet, measures_sheet())
     out.print(
-        f"wrote {sheet}: fill in the column cm for what you measure, where {picture} shows; then name it in the "
-        'subject file, under [prior]: measures = "measures.csv"',
+        f"wrote {sheet}: fill in the column cm for what you measure, where {picture} shows; kinertia init {folder} "
+        'takes it up, and in a subject file that is there already name it under [prior]: measures = "measures.csv"',
         soft_wrap=True,
     )
     return Outcome({"sheet": str(sheet), "picture": str(picture)})

@@ -13,7 +13,8 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
+from kinertia.estimation.learnt_prior import LearntPrior, learn
+from kinertia.estimation.person_information import PersonInformation, information_of
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.population_file import population_text, read_population
 from kinertia.io.provenance import VERSION

@@ -28,6 +28,7 @@ from kinertia.report.extras import HOW, has_matplotlib
 from kinertia.report.faults import counts, faults_summary, save_faults
 from kinertia.report.populations import (
     CAPTION,
+    mean_sentences,
     population_rows,
     populations_summary,
     rucksack_sentence,
@@ -165,7 +166,8 @@ def populations(
 ) -> Outcome:
     """What does a wrong prior cost? Children, obese, old people, prostheses, with the adults' prior and their own.
 
-    Also: is a rucksack of unknown mass found?
+    Also: what does a group teach of its mean, and is a rucksack of unknown
+    mass found?
 
     [bold]Example[/]
 
@@ -173,15 +175,15 @@ def populations(
     """
     results_folder(output, force)
     with shown_progress() as progress:
-        accuracies, rucksacks = run_populations(people, seed, workers, lambda share: progress("people", share))
-    save_populations(accuracies, rucksacks, seed, output)
+        found = run_populations(people, seed, workers, lambda share: progress("people", share))
+    save_populations(found, seed, output)
     shown = plain_table(*POPULATION_HEADINGS)
-    for row in population_rows(accuracies):
+    for row in population_rows(found.accuracies):
         shown.add_row(*row)
     out.print(shown)
-    out.print(f"{CAPTION}\n\n{rucksack_sentence(rucksacks)}")
+    out.print("\n\n".join((CAPTION, *mean_sentences(found.means), rucksack_sentence(found.rucksacks))))
     out.print(f"\nresults in {output}: populations.html, populations.json, populations.md", soft_wrap=True)
-    return Outcome(populations_summary(accuracies, rucksacks, seed))
+    return Outcome(populations_summary(found, seed))
 
 
 def sensitivity(

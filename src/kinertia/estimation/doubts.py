@@ -15,6 +15,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
 from kinertia.motion.force_faults import direction_trouble, offset_trouble, plate_sign_trouble
+from kinertia.motion.force_rate import rate_doubts
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
@@ -111,7 +112,8 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
     if trouble := one_plate or direction_trouble(trial, owners):
         return _refused(trouble)
     offset = offset_trouble(trial, owners)
-    return _told([*([offset] if offset else []), *gain_doubts(recording, trial, owners)])
+    sentences = [*([offset] if offset else []), *gain_doubts(recording, trial, owners)]
+    return _told([*rate_doubts(trial, owners), *sentences])
 
 
 def warnings_of(name: str, doubts: Sequence[Doubt]) -> list[str]:

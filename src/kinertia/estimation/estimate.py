@@ -16,6 +16,7 @@ from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
+from kinertia.estimation.simultaneous.unseen_turn import unseen_turn_note
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
 from kinertia.estimation.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
 from kinertia.model.anatomy import segment_of
@@ -128,7 +129,12 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         converged=outcome.converged,
         posterior=outcome.posterior,
         warnings=tuple(dict.fromkeys(warnings)),
-        notes=(*ready.notes, *_force_notes(outcome.trials, settings), *_movement_notes(ready)),
+        notes=(
+            *ready.notes,
+            *_force_notes(outcome.trials, settings),
+            *_turn_notes(outcome.posterior, ready),
+            *_movement_notes(ready),
+        ),
         file=ready.file,
     )
 
@@ -136,6 +142,12 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
 def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
     """Per trial, which ground reactions the joint moments are from."""
     return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
+
+
+def _turn_notes(posterior: Posterior | None, ready: Prepared) -> list[str]:
+    """Turned plates that these trials would not show."""
+    note = "" if posterior is None else unseen_turn_note(posterior.instruments, ready.uncertainty.instruments)
+    return [note] if note else []
 
 
 def _movement_notes(ready: Prepared) -> list[str]:

@@ -2,12 +2,22 @@
 
 Each person's recordings say little about most parameters; all together they say much about *their* mean and spread. A
 fit's posterior is its prior times what the recordings say; taken apart, the latter of all people is joined with a
-prior of the group: its people are as far from their mean as the literature's are, and their mean is off the tables by
-half of that variance. Expectation-maximisation (Dempster, Laird & Rubin 1977, J R Stat Soc B 39:1) finds the mean and
+prior of the group, and expectation-maximisation (Dempster, Laird & Rubin 1977, J R Stat Soc B 39:1) finds the mean and
 covariance of the group. Where the people say nothing, its error bars are wider than the literature's, which are those
 of a person of the tables.
 
-All in relative parameters: distance from the person's own literature values, in the literature's deviations.
+The prior of the group:
+
+- its people are as far from their mean as the literature's are from the tables, which counts as much as 120 people;
+- its mean differs from the tables in some parameters much and in most of them little: Student's t with 3 degrees of
+  freedom, one draw for a parameter of both sides (Tipping 2001, J Mach Learn Res 1:211, does it for single weights). A
+  normal prior spreads a heavy trunk over whatever else would explain the trials, and many people are needed to
+  take that back;
+- a mean segment that is heavier has moments of inertia that are larger in proportion.
+
+All in relative parameters: distance from the person's own literature values, in the literature's deviations. What the
+recordings say is linear in the dynamic parameters (`person_information`); mean and spread of these are taken for those
+of masses, centres of mass and moments about them, which they are to first order.
 """
 
 from __future__ import annotations
@@ -18,41 +28,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.errors import PriorError
-from kinertia.estimation.population import population_prior
-from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.result import Fit
+from kinertia.estimation.person_information import PersonInformation
+from kinertia.estimation.prior import BspPrior
 from kinertia.io.population_file import PopulationFile
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.sides import by_side
 
-BETWEEN, WITHIN = 0.5, 1.0
-"""Variance of a group's mean about the tables, and of its people about their mean, over the literature's."""
-PSEUDO_PEOPLE = 30.0
-"""The literature's spread within a group counts as much as so many people."""
+BETWEEN, WITHIN = 0.4, 1.0
+"""Squared scale of a group's mean about the tables, and variance of its people about their mean, over the literature's
+variance."""
+PSEUDO_PEOPLE = 120.0
+"""The literature's spread within a group counts as much as so many people: as many as a body has parameters, since the
+correlations of so many take more people than groups have."""
+_FREEDOM = 3.0
+"""Degrees of freedom of Student's t of the mean."""
+_PSEUDO_SCALES = 4.0
+"""`BETWEEN` counts as much as so many parameters' means for the scale that they have in common."""
 FEWEST_PEOPLE = 5
-_ITERATIONS, _SETTLED = 200, 1e-4
-_OWN_PRIOR = 1e-6
-_LEAST_SHARE = 0.01
-"""Of its prior variance that the recordings take away from a combination, or nothing is learnt from it: below, what the
-fit's curvature moves is more than what the recordings say, and all people's would add up."""
-
-
-@dataclass(frozen=True, eq=False)
-class PersonInformation:
-    """What one person's recordings say, the prior taken away.
-
-    Attributes:
-        name: whose.
-        segments: names, as in the tables.
-        information: (10 s, 10 s) on the relative parameters.
-        right: (10 s,) its right-hand side.
-        correlation: (10 s, 10 s) of the literature's prior.
-    """
-
-    name: str
-    segments: tuple[str, ...]
-    information: np.ndarray
-    right: np.ndarray
-    correlation: np.ndarray
+_ITERATIONS, _SETTLED = 200, 1e-3
+_NOTHING = 1e-12
+"""Eigenvalues of the information below this share of the largest are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +71,7 @@ class LearntPrior:
     @property
     def learnt(self) -> np.ndarray:
         """(10 s,) 1 - variance / that of a group of which nothing is known: 0 nothing learnt."""
-        result: np.ndarray = 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN)
+        result: np.ndarray = np.maximum(0.0, 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN))
         return result
 
     @classmethod
@@ -114,55 +109,11 @@ class LearntPrior:
         return replace(literature, mean=mean, covariance=self.covariance * np.outer(sd, sd))
 
 
-def information_of(fit: Fit) -> PersonInformation:
-    """What the recordings of a fit say.
-
-    Raises:
-        PriorError: it has no error bars, or leant on another prior than the literature's.
-    """
-    name = fit.subject.name
-    if fit.posterior is None:
-        raise PriorError(f"{name}: estimated by the two-level method, which has no error bars")
-    literature = literature_prior(fit.literature)
-    own = population_prior(literature, fit.subject).prior
-    if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
-        raise PriorError(f"{name}: leant on another prior than the literature's of the built-in model")
-    return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
-
-
-def person_information(
-    name: str, literature: BspPrior, own: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
-) -> PersonInformation:
-    """What recordings say by an estimate that leant on a prior of the literature's mean.
-
-    Args:
-        name: whose.
-        literature: whose deviations are the units.
-        own: that the estimate leant on.
-        estimate, covariance: with the posterior covariance (10 s, 10 s) of its table.
-    """
-    sd = literature.sd.ravel()
-    correlation, before, posterior = (
-        each / np.outer(sd, sd) for each in (literature.covariance, own.covariance, covariance)
-    )
-    moved = (estimate.table() - literature.mean.table()).ravel() / sd
-    # in coordinates in which the estimate's prior is the unit matrix; what says next to nothing there is left out
-    root = np.linalg.cholesky(before)
-    inverse = np.linalg.inv(root)
-    left, vectors = np.linalg.eigh(inverse @ posterior @ inverse.T)
-    along = vectors.T @ inverse @ moved
-    shown = left < 1.0 - _LEAST_SHARE
-    back = (inverse.T @ vectors)[:, shown]
-    information = (back * (1.0 / left[shown] - 1.0)) @ back.T
-    return PersonInformation(name, estimate.segments, information, back @ (along[shown] / left[shown]), correlation)
-
-
-def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None) -> LearntPrior:
+def learn(people: Sequence[PersonInformation]) -> LearntPrior:
     """The group's prior.
 
     Args:
         people: of one group, at least `FEWEST_PEOPLE`.
-        start: of nearly the same people, for a quicker search.
 
     Raises:
         PriorError: too few, or estimated with different models.
@@ -173,54 +124,129 @@ def learn(people: Sequence[PersonInformation], start: LearntPrior | None = None)
     if other := next((one for one in people if one.segments != segments), None):
         raise PriorError(f"{other.name} was estimated with another model than {people[0].name}")
     # in coordinates in which the literature's people are uncorrelated, where nothing is close to singular
-    root = np.linalg.cholesky(np.mean([one.correlation for one in people], axis=0))
-    seen = _Seen.of(root, people)
-    size, count = len(root), len(people)
-    anchor = WITHIN * np.eye(size)
-    mean = np.zeros(size) if start is None else np.linalg.solve(root, start.mean)
-    within = anchor
+    correlations = np.mean([_correlation(one.literature.covariance) for one in people], axis=0)
+    root = np.linalg.cholesky(correlations)
+    seen, means = _Seen.of(root, people), _Means.of(root, people)
+    anchor = WITHIN * np.eye(len(root))
+    within, scales = anchor, np.full(len(means.blocks), BETWEEN)
     for _ in range(_ITERATIONS):
-        posterior = seen.posterior(within)
-        estimates = mean + np.einsum("pij,pj->pi", posterior, seen.right - seen.information @ mean)
-        # a mean between nothing and the estimates' own, by how far the group's mean may be from the tables
-        new_mean = np.linalg.solve(within / BETWEEN + count * np.eye(size), estimates.sum(axis=0))
-        away = estimates - new_mean
-        spread = posterior.sum(axis=0) + away.T @ away
-        new_within = (PSEUDO_PEOPLE * anchor + spread) / (PSEUDO_PEOPLE + count)
-        change = max(np.abs(new_mean - mean).max(), np.abs(new_within - within).max())
-        mean, within = new_mean, 0.5 * (new_within + new_within.T)
+        mean, of_mean = seen.mean(within, means.covariance(scales))
+        spread = seen.spread(within, mean, of_mean)
+        new_within = (PSEUDO_PEOPLE * anchor + spread) / (PSEUDO_PEOPLE + len(people))
+        new_scales = means.scales(mean, of_mean, scales)
+        change = max(np.abs(new_within - within).max(), np.abs(np.log(new_scales / scales)).max())
+        within, scales = new_within, new_scales
         if change < _SETTLED:
             break
-    of_mean = np.linalg.inv(np.eye(size) / BETWEEN + seen.of_mean(within))
+    mean, of_mean = seen.mean(within, means.covariance(scales))
     of_group, whole = (root @ part @ root.T for part in (of_mean, within + of_mean))
-    return LearntPrior(segments, root @ mean, np.sqrt(np.diag(of_group)), 0.5 * (whole + whole.T), count)
+    return LearntPrior(segments, root @ mean, np.sqrt(np.diag(of_group)), 0.5 * (whole + whole.T), len(people))
+
+
+def _correlation(covariance: np.ndarray) -> np.ndarray:
+    sd = np.sqrt(np.diag(covariance))
+    result: np.ndarray = covariance / np.outer(sd, sd)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Means:
+    """Student's t of a group's mean, as normal with a squared scale for each parameter of both sides.
+
+    Attributes:
+        root: (k, k) of the coordinates in which the learning is done.
+        correlation: (k, k) of the mean's relative parameters.
+        blocks: rows of the parameters that share a scale.
+    """
+
+    root: np.ndarray
+    correlation: np.ndarray
+    blocks: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Means:
+        """By the people's literature."""
+        with_mass = np.mean([_moments_with_mass(one.literature) for one in people], axis=0)
+        sides = by_side(people[0].segments)
+        return cls(
+            root,
+            _correlation(with_mass @ root @ root.T @ with_mass.T),
+            tuple(
+                np.array([10 * row + k for row in rows.values() for k in kind])
+                for rows in sides.values()
+                for kind in ((0,), (1,), (2,), (3,), (4, 5, 6), (7, 8, 9))
+            ),
+        )
+
+    def covariance(self, scales: np.ndarray) -> np.ndarray:
+        """(k, k) of the mean in the coordinates of `root`."""
+        each = np.empty(len(self.root))
+        for rows, scale in zip(self.blocks, scales, strict=True):
+            each[rows] = np.sqrt(scale)
+        whole = np.linalg.solve(self.root, each[:, None] * np.linalg.cholesky(self.correlation))
+        result: np.ndarray = whole @ whole.T
+        return result
+
+    def scales(self, mean: np.ndarray, of_mean: np.ndarray, scales: np.ndarray) -> np.ndarray:
+        """What mean and covariance of the mean, in the coordinates of `root`, make of the squared scales."""
+        square = self.root @ (of_mean + np.outer(mean, mean)) @ self.root.T
+        common = (len(scales) + _PSEUDO_SCALES) / (np.sum(1.0 / scales) + _PSEUDO_SCALES / BETWEEN)
+        return np.array(
+            [
+                (_FREEDOM * common + np.trace(np.linalg.solve(self.correlation[at], square[at])))
+                / (_FREEDOM + len(rows))
+                for rows, at in ((rows, np.ix_(rows, rows)) for rows in self.blocks)
+            ]
+        )
+
+
+def _moments_with_mass(literature: BspPrior) -> np.ndarray:
+    """(k, k) relative parameters from those at radii of gyration that do not change with the mass."""
+    values = literature.mean.table() / literature.sd
+    result = np.eye(values.size)
+    for row, each in enumerate(values):
+        result[10 * row + 4 : 10 * row + 10, 10 * row] = each[4:] / each[0]
+    return result
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What all people's recordings say: roots (p, k, k) of the information, itself, and the right-hand sides (p, k)."""
+    """What all people's recordings say: roots (p, k, r) of the information, and the right-hand sides (p, k)."""
 
     roots: np.ndarray
-    information: np.ndarray
     right: np.ndarray
 
     @classmethod
     def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Seen:
         """In the coordinates x of root x."""
         values, vectors = np.linalg.eigh([root.T @ one.information @ root for one in people])
+        most = int((values > _NOTHING * values.max()).sum(axis=1).max())
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        return cls(roots, roots @ roots.transpose(0, 2, 1), np.array([root.T @ one.right for one in people]))
+        return cls(roots[:, :, len(root) - most :], np.array([root.T @ one.right for one in people]))
 
-    def posterior(self, within: np.ndarray) -> np.ndarray:
-        """(p, k, k) covariances of the people, given the spread within the group."""
+    def mean(self, within: np.ndarray, between: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The group's mean and its covariance, given the spread within the group and that of means."""
+        inner = np.linalg.inv(np.eye(self.roots.shape[2]) + self._inner(within))
+        of_all = (self.roots @ inner @ self.roots.transpose(0, 2, 1)).sum(axis=0)
+        shown = self.right @ within
+        right = self.right - np.einsum("pir,prs,pjs,pj->pi", self.roots, inner, self.roots, shown, optimize=True)
+        covariance = np.linalg.inv(np.linalg.inv(between) + of_all)
+        covariance = 0.5 * (covariance + covariance.T)
+        return covariance @ right.sum(axis=0), covariance
+
+    def spread(self, within: np.ndarray, mean: np.ndarray, of_mean: np.ndarray) -> np.ndarray:
+        """(k, k) expected sum of squares of the people about their mean."""
         seen = within @ self.roots
-        inner = np.eye(len(within)) + self.roots.transpose(0, 2, 1) @ seen
-        result: np.ndarray = within - seen @ np.linalg.solve(inner, seen.transpose(0, 2, 1))
+        inner = np.linalg.inv(np.eye(self.roots.shape[2]) + self._inner(within))
+        # of each person: covariance given the mean, and how the expectation goes with the mean
+        posterior = within - seen @ inner @ seen.transpose(0, 2, 1)
+        with_mean = seen @ inner @ self.roots.transpose(0, 2, 1)
+        away = np.einsum("pij,pj->pi", posterior, self.right) - with_mean @ mean
+        total: np.ndarray = posterior.sum(axis=0) + away.T @ away
+        total += (with_mean @ of_mean @ with_mean.transpose(0, 2, 1)).sum(axis=0)
+        result: np.ndarray = 0.5 * (total + total.T)
         return result
 
-    def of_mean(self, within: np.ndarray) -> np.ndarray:
-        """(k, k) information of all people on their mean."""
-        inner = np.eye(len(within)) + self.roots.transpose(0, 2, 1) @ within @ self.roots
-        total: np.ndarray = (self.roots @ np.linalg.solve(inner, self.roots.transpose(0, 2, 1))).sum(axis=0)
-        result: np.ndarray = 0.5 * (total + total.T)
+    def _inner(self, within: np.ndarray) -> np.ndarray:
+        result: np.ndarray = self.roots.transpose(0, 2, 1) @ within @ self.roots
         return result

@@ -31,7 +31,7 @@ GROWN_UP_YEARS, OLD_YEARS = 18.0, 65.0
 OBESE_KG_M2 = 30.0
 """Body-mass index from which on a person counts as obese (WHO)."""
 _SHORT_M = 1.4
-"""Below it a person without a stated age may well be a child."""
+"""Below it a person without a stated age is likely a child, and in any case nobody of whom the tables are."""
 _PAVOL = {
     "male": {"thigh": 0.1127, "shank": 0.0441, "foot": 0.0127, "upper_arm": 0.0299, "forearm": 0.0175 + 0.0065},
     "female": {"thigh": 0.1162, "shank": 0.0456, "foot": 0.0123, "upper_arm": 0.0301, "forearm": 0.0141 + 0.0054},
@@ -67,12 +67,6 @@ def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
         said.append("no numbers that could be checked: young adults' values with deviations half as large again")
     sentences = [f"population: {population} ({why}), of whom the tables are not: {one}; {HELP}" for one in said]
     notes, warnings = (sentences, []) if stated is not None else ([], sentences)
-    height_m = subject.height_m
-    if subject.age_years is None and stated is None and height_m is not None and height_m < _SHORT_M:
-        warnings.append(
-            f"height {height_m:g} m: the tables are of adults; give age_years (or population) under [subject] if "
-            "this is a child"
-        )
     return PopulationPrior(prior, tuple(notes), tuple(warnings))
 
 
@@ -82,6 +76,8 @@ def _by_age_and_build(subject: Subject) -> tuple[str, str]:
         return "child", f"{age:g} years"
     if mass_kg and height_m and mass_kg / height_m**2 >= OBESE_KG_M2:
         return "obese", f"body-mass index {mass_kg / height_m**2:.1f} kg/m2"
+    if age is None and height_m is not None and height_m < _SHORT_M:
+        return "child", f"height {height_m:g} m; if not, give age_years or population under [subject]"
     if age is not None and age >= OLD_YEARS:
         return "elderly", f"{age:g} years"
     return "adult", "nothing speaks against it"

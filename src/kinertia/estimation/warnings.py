@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.force_mass import CARRIED_HINT, force_mass
+from kinertia.estimation.force_mass import CARRIED_HINT, UNMEASURED_HINT, force_mass
 from kinertia.estimation.input_checks import mass_by_force_kg
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
@@ -52,6 +52,7 @@ def force_warnings(
         by_force, by_motion = by_markers.mass_kg, mass_from_force_kg(literature, trial)
         if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg + 2 * carried.sd_kg:
             hint = f"; {CARRIED_HINT}" if by_force - mass_kg > LIGHTEST_LOAD_KG else ""
+            hint = f", {UNMEASURED_HINT}" if by_force < mass_kg else hint
             warnings.append(
                 f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {carried} "
                 f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates{hint}"

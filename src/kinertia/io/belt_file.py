@@ -16,8 +16,9 @@ _COLUMN = "belt_speed"
 _FASTEST_M_S = 15.0
 
 
-def read_belt(stated: float | Path | None) -> Belt | None:
-    """The speed of a treadmill's belt as a subject file states it: m/s, or a file with it over the markers' time.
+def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
+    """The speed of a treadmill's belt as a subject file states it: m/s, of two belts that under the right foot and that
+    under the left, or a file with it over the markers' time.
 
     CSV has the columns `time_s` and `speed_m_s`; MOT and STO, which may be the force file, a column `belt_speed`.
 
@@ -27,7 +28,7 @@ def read_belt(stated: float | Path | None) -> Belt | None:
     """
     if stated is None:
         return None
-    if isinstance(stated, float):
+    if isinstance(stated, float | tuple):
         return Belt(np.zeros(1), np.array([stated]))
     path = stated
     if path.suffix.lower() in (".mot", ".sto"):

@@ -11,11 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from kinertia.errors import FileError
 from kinertia.io.number_table import expect_file
 
 _SEPARATORS = ",;\t"
+_BEGINNING_BYTES = 2000
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,30 @@ class Row:
         return value
 
 
+def has_columns(path: Path, columns: Sequence[str]) -> bool:
+    """Whether a file is a table with these columns, by its name and its beginning; raises nothing for another one."""
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        beginning = file.read(_BEGINNING_BYTES).decode("utf-8-sig", errors="replace")
+    lines = beginning.lstrip().splitlines()
+    return bool(lines) and set(columns) <= set(_opened(lines).heading)
+
+
+class _Opened(NamedTuple):
+    """What is below the heading, row by row; what separates cells; the columns, in lower case."""
+
+    table: Any
+    separator: str
+    heading: list[str]
+
+
+def _opened(lines: Sequence[str]) -> _Opened:
+    separator = max(_SEPARATORS, key=lines[0].count)
+    table = csv.reader(lines, delimiter=separator)
+    return _Opened(table, separator, [cell.strip().lower() for cell in next(table)])
+
+
 def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]:
     """The rows of a table, blank ones left out; columns in any order, others are kept, missing cells at the end empty.
 
@@ -74,9 +100,7 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
     first = next((number for number, line in enumerate(lines) if line.strip()), None)
     if first is None:
         raise FileError(path, f"the file is empty; expected {expected}")
-    separator = max(_SEPARATORS, key=lines[first].count)
-    table = csv.reader(lines[first:], delimiter=separator)
-    heading = [cell.strip().lower() for cell in next(table)]
+    table, separator, heading = _opened(lines[first:])
     if lacking := [name for name in columns if name not in heading]:
         found = ", ".join(heading)
         raise FileError(path, f"lacks the column {', '.join(lacking)}; found {found}; expected {expected}", first + 1)

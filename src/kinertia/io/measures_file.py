@@ -10,10 +10,11 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.io.csv_file import read_csv
+from kinertia.io.csv_file import has_columns, read_csv
 from kinertia.model.measures import Measure, measures
 
 COLUMNS = ("measure", "level", "what", "cm", "sd_cm", "first")
+_NEEDED = ("measure", "cm")
 _LONGEST_CM, _SHORTEST_CM = 250.0, 1.0
 
 
@@ -40,6 +41,11 @@ def measures_sheet() -> str:
     return text.getvalue()
 
 
+def is_measures_sheet(path: Path) -> bool:
+    """Whether a file is such a sheet, filled in or not."""
+    return has_columns(path, _NEEDED)
+
+
 def read_measures(path: Path) -> BodyMeasures:
     """Read a sheet. Rows without a value were not measured; a deviation that was taken out is the sheet's own.
 
@@ -48,7 +54,7 @@ def read_measures(path: Path) -> BodyMeasures:
     """
     known = {one.name: one for one in measures()}
     values: dict[str, tuple[float, float]] = {}
-    for row in read_csv(path, ("measure", "cm"), "the sheet of kinertia init --measures"):
+    for row in read_csv(path, _NEEDED, "the sheet of kinertia init --measures"):
         name = row.cells["measure"]
         if name not in known:
             near = get_close_matches(name, known, n=1)

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
-from kinertia.io.subject_file import Model, TrialFiles
+from kinertia.io.subject_file import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
 from kinertia.settings import Settings, Subject, Table
 
@@ -31,9 +32,10 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
     The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads go
     with the trial whose name is most like theirs, and are looked for in the folders in it and beside it where the
     folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The only OpenSim
-    model of a folder takes the place of a static trial that no name tells. What stays unknown is a commented
-    line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names begin like another
-    static trial's are left out and named in a comment.
+    model of a folder takes the place of a static trial that no name tells. A sheet of girths and lengths is taken up,
+    but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays unknown is a
+    commented line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names begin like
+    another static trial's are left out and named in a comment.
 
     Raises:
         FileError: no such folder, or no file of markers in it.
@@ -41,20 +43,10 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
     folder = Path(folder).resolve()
     if not folder.is_dir():
         raise FileError(folder, "no such folder; give the one that holds the recordings")
-    files = sorted(folder.iterdir())
-    for file in files:
-        if not _is_utf8(file.name):
-            raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
+    files = _expect_files(folder)
     c3d = [file for file in files if file.suffix.lower() == ".c3d"]
     trc = [file for file in files if file.suffix.lower() != ".c3d" and _holds_markers(file)]
     captures = c3d + [file for file in trc if file.stem not in [twin.stem for twin in c3d]]
-    if not captures:
-        inside = [f.name for f in files if f.is_dir() and any(map(is_capture, filter(Path.is_file, f.iterdir())))]
-        if inside:
-            raise FileError(folder, f"holds no file of markers, but its folder {inside[0]} does; give that one")
-        raise FileError(
-            folder, f"holds no file of markers ({', '.join(MARKER_FILES)}); give the folder that holds the recordings"
-        )
     models = [file for file in files if file.suffix.lower() == ".osim"]
     by_model = len(models) == 1 and not any(STATIC_NAME.search(file.stem) for file in captures)
     static, trials = (None, captures) if by_model else _static_and_trials(captures)
@@ -88,8 +80,31 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
             text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
     if not trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
+    sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
+    if sheets:
+        text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
     text += ["", "[settings]", *(_entry(Settings, *item) for item in Settings().model_dump().items()), ""]
     return "\n".join(text)
+
+
+def _expect_files(folder: Path) -> list[Path]:
+    """What is in the folder, recordings among it.
+
+    Raises:
+        FileError: there are none, or a name that no subject file can hold.
+    """
+    files = sorted(folder.iterdir())
+    for file in files:
+        if not _is_utf8(file.name):
+            raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
+    if not any(map(is_capture, files)):
+        inside = [f.name for f in files if f.is_dir() and any(map(is_capture, filter(Path.is_file, f.iterdir())))]
+        if inside:
+            raise FileError(folder, f"holds no file of markers, but its folder {inside[0]} does; give that one")
+        raise FileError(
+            folder, f"holds no file of markers ({', '.join(MARKER_FILES)}); give the folder that holds the recordings"
+        )
+    return files
 
 
 def _entry(table: type[Table], key: str, value: object, example: object = None, note: str = "") -> str:

@@ -108,12 +108,24 @@ def _window(value: object) -> tuple[float, float]:
     raise ValueError("must be [start, end] in seconds, the start before the end")
 
 
-def _belt_speed(value: object, info: ValidationInfo) -> float | Path:
-    if isinstance(value, str | Path):
-        return _file(value, info)
+def _belt_speed(value: object, info: ValidationInfo) -> float | tuple[float, float] | Path:
+    match value:
+        case str() | Path():
+            return _file(value, info)
+        case {"right": right, "left": left, **others} if not others:
+            return _one_belt_speed(right), _one_belt_speed(left)
+        case (right, left):  # as it is once read
+            return _one_belt_speed(right), _one_belt_speed(left)
+    return _one_belt_speed(value)
+
+
+def _one_belt_speed(value: object) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= 15:
         return float(value)
-    raise ValueError("must be the speed of a treadmill's belt in m/s (up to 15), or a file with it over time")
+    raise ValueError(
+        "must be the speed of a treadmill's belt in m/s (up to 15), of two belts { right = 1.2, left = 0.6 }, or a "
+        "file with it over time"
+    )
 
 
 File = Annotated[Path, BeforeValidator(_file)]
@@ -121,7 +133,7 @@ MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 TrialName = Annotated[str, BeforeValidator(_trial_name)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
 LengthUnit = Literal["mm", "cm", "m"]
-BeltSpeed = Annotated[float | Path, BeforeValidator(_belt_speed)]
+BeltSpeed = Annotated[float | tuple[float, float] | Path, BeforeValidator(_belt_speed)]
 
 
 class Model(Table):
@@ -153,7 +165,9 @@ class TrialFiles(Table):
     )
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
     belt_speed_m_s: BeltSpeed | None = Field(
-        default=None, description="of a treadmill: m/s, or a file with it over time; left out: by standing feet"
+        default=None,
+        description="of a treadmill: m/s, of two belts `{ right = 1.2, left = 0.6 }`, or a file with it over time; "
+        "left out: by standing feet",
     )
 
     @model_validator(mode="before")

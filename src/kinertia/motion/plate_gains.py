@@ -39,7 +39,7 @@ def gain_doubts(recording: Recording, trial: Trial, owners: Mapping[str, str]) -
         f"the gain of {heavy} or of {light} is wrong: while one foot stands alone, the body weighs "
         f"{mass_kg[heavy]:.1f} kg by the one and {mass_kg[light]:.1f} kg by the other ({100 * (ratio - 1):.0f} % "
         "apart), with what its markers say of its acceleration; check the sensitivities of both plates with a known "
-        "weight"
+        f"weight, or see whether a part of the weight was on no plate over {light} (a handrail, a crutch)"
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinertia.motion.gait_cycle import FeetUnderPelvis, Stride
 from kinertia.trial.belt import Belt
+from kinertia.trial.data import FEET
 
 _FOOT_FLAT = (10.0, 30.0)
 """% of the cycle in which the foot lies flat on the ground, until the heel rises."""
@@ -59,14 +60,15 @@ def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | Non
 
     Standing feet tell its speed where it is not stated, and always its direction.
     """
-    by_feet = _belt_velocity(feet, strides)
-    along = by_feet / max(float(np.linalg.norm(by_feet)), 1e-9)
+    by_side = _belt_velocities(feet, strides)
     paths = []
     for stride in strides:
+        by_feet = by_side[stride.side]
         start, end = (_at(feet, feet.heel[stride.side], time) for time in (stride.start_s, stride.end_s))
         under = by_feet * (stride.end_s - stride.start_s)
         if belt is not None:
-            under = along * belt.way_m(stride.start_s, stride.end_s)
+            along = by_feet / max(float(np.linalg.norm(by_feet)), 1e-9)
+            under = along * belt.under(FEET.index(stride.side)).way_m(stride.start_s, stride.end_s)
         paths.append((end - start - under) * [1.0, 0.0, 1.0])
     return np.array(paths).reshape(-1, 3)
 
@@ -102,6 +104,14 @@ def _double_support(stride: Stride) -> float:
 def _at(feet: FeetUnderPelvis, values: np.ndarray, time_s: float) -> np.ndarray:
     """(3,) values (n, 3) at this time."""
     return np.array([np.interp(time_s, feet.time, column) for column in values.T])
+
+
+def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> dict[str, np.ndarray]:
+    """By side: of both feet together, unless they stand on belts of different speeds."""
+    own = {side: _belt_velocity(feet, [one for one in strides if one.side == side]) for side in FEET}
+    moving = all(velocity.any() for velocity in own.values())
+    apart = np.linalg.norm(own["r"] - own["l"]) > _BELT_M_S
+    return own if moving and apart else dict.fromkeys(FEET, _belt_velocity(feet, strides))
 
 
 def _belt_velocity(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:

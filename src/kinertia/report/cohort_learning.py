@@ -20,7 +20,8 @@ from typing import Any
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.from_files import check_plates
 from kinertia.estimation.input_checks import known
-from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, information_of, learn
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
+from kinertia.estimation.person_information import PersonInformation, information_of
 from kinertia.estimation.session import person_instruments, session_instruments
 from kinertia.io.file_names import path_from
 from kinertia.io.output_folder import write_then_rename

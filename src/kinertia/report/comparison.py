@@ -6,7 +6,7 @@ the first result is what the others are compared with.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -77,6 +77,11 @@ def differences(first: Fit, other: Fit) -> list[Difference]:
     return compared
 
 
+def judged(compared: Sequence[Difference]) -> bool:
+    """Whether there are error bars to tell a change by."""
+    return any(np.isfinite(one.sd) for one in compared)
+
+
 def _sd(fit: Fit) -> np.ndarray:
     return np.full(fit.estimate.table().shape, np.nan) if fit.posterior is None else fit.posterior.sd
 
@@ -144,7 +149,7 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
                 "name": other,
                 "count": len(compared),
                 "changed": sum(one.changed for one in compared),
-                "judged": any(np.isfinite(one.sd) for one in compared),
+                "judged": judged(compared),
                 "rows": [_row(one) for one in compared],
             }
             for other, compared in pairs

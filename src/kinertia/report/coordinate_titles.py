@@ -63,8 +63,12 @@ def title_of(skeleton: Skeleton, column: int) -> str:
 
 
 def load_title(one: Coordinate, what: str) -> str:
-    """Moment or power of a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +"."""
+    """Moment or power of a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +".
+
+    Words that a figure of three panels beside one another has no room for are left out: "Trunk bending, to the right +"
+    is "Trunk moment, bending right +".
+    """
     if not one.title.endswith(" +"):
         return f"{one.title} {what}"
     joint, _, direction = one.title.partition(" ")
-    return f"{joint} {what}, {direction.replace(',', '')}"
+    return f"{joint} {what}, {direction.replace(', to the', '').replace(',', '')}"

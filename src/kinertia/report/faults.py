@@ -41,8 +41,9 @@ Sentences and changes of the joint moments are in `faults.json`.
   to 0.7 of their deviations, in one of seven walks by 1.4.
 - Turned plates, where markers are noisy: they show in the direction in which they push the body, to a third of a degree
   in most walks, but to 1.6 degrees in the Gait 2354 walk (60 frames a second), where 3 degrees may be chance and change
-  moments by twice their deviations. The path of the centre of pressure under the feet tells less: on sound walks, right
-  and left together, it is up to 4 degrees askew to the line from heel to toe.
+  moments by twice their deviations. A note of the fit then says from which angle on its trials show a turn. The path of
+  the centre of pressure under the feet tells less: on sound walks, right and left together, it is up to 4 degrees askew
+  to the line from heel to toe.
 - A floor that is too low by less than thick soles are high. It is named where the feet's lowest marker is more than
   50 mm above the floor; on fourteen people it is 23 to 44 mm. The forces would show it to 13 to 24 mm: too little.
 

@@ -108,7 +108,7 @@ def drawing(figure: Figure) -> Drawing:
     for cell in cells[len(suffixes) :]:
         cell.remove()
     for suffix, title in zip(suffixes, figure.layout["annotations"], strict=True):
-        panels[suffix].set_title(textwrap.fill(_text(title["text"]), _TITLE_LETTERS), loc="left")
+        panels[suffix].set_title(_in_lines(_text(title["text"])), loc="left")
     lower: np.ndarray | None = None
     for trace in figure.data:
         x, y = _numbers(trace, "x"), _numbers(trace, "y")
@@ -186,6 +186,12 @@ def _legend(panels: list[Axes]) -> tuple[list[Any], list[str]]:
         handles, labels = panel.get_legend_handles_labels()
         by_label = {**dict(zip(labels, handles, strict=True)), **by_label}
     return list(by_label.values()), list(by_label)
+
+
+def _in_lines(title: str) -> str:
+    """A title broken where it would leave its panel, but not inside its unit."""
+    whole = re.sub(r"\([^)]*\)", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title)
+    return textwrap.fill(whole, _TITLE_LETTERS).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _text(marked: object) -> str:

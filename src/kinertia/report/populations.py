@@ -12,13 +12,21 @@ from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.report.result_page import Part, render_parts
 from kinertia.report.row_figures import dot_figure
-from kinertia.studies.populations import RUCKSACK_KG, PopulationAccuracy, RucksackAccuracy
+from kinertia.studies.populations import (
+    INFORMED_SD,
+    RUCKSACK_KG,
+    MeanAccuracy,
+    PopulationAccuracy,
+    PopulationsStudy,
+    RucksackAccuracy,
+)
 
 HEADINGS = ("population", "prior", "mass (kg)", "CoM (mm)", "inertia (kg m2)", "moments (N m)", "coverage", "unlike")
 CAPTION = (
     "RMS errors, after the estimate / of what it started from. moments: what wrong parameters make of joint moments, "
     "with the true motion and forces. coverage: parameters within their 95 % intervals. unlike: people of whom the fit "
-    "says that they are unlike the prior."
+    "says that they are unlike the prior. exactly known: the distribution from which the people were drawn, the best "
+    "that any prior can do."
 )
 _SHOWN = {"mass": (1.0, ".2f"), "CoM": (1e3, ".1f"), "inertia": (1.0, ".3f")}
 """Factor to the unit of the heading, and digits."""
@@ -35,6 +43,17 @@ def population_rows(accuracies: Sequence[PopulationAccuracy]) -> list[list[str]]
         cells.append(_both(one.moments_nm, one.moments_before_nm, ".2f"))
         rows.append([one.title, one.prior, *cells, f"{100 * one.coverage:.1f} %", f"{100 * one.unlike:.0f} %"])
     return rows
+
+
+def mean_sentences(means: Sequence[MeanAccuracy]) -> list[str]:
+    """What is learnt of the mean of each population, a sentence for each."""
+    return [
+        f"Mean of {one.people} {one.title}: {one.informed} parameters are known to {INFORMED_SD:g} of the literature's "
+        f"deviations or better; of these {100 * one.coverage:.0f} % are within their 95 % intervals (of all "
+        f"{100 * one.coverage_of_all:.0f} %), and the tables' RMS error of {one.rms_before:.2f} deviations becomes "
+        f"{one.rms:.2f}."
+        for one in means
+    ]
 
 
 def rucksack_sentence(rucksacks: Sequence[RucksackAccuracy]) -> str:
@@ -60,15 +79,18 @@ def _both(after: float, before: float, form: str) -> str:
     return f"{after:{form}} / {before:{form}}"
 
 
-def populations_markdown(accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy]) -> str:
-    """The table, its caption, and the sentence of the rucksack."""
-    lines = [HEADINGS, ("---",) * 2 + ("--:",) * (len(HEADINGS) - 2), *population_rows(accuracies)]
+def populations_markdown(study: PopulationsStudy) -> str:
+    """The table, its caption, what is learnt of means, and the sentence of the rucksack."""
+    lines = [HEADINGS, ("---",) * 2 + ("--:",) * (len(HEADINGS) - 2), *population_rows(study.accuracies)]
     table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-    return f"{table}\n\n{accuracies[0].people} people each. {CAPTION}\n\n{rucksack_sentence(rucksacks)}\n"
+    people = f"{study.accuracies[0].people} people each. {CAPTION}"
+    texts = (table, people, "\n".join(mean_sentences(study.means)), rucksack_sentence(study.rucksacks))
+    return "\n\n".join(text for text in texts if text) + "\n"
 
 
-def render_populations(accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy]) -> str:
+def render_populations(study: PopulationsStudy) -> str:
     """The page."""
+    accuracies = study.accuracies
     figure = dot_figure(
         [f"{one.title}, {one.prior}" for one in accuracies],
         {
@@ -85,29 +107,27 @@ def render_populations(accuracies: Sequence[PopulationAccuracy], rucksacks: Sequ
     )
     parts = [
         Part("Errors against the truth", (CAPTION,), figure, headings=HEADINGS, rows=population_rows(accuracies)),
-        Part("A rucksack", (rucksack_sentence(rucksacks),)),
+        Part("What a group teaches of its mean", tuple(mean_sentences(study.means))),
+        Part("A rucksack", (rucksack_sentence(study.rucksacks),)),
     ]
     return render_parts("What does a wrong prior cost?", f"{accuracies[0].people} people of each population.", parts)
 
 
-def populations_summary(
-    accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy], seed: int
-) -> dict[str, Any]:
+def populations_summary(study: PopulationsStudy, seed: int) -> dict[str, Any]:
     """What `populations.json` says."""
     return {
         "kinertia": VERSION,
         "seed": seed,
-        "populations": [asdict(one) for one in accuracies],
-        "rucksack": [asdict(one) for one in rucksacks],
+        "populations": [asdict(one) for one in study.accuracies],
+        "means": [asdict(one) for one in study.means],
+        "rucksack": [asdict(one) for one in study.rucksacks],
     }
 
 
-def save_populations(
-    accuracies: Sequence[PopulationAccuracy], rucksacks: Sequence[RucksackAccuracy], seed: int, folder: str | Path
-) -> None:
+def save_populations(study: PopulationsStudy, seed: int, folder: str | Path) -> None:
     """Write `populations.html`, `populations.json` and `populations.md` into a folder."""
     with complete_folder(folder, "study populations") as work:
-        text = json.dumps(populations_summary(accuracies, rucksacks, seed), indent=2)
+        text = json.dumps(populations_summary(study, seed), indent=2)
         (work / "populations.json").write_text(text + "\n", encoding="utf-8")
-        (work / "populations.md").write_text(populations_markdown(accuracies, rucksacks), encoding="utf-8")
-        (work / "populations.html").write_text(render_populations(accuracies, rucksacks), encoding="utf-8")
+        (work / "populations.md").write_text(populations_markdown(study), encoding="utf-8")
+        (work / "populations.html").write_text(render_populations(study), encoding="utf-8")

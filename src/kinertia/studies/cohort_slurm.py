@@ -12,6 +12,7 @@ from typing import Any
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
 from kinertia.studies.cohort_cluster import HOW, SCHEDULING
+from kinertia.studies.cohort_slurm_jobs import replaced_jobs
 
 _NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
 """Otherwise SLURM leaves a file per job where the command was started."""
@@ -26,7 +27,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
         people: how many are to be fitted; never more workers.
 
     Raises:
-        KinertiaError: dask-jobqueue or SLURM is not here.
+        KinertiaError: dask-jobqueue or SLURM is not here, SLURM takes no job, or none of them reports.
     """
     if find_spec("dask_jobqueue") is None:
         raise KinertiaError(f"--slurm needs dask-jobqueue, which is not installed; install: {HOW}")
@@ -54,7 +55,6 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
             **({} if wanted.python is None else {"python": wanted.python}),
         ) as cluster,
         Client(cluster) as client,
+        replaced_jobs(cluster, client, wanted, min(wanted.workers, people)),
     ):
-        jobs = min(wanted.workers, people)
-        cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # another job for each that SLURM ends
         yield client

@@ -1,7 +1,9 @@
 """What does a wrong prior cost? People whom the tables do not describe, with the adults' prior and with their own.
 
 Every person walks once in a laboratory with skin motion and calibration errors (`accuracy`), and is estimated twice
-from the same recording: as if nothing were known, and with what the subject file can say of such a person. A draw
+from the same recording: as if nothing were known, and with what the subject file can say of such a person. What the
+recording says is then joined with two more priors, without estimating anew: with the one learnt from others of the
+population, and with the distribution from which the person was drawn, which is the best that any prior can do. A draw
 depends on seed, population and its number only.
 """
 
@@ -16,7 +18,8 @@ import numpy as np
 from kinertia.estimation.attached import with_attached_prior
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.known_body import with_prosthesis
-from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, PersonInformation, learn, person_information
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
+from kinertia.estimation.person_information import PersonInformation, person_information
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
@@ -48,6 +51,8 @@ GAIN_SD_PERCENT = 0.2
 """What a laboratory states that has put known weights on its plates: what the literature says of sound ones."""
 _PARTS = 4
 """Of a group; the prior of each part is learnt from the others."""
+INFORMED_SD = 0.5
+"""A parameter's mean is informed by the group if its deviation is less, in the literature's deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +104,37 @@ class PopulationAccuracy:
 
 
 @dataclass(frozen=True)
+class MeanAccuracy:
+    """The mean that was learnt from all people of a population.
+
+    Attributes:
+        title: of the population.
+        people: how many.
+        informed: of how many parameters the trials inform the mean (`INFORMED_SD`).
+        rms, rms_before: RMS error of these, and of the tables, in the literature's deviations.
+        coverage: share of these within their 95 % intervals.
+        coverage_of_all: the same of all parameters.
+    """
+
+    title: str
+    people: int
+    informed: int
+    rms: float
+    rms_before: float
+    coverage: float
+    coverage_of_all: float
+
+
+@dataclass(frozen=True)
+class PopulationsStudy:
+    """All that the study finds."""
+
+    accuracies: tuple[PopulationAccuracy, ...]
+    means: tuple[MeanAccuracy, ...]
+    rucksacks: tuple[RucksackAccuracy, ...]
+
+
+@dataclass(frozen=True)
 class RucksackAccuracy:
     """What is found of a rucksack of unknown mass.
 
@@ -118,20 +154,60 @@ class RucksackAccuracy:
 
 def run_populations(
     people: int = 20, seed: int = 1, workers: int | None = None, progress: Callable[[float], None] = lambda share: None
-) -> tuple[list[PopulationAccuracy], list[RucksackAccuracy]]:
-    """Every population with the adults' prior and with its own, and people with a rucksack on plates of whose gain the
-    laboratory states nothing, and something.
+) -> PopulationsStudy:
+    """Every population with all priors, what is learnt of its mean, and people with a rucksack on plates of whose gain
+    the laboratory states nothing, and something.
     """
     cases = [(name, number) for name in (*POPULATIONS, RUCKSACK.name) for number in range(people)]
     drawn = in_parallel(partial(run_person, seed), cases, workers, progress)
-    rows = []
-    for i, population in enumerate(POPULATIONS.values()):
-        both = zip(*drawn[i * people : (i + 1) * people], strict=True)
-        adults, own = (list(each) for each in both)
-        outcomes = {"adults'": adults, "own": own, "learnt from others": _with_learnt_prior(adults)}
-        rows += [_summarised(population.title, prior, each) for prior, each in outcomes.items() if each]
+    rows: list[PopulationAccuracy] = []
+    means: list[MeanAccuracy] = []
+    for i, name in enumerate(POPULATIONS):
+        of_group, of_mean = of_population(name, drawn[i * people : (i + 1) * people])
+        rows += of_group
+        means += of_mean
     carried = zip(*drawn[len(POPULATIONS) * people :], strict=True)
-    return rows, [_of_rucksack(gain, each) for gain, each in zip((None, GAIN_SD_PERCENT), carried, strict=True)]
+    rucksacks = [_of_rucksack(gain, each) for gain, each in zip((None, GAIN_SD_PERCENT), carried, strict=True)]
+    return PopulationsStudy(tuple(rows), tuple(means), tuple(rucksacks))
+
+
+def of_population(
+    name: str, drawn: Sequence[tuple[PersonOutcome, ...]]
+) -> tuple[list[PopulationAccuracy], list[MeanAccuracy]]:
+    """A row for each prior, and what is learnt of the mean (nothing of few people).
+
+    Args:
+        name: a key of `POPULATIONS`.
+        drawn: of each person, what `run_person` says.
+    """
+    population, adults = POPULATIONS[name], literature_prior(walking_subject().literature)
+    with_adults, with_own = (list(each) for each in zip(*drawn, strict=True))
+    right = population.of(adults)
+    outcomes = {
+        "adults'": with_adults,
+        "own": with_own,
+        "learnt from others": _with_learnt_prior(with_adults),
+        "exactly known": [_again(person, right) for person in with_adults],
+    }
+    rows = [_summarised(population.title, prior, each) for prior, each in outcomes.items() if each]
+    if len(drawn) < FEWEST_PEOPLE:
+        return rows, []
+    return rows, [_of_mean(population.title, learn([known(one.information) for one in with_adults]), adults, right)]
+
+
+def _of_mean(title: str, learnt: LearntPrior, adults: BspPrior, right: BspPrior) -> MeanAccuracy:
+    shift = ((right.mean.table() - adults.mean.table()) / adults.sd).ravel()
+    error, informed = learnt.mean - shift, learnt.mean_sd < INFORMED_SD
+    within = np.abs(error) < WITHIN * learnt.mean_sd
+    return MeanAccuracy(
+        title,
+        learnt.people,
+        int(informed.sum()),
+        rms(error[informed]),
+        rms(shift[informed]),
+        float(within[informed].mean()),
+        float(within.mean()),
+    )
 
 
 def _of_rucksack(gain_sd_percent: float | None, people: Sequence[PersonOutcome]) -> RucksackAccuracy:
@@ -167,7 +243,7 @@ def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
 def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
     """Each person once more, with the prior learnt from those of the other parts of the group; none where they are few.
 
-    In linear theory: what the recording says joined with the prior, without estimating anew.
+    What the recording says joined with the prior, without estimating motion and calibration anew.
     """
     prior = literature_prior(walking_subject().literature)
     parts = [list(people[k::_PARTS]) for k in range(_PARTS)]
@@ -177,20 +253,16 @@ def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
         if len(others) < FEWEST_PEOPLE:
             return []
         group = learn(others).of(prior)
-        outcomes += [_again(person, prior, group) for person in part]
+        outcomes += [_again(person, group) for person in part]
     return outcomes
 
 
-def _again(person: PersonOutcome, literature: BspPrior, group: BspPrior) -> PersonOutcome:
+def _again(person: PersonOutcome, group: BspPrior) -> PersonOutcome:
     seen = known(person.information)
-    sd = literature.sd.ravel()
-    mean, before = (group.mean.table() - literature.mean.table()).ravel() / sd, group.covariance / np.outer(sd, sd)
-    covariance = np.linalg.inv(seen.information + np.linalg.inv(before))
-    relative = mean + covariance @ (seen.right - seen.information @ mean)
-    table = literature.mean.table() + (sd * relative).reshape(-1, 10)
-    estimate = BodySegmentParameters.from_table(group.mean.segments, table)
-    deviations = (np.sqrt(np.diag(covariance)) * sd).reshape(-1, 10)
-    return _compared(person.trial, estimate, group.mean, deviations, False, seen)
+    estimate, covariance = seen.with_prior(group)
+    sd = np.sqrt(np.diag(covariance)).reshape(-1, 10)
+    unlike = unlikeness(group, estimate, covariance).unlike
+    return _compared(person.trial, estimate, group.mean, sd, unlike, seen)
 
 
 def own_prior(name: str, adults: BspPrior) -> BspPrior:

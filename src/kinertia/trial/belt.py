@@ -19,7 +19,7 @@ class Belt:
 
     Attributes:
         time: (k,) s, on the markers' clock.
-        speed_m_s: (k,).
+        speed_m_s: (k,); of two belts (k, 2), under the right and the left foot.
 
     Examples:
         >>> belt = Belt(np.array([0.0, 2.0]), np.array([1.0, 2.0]))
@@ -27,10 +27,16 @@ class Belt:
         [[-1.5, 0.0, 0.0]]
         >>> belt.way_m(0.0, 2.0)
         3.0
+        >>> Belt(np.zeros(1), np.array([[1.4, 0.7]])).under(1).way_m(0.0, 2.0)
+        1.4
     """
 
     time: np.ndarray
     speed_m_s: np.ndarray
+
+    def under(self, foot: int) -> Belt:
+        """The belt under the right (0) or the left foot (1)."""
+        return self if self.speed_m_s.ndim == 1 else Belt(self.time, self.speed_m_s[:, foot])
 
     def velocity(self, time: np.ndarray, along: np.ndarray) -> np.ndarray:
         """(n, 3) m/s at these times, in the direction (3,) in which standing feet go; zero where they go nowhere."""

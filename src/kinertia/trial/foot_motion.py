@@ -74,9 +74,10 @@ def foot_motions(feet: Sequence[Markers], loaded: BoolArray, belt: Belt | None =
     velocities = ground if len(ground) == 2 else (ground or [np.zeros(3)]) * 2
     steps = _steps(heights, loaded)
     result = []
-    for markers, place, height, velocity, of_ground in zip(feet, places, heights, moves, velocities, strict=True):
+    for foot, (markers, place, height, velocity) in enumerate(zip(feet, places, heights, moves, strict=True)):
+        of_ground = velocities[foot]
         if belt is not None:
-            of_ground = belt.velocity(markers.time, of_ground)[:, None]
+            of_ground = belt.under(foot).velocity(markers.time, of_ground)[:, None]
         slow = _velocity(markers, place, _STILL_SPAN_S)
         still = _still(markers.time, slow - of_ground) | _still(markers.time, slow)
         result.append(FootMotion(_over(steps, height), velocity - of_ground, still))

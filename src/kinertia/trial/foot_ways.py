@@ -21,6 +21,8 @@ _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 _LEAST_SWING_M_S = 1.0
 """Who does not move the feet faster takes no steps."""
 _SHORTEST_S = 0.1
+_LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
+"""Shares of the line between a foot's outermost markers."""
 _LANDING_S = 0.05
 """A foot may bear load so long before it stands and after."""
 
@@ -56,6 +58,13 @@ class FootWay:
         length = np.maximum(np.linalg.norm(along, axis=1), 1e-6)
         ahead: FloatArray = ((place - back) * along).sum(axis=1) / length
         return ahead, ahead - length
+
+    def load_path(self, time: FloatArray, weight: FloatArray) -> FloatArray:
+        """(k, 2) m, where the load of a step is expected that has this vertical force (k,) N at these times (k,)."""
+        back, front = (self._at(end, time) for end in (self.back, self.front))
+        share = _LOAD_BEGINS + _LOAD_GOES_ON * np.cumsum(weight) / weight.sum()
+        result: FloatArray = back + (front - back) * share[:, None]
+        return result
 
     def _at(self, end: FloatArray, time: FloatArray) -> FloatArray:
         return np.column_stack([np.interp(time, self.time, end[:, axis]) for axis in range(2)])
@@ -106,12 +115,12 @@ def _seen(place: FloatArray) -> BoolArray:
 def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | None) -> list[FloatArray]:
     """(n, m, 3) m/s of every marker of each foot against the ground."""
     velocities = [np.gradient(place, markers.time, axis=0) for place in places]
-    belt = _belt(places, velocities)
-    if stated is not None:
-        return [velocity - stated.velocity(markers.time, belt)[:, None] for velocity in velocities]
-    if np.linalg.norm(belt) < _LEAST_BELT_M_S:
-        belt = np.zeros(3)
-    return [velocity - belt for velocity in velocities]
+    belts = _belts(places, velocities)
+    if stated is None:
+        belts = [belt if np.linalg.norm(belt) >= _LEAST_BELT_M_S else np.zeros(3) for belt in belts]
+    else:
+        belts = [stated.under(foot).velocity(markers.time, belt)[:, None] for foot, belt in enumerate(belts)]
+    return [velocity - belt for velocity, belt in zip(velocities, belts, strict=True)]
 
 
 def belt_doubts(markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt) -> list[str]:
@@ -120,16 +129,30 @@ def belt_doubts(markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt)
     if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
         return []
     velocities = [np.gradient(place, markers.time, axis=0) for place in places]
-    shown = float(np.linalg.norm(_belt(places, velocities)))
-    stated = belt.way_m(markers.time[0], markers.time[-1]) / float(np.ptp(markers.time))
-    if abs(shown - stated) <= max(_BELT_APART * max(stated, shown), _LEAST_BELT_M_S):
+    belts = [float(np.linalg.norm(each)) for each in _belts(places, velocities)]
+    stated = [belt.under(f).way_m(*markers.time[[0, -1]]) / float(np.ptp(markers.time)) for f in range(len(FEET))]
+    pairs = list(zip(stated, belts, strict=True))
+    off = [abs(one - other) / max(_BELT_APART * max(one, other), _LEAST_BELT_M_S) for one, other in pairs]
+    worst = int(np.argmax(off))
+    if off[worst] <= 1.0:
         return []
-    ratio = stated / max(shown, 1e-9)
+    ratio = stated[worst] / max(belts[worst], 1e-9)
     unit = "; it looks to be in km/h" if abs(ratio / 3.6 - 1) < _BELT_APART else ""
+    if belt.speed_m_s.ndim == 2 and np.abs(np.subtract(stated, belts[::-1])).max() < _LEAST_BELT_M_S:
+        unit = ": right and left look exchanged"
+    which = f" under the {('right', 'left')[worst]} foot" if belt.speed_m_s.ndim == 2 else ""
     return [
-        f"the stated speed of the belt is {stated:.2f} m/s on average, but standing feet go {shown:.2f} m/s{unit}: "
-        "correct belt_speed_m_s (m/s), or leave it out"
+        f"the stated speed of the belt{which} is {stated[worst]:.2f} m/s on average, but standing feet go "
+        f"{belts[worst]:.2f} m/s{unit}: correct belt_speed_m_s (m/s), or leave it out"
     ]
+
+
+def _belts(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> list[FloatArray]:
+    """(3,) m/s of what each foot stands on: of both together, unless they stand on belts of different speeds."""
+    own = [_belt([place], [velocity]) for place, velocity in zip(places, velocities, strict=True)]
+    moving = min(float(np.linalg.norm(belt)) for belt in own) >= _LEAST_BELT_M_S
+    apart = float(np.linalg.norm(own[0] - own[1])) >= _LEAST_BELT_M_S
+    return own if moving and apart else [_belt(places, velocities)] * len(own)
 
 
 def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> FloatArray:

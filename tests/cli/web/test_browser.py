@@ -16,6 +16,7 @@ from chromium import DESKTOP, PHONE, picture, playwright
 from kinertia.cli.measured_demo import FILES
 from kinertia.cli.web import jobs
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_file import read_subject
 from kinertia.report.saved_fit import load_fit
 
@@ -183,6 +184,39 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
     tab.quiet()
 
 
+def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monkeypatch):
+    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", "pass"))
+    person = app.library.add("Rows by keyboard")
+    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+        shutil.copyfile(path, person.folder / path.name)
+    (person.folder / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
+    tab = Tab(browser, app)
+    page = tab.page
+    page.goto(f"{app.address}people/{quote(person.name)}")
+    press(page, "measures.csv is used as", "w")
+    press(page, "Population", "c")
+    press(page, "Marker set", "p")
+    for title, entries in (
+        ("Segments that were measured", {"Segment": "thigh_r", "Mass (kg)": "4.9 +- 0.4", "Measured by": "DXA"}),
+        (
+            "What is worn or carried",
+            {"Name": "rucksack", "Segment": "torso", "Mass (kg)": "unknown", "On the scale": "no", "CoM": "-150 250 0"},
+        ),
+    ):
+        press(page, title)
+        for label, text in entries.items():
+            press(page, label, "Home")
+            page.keyboard.type(text)
+    press(page, "Save and check")
+    playwright.expect(page.get_by_text("Segments that were measured (1)")).to_be_visible(timeout=PATIENCE_MS)
+    wanted = read_subject(person.subject)
+    assert wanted.prior.measures == (person.folder / "measures.csv").resolve()
+    assert (wanted.subject.population, wanted.model.markers) == ("child", "plug-in-gait")
+    assert (wanted.segments["thigh_r"].mass_kg, wanted.segments["thigh_r"].source) == ((4.9, 0.4), "DXA")
+    assert (wanted.attached[0].name, wanted.attached[0].com_mm) == ("rucksack", (-150.0, 250.0, 0.0))
+    tab.quiet()
+
+
 def test_an_unknown_marker_is_assigned_by_a_click(tab, app):
     person = app.library.add("Unknown marker")
     for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
@@ -207,18 +241,20 @@ def test_an_unknown_marker_is_assigned_by_a_click(tab, app):
     tab.quiet()
 
 
-@pytest.mark.parametrize("viewport", [DESKTOP, PHONE], ids=["desktop", "phone"])
-def test_pages_have_no_barriers_and_fit_a_phone(browser, app, viewport):
+def test_pages_have_no_barriers_fit_a_phone_and_are_dark_where_the_system_is(browser, app):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
-    tab = Tab(browser, app, viewport).home()
+    tab = Tab(browser, app).home()
     if app.library.person("Barrier-free") is None:
         with_everything(app.library.add("Barrier-free"))
     for path in ("", "people/Barrier-free", "people/Barrier-free/markers", "compare", "people/nobody"):
         tab.page.goto(app.address + path)
         tab.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
-        assert tab.page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], path
-        if viewport is PHONE:
-            continue
-        violations = axe.Axe().run(tab.page).response["violations"]
-        assert [(one["id"], [node["target"] for node in one["nodes"]]) for one in violations] == [], path
+        for viewport, scheme in ((DESKTOP, "light"), (PHONE, "dark")):
+            tab.page.set_viewport_size(viewport)
+            tab.page.emulate_media(color_scheme=scheme)
+            assert tab.page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], path
+            assert (picture(tab.page)[-20:, :10].mean() < 0.35) == (scheme == "dark")
+            violations = axe.Axe().run(tab.page).response["violations"]
+            found = [(one["id"], [node["target"] for node in one["nodes"]]) for one in violations]
+            assert found == [], (path, viewport, scheme)
     tab.page.close()

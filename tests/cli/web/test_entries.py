@@ -22,6 +22,7 @@ from kinertia.cli.web.file_table import file_table, uses_of, with_uses, within_f
 from kinertia.cli.web.library import Library
 from kinertia.errors import FileError, SettingsError
 from kinertia.io.marker_set_file import preset_names
+from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Subject
 
@@ -112,6 +113,22 @@ def test_what_was_corrected_stays_when_files_are_added_or_removed(person, measur
     assert "trial" in trouble(person)
 
 
+def test_a_sheet_of_measures_is_used_until_it_is_put_aside(person, measured_walk):
+    put(person, measured_walk, "static.c3d", "walk.c3d")
+    recognise(person)
+    write_form(person, {"sex": "male"})
+    (person.folder / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
+    recognise(person)
+    assert used(person) == {"static.c3d": "static", "walk.c3d": "trial", "measures.csv": "measures"}
+    assert read_subject(person.subject).prior.measures == (person.folder / "measures.csv").resolve()
+    (row,) = [row for row in file_table(person.files(), entries(person)) if row.name == "measures.csv"]
+    assert row.kind == "girths and lengths of the person"
+    write_form(person, {USE + "measures.csv": ""})
+    assert read_subject(person.subject).prior.measures is None
+    recognise(person)
+    assert "measures.csv" not in used(person), "what was put aside stays so"
+
+
 def test_two_files_for_one_use_are_an_error(person, measured_walk):
     put(person, measured_walk, "static.c3d", "walk.c3d")
     recognise(person)
@@ -200,7 +217,7 @@ def test_the_table_gives_the_entries_back():
         "subject": {"sex": "male"},
         "model": {"static": "s.trc", "markers": "plug-in-gait", "length_unit": "mm"},
         "trial": [{"markers": "w.trc", "forces": "w.mot", "window_s": [1, 2]}, {"markers": "v.trc"}],
-        "prior": {"bsp": "bsp.csv", "masses_kept": True},
+        "prior": {"bsp": "bsp.csv", "measures": "tape.csv", "masses_kept": True},
     }
     uses = {name: use for name, use in uses_of(content).items() if name != "plug-in-gait"}
     assert with_uses(content, uses) == content

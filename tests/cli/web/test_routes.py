@@ -14,6 +14,8 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_server import running
 from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
+from kinertia.io.measures_file import measures_sheet
+from kinertia.report.measures_picture import measures_picture
 
 
 @pytest.fixture
@@ -39,6 +41,15 @@ def test_people_are_compared_as_on_the_command_line(app, measured_demo):
     assert "Comparison: Anna, Ben" in compared.text
     assert "sandbox" in compared.headers["content-security-policy"]
     assert "written by the command line" in app.ask("/people/Anna").text
+
+
+def test_the_sheet_of_measures_is_saved_as_the_command_line_writes_it(app, measured_walk):
+    person = app.library.add("Anna")
+    shutil.copyfile(measured_walk / "walk.c3d", person.folder / "walk.c3d")
+    linked = app.ask("/people/Anna").text
+    for name, content in (("measures.csv", measures_sheet()), ("measures.svg", measures_picture())):
+        assert f'href="{app.root}/{name}" download' in linked
+        assert app.ask(f"/{name}").text == content
 
 
 def test_who_has_no_results_is_not_compared(app):

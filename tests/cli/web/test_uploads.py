@@ -1,10 +1,11 @@
 """Dropped files: names made harmless, limits kept, archives and other kinds refused in the command line's words."""
 
 import asyncio
+import http.client
 import io
 import json
 import zipfile
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 import pytest
 
@@ -110,6 +111,27 @@ def test_markup_that_a_name_may_have_is_text_on_the_page(served, person):
     drop(served, person, "a&amp;'b.trc")
     page = served.ask(f"/people/{quote(person.name)}").text
     assert "a&amp;amp;&#39;b.trc" in page
+
+
+@pytest.mark.parametrize("size", [10, 3_000_000])
+def test_who_sends_a_refused_file_is_heard_out(served, person, size):
+    """A browser that still sends takes a connection that is closed for a failure, and never sees the answer."""
+    connection = http.client.HTTPConnection(urlsplit(served.address).netloc, timeout=20)
+    connection.putrequest("POST", f"{served.root}/people/{quote(person.name)}/files?name=letter.pdf")
+    connection.putheader("Content-Length", str(size))
+    connection.endheaders()
+    answer = http.client.HTTPResponse(connection.sock, method="POST")
+    answer.begin()
+    assert answer.status == 422
+    assert "'.pdf' file cannot be checked" in json.loads(answer.read())["problem"]
+    connection.sock.sendall(bytes(size))
+    connection.sock.sendall(
+        f"GET {served.root}/ HTTP/1.1\r\nHost: {connection.host}:{connection.port}\r\n\r\n".encode()
+    )
+    again = http.client.HTTPResponse(connection.sock)
+    again.begin()
+    assert again.status == 200
+    connection.close()
 
 
 def test_other_kinds_are_refused_in_the_words_of_the_command_line(served, person, tmp_path):

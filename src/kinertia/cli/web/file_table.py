@@ -14,6 +14,7 @@ from typing import Any, get_args
 from kinertia.errors import SettingsError
 from kinertia.io.file_names import last_part
 from kinertia.io.marker_set_file import preset_names
+from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.subject_draft import holds_forces, holds_loads, is_capture
 from kinertia.io.subject_file import TABLES
@@ -22,6 +23,7 @@ Content = dict[str, Any]
 """Entries of a subject file, as `tomllib` reads them."""
 NOT_USED = ""
 _MODEL_FILES = ("static", "osim", "markers")
+_PRIOR_FILES = ("bsp", "measures")
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
         return "marker set", (("markers", "marker set"), unused)
     if suffix == ".csv" and "information" in _first_line(file):
         return "body segment parameters of an earlier fit", (("bsp", "what the estimate starts from"), unused)
+    if is_measures_sheet(file):
+        return "girths and lengths of the person", (("measures", "what was measured of the body"), unused)
     if suffix in (".toml", ".csv"):
         return "used only where the text of the subject file names it", ()
     return "nothing that Kinertia reads", ()
@@ -83,12 +87,10 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
 
 def uses_of(content: Content) -> dict[str, str]:
     """Use by file name."""
-    model, uses = _table(content, "model"), {}
-    for key in _MODEL_FILES:
-        if isinstance(model.get(key), str):
-            uses[model[key]] = key
-    if isinstance(bsp := _table(content, "prior").get("bsp"), str):
-        uses[bsp] = "bsp"
+    uses: dict[str, str] = {}
+    for name, keys in (("model", _MODEL_FILES), ("prior", _PRIOR_FILES)):
+        table = _table(content, name)
+        uses |= {table[key]: key for key in keys if isinstance(table.get(key), str)}
     for trial in _trials(content):
         markers = str(trial.get("markers", ""))
         uses[markers] = "trial"
@@ -132,9 +134,8 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
     changed = {**content, "model": model, "trial": trials}
     if not trials:
         del changed["trial"]
-    prior = {key: value for key, value in _table(content, "prior").items() if key != "bsp"}
-    if bsp := by_use.get("bsp"):
-        prior["bsp"] = bsp[0]
+    prior = {key: value for key, value in _table(content, "prior").items() if key not in _PRIOR_FILES}
+    prior |= {key: own[0] for key in _PRIOR_FILES if (own := by_use.get(key))}
     return {**changed, "prior": prior} if prior else {key: changed[key] for key in changed if key != "prior"}
 
 
@@ -143,7 +144,7 @@ def with_new_files(content: Content, draft: Content, present: Iterable[str], see
     here, new = set(present), set(present) - set(seen)
     drafted = uses_of(draft)
     uses = {name: use for name, use in uses_of(content).items() if name in here}
-    single = {use for use in uses.values() if use in ("static", "osim", "markers", "bsp")}
+    single = {use for use in uses.values() if use in (*_MODEL_FILES, *_PRIOR_FILES)}
     if single & {"static", "osim"}:
         single |= {"static", "osim"}
     for name, use in drafted.items():

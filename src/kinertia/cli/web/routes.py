@@ -25,7 +25,9 @@ from kinertia.cli.web.person_page import person_page, progress, standing
 from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, to
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
+from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import check_folder, complete_folder, expect_own_folder
+from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
@@ -40,6 +42,8 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/example", actions.add_example, methods=["POST"]),
         Route("/compare", actions.compare),
         Route("/compare/page", actions.compared),
+        Route("/measures.csv", actions.measures_sheet),
+        Route("/measures.svg", actions.measures_picture),
         Route("/stop", actions.end, methods=["POST"]),
         Route("/people/{name}", actions.person),
         Route("/people/{name}/files", actions.upload, methods=["POST"]),
@@ -113,7 +117,7 @@ class _Actions:
         try:
             path = await receive(person, request.query_params.get("name", ""), request.stream())
         except KinertiaError as error:
-            return JSONResponse({"problem": str(error)}, 422, {"connection": "close"})
+            return JSONResponse({"problem": str(error)}, 422)
         return JSONResponse({"name": path.name})
 
     async def recognised(self, request: Request) -> Response:
@@ -226,6 +230,14 @@ class _Actions:
             return render_comparison({person.name: load_fit(person.results) for person in chosen})
 
         return HTMLResponse(await run_in_threadpool(made), headers={"content-security-policy": RESULT_POLICY})
+
+    async def measures_sheet(self, request: Request) -> Response:
+        """The empty sheet of girths and lengths that `kinertia init --measures` writes, to save."""
+        return Response(measures_sheet(), media_type="text/csv")
+
+    async def measures_picture(self, request: Request) -> Response:
+        """Where to measure, to save."""
+        return Response(measures_picture(), media_type="image/svg+xml")
 
     async def end(self, request: Request) -> Response:
         """Stop the server."""

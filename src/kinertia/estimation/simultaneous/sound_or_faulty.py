@@ -51,6 +51,20 @@ class SoundOrFaulty:
         share = self.faulty_share
         return float(np.sqrt((1.0 - share) * self.sound_sd**2 + share * self.faulty_sd**2))
 
+    def least_told(self, sd: float) -> float:
+        """The smallest error that data with this deviation make likelier to be of a faulty instrument than of a sound
+        one; infinite where there is only one kind.
+
+        >>> prior = SoundOrFaulty(0.1, 2.0, 0.05)
+        >>> round(prior.least_told(0.3), 2), round(prior.least_told(1.6), 2)
+        (0.99, 5.37)
+        """
+        if not 0.0 < self.faulty_share < 1.0:
+            return float("inf")
+        sound, faulty = (float(np.hypot(sd, own)) for own in (self.sound_sd, self.faulty_sd))
+        odds = np.log((1.0 - self.faulty_share) / self.faulty_share * faulty / sound)
+        return float(np.sqrt(2.0 * odds / (sound**-2 - faulty**-2)))
+
     def draw(self, rng: np.random.Generator) -> float:
         """One instrument's error."""
         faulty = rng.random() < self.faulty_share

@@ -1,0 +1,57 @@
+"""How fast the body is by its markers, and how fast the forces make it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.motion.markers_centre import markers_centre
+from kinertia.motion.smoothing import SmoothingError, smooth
+from kinertia.trial.data import FloatArray, Trial
+
+_PELVIS_HZ = 6.0
+_LEAST_WINDOW_S = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class CausedVelocity:
+    """(n, 3) m/s over (n,) s: of the pelvis, of the markers' centre, and of a body of this mass as the forces cause
+    them.
+    """
+
+    time: FloatArray
+    pelvis: FloatArray
+    centre: FloatArray
+    caused: FloatArray
+    mass_kg: float
+
+
+def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:
+    """Of every window in which the sum of the forces is known, if it is long enough."""
+    worn = [label for label in trial.markers.labels if owners.get(label) == "pelvis"]
+    whole = markers_centre(owners, trial.markers)
+    if not worn or whole is None:
+        return []
+    place = trial.markers.select(worn).positions.mean(axis=1)
+    seen = np.isfinite(place).all(axis=1)
+    if not seen.any():
+        return []
+    try:
+        pelvis_m, centre_m = (smooth(trial.markers.time[seen], part[seen], _PELVIS_HZ) for part in (place, whole))
+    except SmoothingError:
+        return []
+    first, last = trial.markers.time[seen][[0, -1]]
+    parts = []
+    for start, end in trial.carried_windows():
+        inside = (trial.loads.time >= max(start, first) - 1e-9) & (trial.loads.time <= min(end, last) + 1e-9)
+        time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
+        if len(time) < 10 or np.ptp(time) < _LEAST_WINDOW_S - 1e-9 or not force[:, 1].mean() > 0:
+            continue
+        mass_kg = float(force[:, 1].mean()) / GRAVITY_M_S2
+        impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
+        caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
+        parts.append(CausedVelocity(time, pelvis_m(time, 1), centre_m(time, 1), caused, mass_kg))
+    return parts

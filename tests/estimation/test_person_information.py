@@ -1,0 +1,41 @@
+"""What a person's recordings say, taken out of an estimate and put back."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.estimation.person_information import PersonInformation, person_information
+from kinertia.estimation.prior import literature_prior
+from kinertia.synthetic.populations import POPULATIONS
+from kinertia.synthetic.walk import walking_subject
+
+PRIOR = literature_prior(walking_subject().literature)
+SIZE = PRIOR.covariance.shape[0]
+
+
+def seen(seed):
+    """A person of whom twenty combinations are known well."""
+    rng = np.random.default_rng(seed)
+    rows = 0.1 * rng.standard_normal((20, SIZE))
+    body = ((PRIOR.draw(rng).table() - PRIOR.mean.table()) / PRIOR.sd).ravel()
+    return PersonInformation("", PRIOR, rows.T @ rows, rows.T @ rows @ body)
+
+
+def test_what_is_taken_out_of_an_estimate_does_not_depend_on_its_prior():
+    """Nor on the body at which the fit linearised: the same recordings by two priors far apart."""
+    person = seen(0)
+    far = POPULATIONS["obese"].of(PRIOR)
+    for prior in (PRIOR, replace(PRIOR, covariance=2.0 * PRIOR.covariance)):
+        estimate, covariance = person.with_prior(prior)
+        out = person_information("", PRIOR, prior, estimate, covariance)
+        np.testing.assert_allclose(out.information, person.information, atol=1e-4 * np.abs(person.information).max())
+        np.testing.assert_allclose(out.right, person.right, atol=1e-4 * np.abs(person.right).max())
+        again, _ = out.with_prior(far)
+        np.testing.assert_allclose(again.table(), person.with_prior(far)[0].table(), atol=1e-3)
+
+
+def test_recordings_that_say_nothing_leave_the_prior():
+    silent = PersonInformation("", PRIOR, np.zeros((SIZE, SIZE)), np.zeros(SIZE))
+    estimate, covariance = silent.with_prior(PRIOR)
+    np.testing.assert_allclose(estimate.table(), PRIOR.mean.table())
+    np.testing.assert_allclose(covariance, PRIOR.covariance, atol=1e-9)

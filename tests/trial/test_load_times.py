@@ -1,0 +1,72 @@
+"""A wrong rate of the forces is told from a late clock by a delay that grows, where there are contacts enough."""
+
+from dataclasses import replace
+
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.trial.load_places import load_places_trouble
+from recorded_walks import WALKS
+
+RUNS = {
+    "rajagopal": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
+    "hamner": ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
+}
+
+
+def said_of(recording, rate=1.0, late_s=0.0):
+    """What is said of forces whose time goes at this rate, and which are later."""
+    plates = recording.plates
+    time = plates.time[0] + rate * (plates.time - plates.time[0]) + late_s
+    feet = choose_marker_set(recording.markers.labels).foot_labels()
+    feet = {side: [label for label in own if label in recording.markers.labels] for side, own in feet.items()}
+    return load_places_trouble(replace(recording, plates=replace(plates, time=time)), feet)
+
+
+@pytest.fixture(params=RUNS)
+def run(request, measured_recording):
+    return measured_recording(*RUNS[request.param])
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, measured_recording):
+    return measured_recording(*WALKS[request.param])
+
+
+@pytest.mark.parametrize("rate", [0.95, 0.98, 0.99, 1.01, 1.02, 1.05])
+def test_a_wrong_rate_of_a_run(run, rate):
+    trouble = said_of(run, rate)
+    assert trouble.startswith("markers and forces do not run at the same speed")
+    factor = float(trouble.partition("by a factor of ")[2].partition(":")[0])
+    assert factor == pytest.approx(rate, abs=0.003)
+
+
+@pytest.mark.parametrize("late_s", [-0.03, 0.0, 0.03])
+def test_a_run_at_its_rate(run, late_s):
+    assert "speed" not in said_of(run, late_s=late_s)
+
+
+@pytest.mark.parametrize("late_s", [-0.07, 0.07])
+def test_a_late_clock_over_many_contacts(run, late_s):
+    trouble = said_of(run, late_s=late_s)
+    assert trouble.startswith("the forces are ")
+    assert "rate" not in trouble
+
+
+def test_two_contacts_do_not_tell_a_rate_from_a_clock(walk):
+    """Both are named."""
+    trouble = said_of(walk, 1.05)
+    assert trouble.startswith("the forces are ")
+    percent = float(trouble.partition("or their rate is ")[2].partition(" %")[0])
+    assert percent == pytest.approx(5.0, abs=2.5)
+
+
+def test_three_contacts_exclude_a_rate_that_is_far_off(measured_recording):
+    """To be 100 ms late in the middle of 2.4 s, forces would have to be 10 % slow."""
+    trouble = said_of(measured_recording(*WALKS["rajagopal"]), late_s=0.1)
+    assert trouble.startswith("the forces are ")
+    assert "rate" not in trouble
+
+
+def test_sound_walks_at_their_rate(walk):
+    assert said_of(walk) == ""

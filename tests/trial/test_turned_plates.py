@@ -1,0 +1,62 @@
+"""A plate that is turned or mirrored in the file is named, and what the centre of pressure gains by turning it back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.load_places import load_places_trouble
+
+WALKS = ("pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d")
+QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+MISTAKES = {
+    "turned by 180 degrees": QUARTER @ QUARTER,
+    "turned by 90 degrees": QUARTER,
+    "turned by -90 degrees": QUARTER.T,
+    "mirrored along X": np.diag([-1.0, 1.0, 1.0]),
+    "mirrored along Z": np.diag([1.0, 1.0, -1.0]),
+}
+
+
+def said_of(recording, which=(), matrix=None, offset_m=(0.0, 0.0, 0.0)):
+    """With loads of some plates turned or mirrored about their middles, or of all elsewhere."""
+    plates = recording.plates
+    force, moment = plates.force.copy(), plates.moment.copy()
+    point = centre_of_pressure(np.concatenate((force, moment), axis=2))
+    free = moment - np.cross(point, force)
+    for p in which:
+        middle = plates.corners[p].mean(axis=0)
+        point[:, p] = middle + (point[:, p] - middle) @ matrix.T
+        if np.linalg.det(matrix) > 0:  # a turned plate turns the forces, too
+            force[:, p] = force[:, p] @ matrix.T
+    moment = np.cross(point + np.array(offset_m), force) + free
+    wrong = replace(plates, force=force, moment=moment)
+    feet = choose_marker_set(recording.markers.labels).foot_labels()
+    feet = {side: [label for label in own if label in recording.markers.labels] for side, own in feet.items()}
+    return load_places_trouble(replace(recording, plates=wrong), feet)
+
+
+@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize("which", [(0,), (1,), (0, 1)])
+def test_what_is_named_is_true(measured_recording, name, which):
+    """Loads in the middle of a plate may leave two corrections; then none is named."""
+    walk = measured_recording(name)
+    named = 0
+    for cause, matrix in MISTAKES.items():
+        trouble = said_of(walk, which, matrix)
+        if "which no other" not in trouble:
+            continue
+        plates = " and ".join(walk.plates.names[p] for p in which)
+        assert trouble.startswith(f"the centre of pressure of {plates} is {cause}")
+        before, after = (float(trouble.partition(word)[2].partition(" mm")[0]) for word in ("up to ", "foot, and "))
+        assert after < 80 < 100 < before
+        named += 1
+    assert named >= 4
+
+
+@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize("offset_m", [(0.0, 0.0, 0.0), (0.12, 0.0, 0.0), (0.0, 0.0, 0.2), (-0.3, 0.0, 0.1)])
+def test_sound_and_displaced_plates_are_not_called_turned(measured_recording, name, offset_m):
+    assert "which no other" not in said_of(measured_recording(name), offset_m=offset_m)
