@@ -32,10 +32,9 @@ def fake_slurm(folder: Path, answers: list[str]) -> Path:
 
 def _sbatch(folder: Path, script: Path) -> None:
     answers = (folder / "answers").read_text(encoding="utf-8").split("\n")
-    number = 1 + sum(1 for _ in folder.glob("*.job"))
+    number = _number(folder)
     answer = answers[min(number, len(answers)) - 1]
     if answer == "refused":
-        (folder / f"{number}.job").write_text("", encoding="utf-8")
         sys.exit(REFUSAL)
     text = script.read_text(encoding="utf-8")
     pid = ""
@@ -54,6 +53,18 @@ def _sbatch(folder: Path, script: Path) -> None:
             Path(path.replace("%J", str(number))).write_text(f"{LAST_WORDS}\n", encoding="utf-8")
     (folder / f"{number}.job").write_text(pid, encoding="utf-8")
     print(f"Submitted batch job {number}")
+
+
+def _number(folder: Path) -> int:
+    """The next one, its file made; jobs are submitted side by side."""
+    number = 1
+    while True:
+        try:
+            (folder / f"{number}.job").touch(exist_ok=False)
+        except FileExistsError:
+            number += 1
+        else:
+            return number
 
 
 def _squeue(folder: Path) -> None:

@@ -13,6 +13,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,7 +29,7 @@ SlurmctldPort={control_port}
 SlurmdPort={node_port}
 SlurmUser=root
 AuthType=auth/munge
-AuthInfo=socket={folder}/munge.socket
+AuthInfo=socket={munge_socket}
 StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
 SlurmctldPidFile={folder}/slurmctld.pid
@@ -62,11 +63,14 @@ def slurm_here(folder: Path) -> Iterator[dict[str, str]]:
     """The environment in which `sbatch` finds it."""
     for name in ("state", "spool"):
         (folder / name).mkdir(parents=True)
+    munge_socket = Path(tempfile.mkdtemp(), "munge")  # whose path has 108 bytes at most
+    munge_socket.parent.chmod(0o755)
     host = socket.gethostname().split(".")[0]
     control_port, node_port = _free_ports(2)
     text = CONFIGURATION.format(
         host=host,
         folder=folder,
+        munge_socket=munge_socket,
         control_port=control_port,
         node_port=node_port,
         cores=psutil.cpu_count(),
@@ -79,7 +83,7 @@ def slurm_here(folder: Path) -> Iterator[dict[str, str]]:
     folder.chmod(0o755)
     environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf")}
     environment["PATH"] = os.pathsep.join([environment.get("PATH", ""), "/usr/sbin"])
-    munge = ["munged", "--foreground", "--force", f"--key-file={key}", f"--socket={folder}/munge.socket"]
+    munge = ["munged", "--foreground", "--force", f"--key-file={key}", f"--socket={munge_socket}"]
     munge += [f"--{name}-file={folder}/munged.{name}" for name in ("pid", "log", "seed")]
     daemons = []
     try:
@@ -87,7 +91,7 @@ def slurm_here(folder: Path) -> Iterator[dict[str, str]]:
             with (folder / f"{command[0]}.out").open("w", encoding="utf-8") as log:
                 daemons.append(subprocess.Popen(command, env=environment, stdout=log, stderr=log))
             if command is munge:
-                _wait(lambda: (folder / "munge.socket").exists(), folder)
+                _wait(munge_socket.exists, folder)
         ask = ["sinfo", "--noheader", "--format=%t"]
         idle = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True, "env": environment}
         _wait(lambda: "idle" in subprocess.run(ask, **idle).stdout, folder)
@@ -99,6 +103,7 @@ def slurm_here(folder: Path) -> Iterator[dict[str, str]]:
                     child.kill()
             daemon.kill()
             daemon.wait()
+        shutil.rmtree(munge_socket.parent)
 
 
 def _free_ports(count: int) -> list[int]:

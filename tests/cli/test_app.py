@@ -70,7 +70,7 @@ def test_installed_command():
 def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
     fit = fit_of("gait2354")
     lines = fit.outcome.out.splitlines()
-    assert max(map(len, lines)) <= 80
+    assert max(len(line) for line in lines if not line.startswith("results in ")) <= 80
     assert len(lines) < 80
     text = " ".join(fit.outcome.out.split())
     trial, mass = fit.trial, fit.summary["total_mass_kg"]
