@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
-_MOTION_SHARE, _KINEMATICS_SHARE = 0.25, 0.35
+_MOTION_SHARE, _KINEMATICS_SHARE = 0.4, 0.5
 """Of the time, after which the synthetic walk and inverse kinematics are done."""
 
 
@@ -16,19 +19,72 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
     if is_compiled():
         return
     progress(_STAGE, 0.0)
-    from kinertia.estimation.prior import literature_prior
-    from kinertia.estimation.simultaneous.fit import fit_simultaneous
-    from kinertia.motion.kinematics import solve_kinematics
-    from kinertia.synthetic.walk import walk, walking_subject
-    from kinertia.trial.data import FootLoads, Trial
+    with _markers_beside():
+        from kinertia.estimation.prior import literature_prior
+        from kinertia.estimation.simultaneous.fit import fit_simultaneous
+        from kinertia.motion.kinematics import solve_kinematics
+        from kinertia.synthetic.walk import walk, walking_subject
+        from kinertia.trial.data import FootLoads, Trial
 
-    subject = walking_subject()
-    short = walk(subject, 0.8)
-    progress(_STAGE, _MOTION_SHARE)
-    feet = FootLoads(short.time, short.foot_loads[..., :3], short.foot_loads[..., 3:])
-    measured = Trial("walk", short.markers, feet, short.foot_loads[:, 0, 1] > -1.0)
-    kinematics = solve_kinematics(short.skeleton, measured, 0.0, 10.0)
-    progress(_STAGE, _KINEMATICS_SHARE)
+        subject = walking_subject()
+        short = walk(subject, 0.8)
+        progress(_STAGE, _MOTION_SHARE)
+        feet = FootLoads(short.time, short.foot_loads[..., :3], short.foot_loads[..., 3:])
+        measured = Trial("walk", short.markers, feet, short.foot_loads[:, 0, 1] > -1.0)
+        kinematics = solve_kinematics(short.skeleton, measured, 0.0, 10.0)
+        progress(_STAGE, _KINEMATICS_SHARE)
     fit_simultaneous(short.skeleton, literature_prior(subject.literature), [kinematics])
     progress(_STAGE, 1.0)
     set_compiled()
+
+
+@contextmanager
+def _markers_beside() -> Iterator[None]:
+    """`compile_markers` in a process of its own, until the end of the block at the earliest; what it leaves undone, as
+    where no process can be started, the estimate compiles itself.
+    """
+    command = [sys.executable, "-c", f"from {__name__} import compile_markers; compile_markers()"]
+    try:
+        beside = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    except OSError:
+        yield
+        return
+    try:
+        yield
+        beside.wait()
+    finally:
+        beside.kill()
+        beside.wait()
+
+
+def compile_markers() -> None:
+    """Compile the markers' terms, which take as long as all before the estimate: of a body at rest."""
+    import numpy as np
+
+    from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
+    from kinertia.estimation.simultaneous.marker_terms import add_markers
+    from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+    from kinertia.estimation.simultaneous.normal_equations import NormalEquations
+    from kinertia.estimation.simultaneous.skin import SkinPatterns
+    from kinertia.estimation.simultaneous.stretches import Stretch
+    from kinertia.synthetic.walk import walking_subject
+
+    skeleton = walking_subject().skeleton
+    coordinates, markers = len(skeleton.coordinates), len(skeleton.markers)
+    basis = MotionBasis(0.01 * np.arange(20), 0.05)
+    frames, stretch = len(basis.first), Stretch.whole(basis)
+    # the body's parameters stand before the unknowns of the markers
+    columns = slice(10, 10 + 3 * markers)
+    add_markers(
+        NormalEquations.zero(stretch.size, coordinates, columns.stop),
+        columns,
+        basis,
+        stretch,
+        skeleton,
+        np.zeros((frames, markers, 3)),
+        np.zeros((frames, coordinates)),
+        (np.ones(markers), ErrorProcess.alike_over(3.0)),
+        (SkinPatterns.none(frames, markers), np.zeros(0)),
+        np.arange(coordinates),
+        np.arange(0),
+    )
