@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
-_MOTION_SHARE, _KINEMATICS_SHARE = 0.4, 0.5
-"""Of the time, after which the synthetic walk and inverse kinematics are done."""
+_MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.4, 0.5, 0.75
+"""Of the time, after which the synthetic walk, inverse kinematics and the rest before the estimate are done."""
 
 
 def compile_once(progress: Callable[[str, float], None]) -> None:
@@ -22,7 +22,9 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
     with _markers_beside():
         from kinertia.estimation.prior import literature_prior
         from kinertia.estimation.simultaneous.fit import fit_simultaneous
+        from kinertia.motion.dynamics import axis_motion, residual_terms, root_regressor
         from kinertia.motion.kinematics import solve_kinematics
+        from kinertia.motion.rigid_body import axis_force_derivatives
         from kinertia.synthetic.walk import walk, walking_subject
         from kinertia.trial.data import FootLoads, Trial
 
@@ -33,6 +35,13 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
         measured = Trial("walk", short.markers, feet, short.foot_loads[:, 0, 1] > -1.0)
         kinematics = solve_kinematics(short.skeleton, measured, 0.0, 10.0)
         progress(_STAGE, _KINEMATICS_SHARE)
+        skeleton, bsp, motion = short.skeleton, short.bsp, short.motion
+        residual_terms(skeleton, bsp, motion, short.foot_loads.sum(axis=1))
+        root_regressor(skeleton, bsp.segments, motion)
+        axis_force_derivatives(
+            skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *axis_motion(skeleton, motion)
+        )
+        progress(_STAGE, _DYNAMICS_SHARE)
     fit_simultaneous(short.skeleton, literature_prior(subject.literature), [kinematics])
     progress(_STAGE, 1.0)
     set_compiled()
