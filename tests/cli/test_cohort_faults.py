@@ -14,7 +14,7 @@ import pytest
 from cohort_faults import HANGING, fit_person_unless_hanging, write_study
 from command_line import PROGRAM, run
 from kinertia.io.subject_file import read_subject
-from kinertia.studies.cohort_cluster import ClusterSize, Job, local_cluster, run_jobs
+from kinertia.studies.cohort_cluster import KEPT_MEMORY, ClusterSize, Job, local_cluster, run_jobs
 from kinertia.studies.cohort_record import Place, inputs_of, prepare_folder
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -59,6 +59,8 @@ def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fit
         patch.setenv("PYTHONPATH", with_tests()["PYTHONPATH"])
         with local_cluster(ClusterSize(1, 2 * 1024**3)) as client:
             ended = list(run_jobs(client, fit_person_unless_hanging, jobs))
+            environment = {name: client.submit(os.getenv, name).result() for name in KEPT_MEMORY}
+    assert environment == {name: str(size) for name, size in KEPT_MEMORY.items()}
     records = {one.record.person: one.record for one in ended}
     assert records["Anna"].fitted
     lost = records[HANGING]

@@ -28,15 +28,19 @@ PERSON_MEMORY_BYTES = 2 * 1024**3
 """What a fit is given at least: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
 RETRIES = 2
 """How often a person is tried again whose process was killed."""
+KEPT_MEMORY = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25})
+"""Bytes that a worker keeps on Linux, by its environment. Dask's workers give memory back at once, and a fit asks for
+it again, page by page: it took a third longer."""
 SCHEDULING = MappingProxyType(
     {
         "distributed.scheduler.allowed-failures": RETRIES,
         # a process that is killed takes with it what waits there, too: let it wait with the scheduler
         "distributed.scheduler.worker-saturation": 1.0,
+        **{f"distributed.nanny.pre-spawn-environ.{name}": size for name, size in KEPT_MEMORY.items()},
         "logging": {"distributed": "critical"},
     }
 )
-"""Settings of Dask for schedulers of our own."""
+"""Settings of Dask for clusters of our own."""
 _SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
 """Of one processor, for a rough guess before anything was measured: see `docs/long-trials.md`."""
 _LEAST_LIMIT_S, _PATIENCE = 900.0, 50.0

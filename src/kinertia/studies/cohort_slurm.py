@@ -11,7 +11,7 @@ from typing import Any
 
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
-from kinertia.studies.cohort_cluster import HOW, SCHEDULING
+from kinertia.studies.cohort_cluster import HOW, KEPT_MEMORY, SCHEDULING
 from kinertia.studies.cohort_slurm_jobs import replaced_jobs
 
 _NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
@@ -47,7 +47,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
             queue=wanted.partition,
             account=wanted.account,
             job_extra_directives=[*wanted.directives, *([] if wanted.logs else _NO_LOGS)],
-            job_script_prologue=list(wanted.before),
+            job_script_prologue=[*(f"export {name}={size}" for name, size in KEPT_MEMORY.items()), *wanted.before],
             interface=wanted.interface,
             log_directory=wanted.logs,
             scheduler_options={"dashboard_address": None},
