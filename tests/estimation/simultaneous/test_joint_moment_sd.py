@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous import joint_moment_sd as module
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, moment_derivatives
@@ -54,8 +55,17 @@ def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     return full
 
 
-def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns."""
+@pytest.fixture(params=[(1.0, 1.0, 1.0), (0.5, 0.2, 3.0)], ids=["as expected", "unlike"])
+def noise(request, monkeypatch) -> np.ndarray:
+    """What is seen of the markers' errors, their rates and their accelerations, over what is expected."""
+    monkeypatch.setattr(module, "motion_noise", lambda *_: np.array(request.param))
+    return np.array(request.param)
+
+
+def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0)) -> np.ndarray:
+    """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns; with these shares of
+    what places, rates and accelerations do.
+    """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
     motion = [part[frames] for part in problem.full(basis.evaluate(coefficients), static)]
     by = moment_derivatives(problem, 0, motion, static, problem.reactions(0, static), frames)
@@ -63,7 +73,7 @@ def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray) -> n
     through = np.zeros((len(frames), c, size, c))
     for row, t in enumerate(frames):
         for a, spline in enumerate(basis.active[t]):
-            parts = zip(basis.values[:, t, a], (by.q, by.qd, by.qdd), strict=True)
+            parts = zip(basis.values[:, t, a] * shares, (by.q, by.qd, by.qdd), strict=True)
             through[row, :, spline] = sum(value * part[row] for value, part in parts)
     rest = np.zeros((len(frames), c, problem.layout.size - by.static.shape[2]))
     return np.concatenate([through.reshape(len(frames), c, -1), by.static, rest], axis=2)
@@ -92,25 +102,28 @@ def test_derivatives_agree_with_finite_differences(estimate):
             np.testing.assert_allclose(change[away], expected[away], atol=1e-6 * np.abs(change).max())
 
 
-def test_deviations_are_those_of_the_dense_covariance(estimate):
+def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     problem, coefficients, static = estimate
     information = dense(problem, coefficients, static)
     root = StaticInformation.of(information, len(information)).root_of_covariance()
     full = root @ root.T
     n = coefficients.size
     by = dense_derivative(problem, coefficients, static)
-    expected = np.sqrt(
-        np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + of_impacts(problem, coefficients, static)
-    )
+    expected = np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + of_impacts(problem, coefficients, static)
+    # of it, what would be left if all that does not move were known
+    alone = inverse(dense(problem, coefficients, static)[:n, :n])
+    for sign, shares in ((1.0, np.sqrt(noise)), (-1.0, np.ones(3))):
+        shaken = dense_derivative(problem, coefficients, static, shares)[..., :n]
+        expected += sign * np.einsum("dri,ij,drj->dr", shaken, alone, shaken, optimize=True)
     part = reduced(problem.trial_normal(0, coefficients, static), 0.0)
     information = prior_information(problem, static) + part.information
     root = StaticInformation.of(information, problem.layout.in_root.stop).root_of_covariance()
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     moment_sd = joint_moment_sd(problem, 0, coefficients, static, part, root)
-    np.testing.assert_allclose(moment_sd, expected, rtol=1e-3)
+    np.testing.assert_allclose(moment_sd, np.sqrt(expected), rtol=1e-3)
 
 
-def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
+def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise):
     """The first counts for two: what its motion leaves open is that of the errors alone."""
     problem, coefficients, static = estimate
     (trial,) = problem.trials
@@ -137,7 +150,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate):
     motion = inverse(dense_band(here.normals[0].last.band))
     carried = -motion @ here.normals[0].last.border.reshape(n, s)
     through = by[..., n:] + by[..., :n] @ carried
-    expected = np.einsum("dri,ij,drj->dr", by[..., :n], motion / 2.0, by[..., :n], optimize=True)
+    shaken = dense_derivative(problem, coefficients, in_trial, np.sqrt(noise))[..., :n]
+    expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
     expected = np.sqrt(expected + of_impacts(problem, coefficients, in_trial))

@@ -4,7 +4,8 @@ Delta method: the joint moments' analytic derivatives by spline coefficients and
 covariance. Errors that come back (`repetition`) make the motion no vaguer, only what many frames say of what does not
 move: what is left of the motion if that were known is that of the errors alone. Of the coefficients' covariance only
 the blocks near the diagonal are needed, since six splines are active in any frame; they come from the block-banded
-factor (`BlockBand.inverse_blocks`) and the static unknowns. Added is what of the forces is faster than the motion
+factor (`BlockBand.inverse_blocks`) and the static unknowns. They count by what is seen of the errors that they are from
+(`motion_noise`). Added is what of the forces is faster than the motion
 (`GroundReactions.impact`), as a moving mean square: whether it acts on the joints or is spent on segments that slow
 down is unknown.
 """
@@ -18,6 +19,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.elimination import Factored, Reduced
+from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem, by_body
 from kinertia.model.log_cholesky import dynamic_jacobian
@@ -70,6 +72,8 @@ def joint_moment_sd(
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     variance, impact = np.empty((2, len(frames), coefficients.shape[1]))
     reactions, spread = problem.reactions(k, static), None
+    # errors that come back count more often only for what does not move
+    shares = np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats)
     for part in eliminated.backwards():
         spread = _MotionSpread.of(part, coefficients.shape[1], root, spread)
         begin, end = np.searchsorted(frames, [part.stretch.frames.start, part.stretch.frames.stop])
@@ -79,8 +83,10 @@ def joint_moment_sd(
             motion = problem.full(basis.evaluate(coefficients, chosen), static)
             by = moment_derivatives(problem, k, motion, static, reactions, chosen)
             still = by.static @ root[problem.layout.in_root]
-            through = by_splines(basis.values[:, chosen], by.q, by.qd, by.qdd).reshape(*by.q.shape[:2], -1)
-            variance[rows] = spread.of_moments(basis.first[chosen], through, still, problem.trials[k].repeats)
+            orders, values, shape = (by.q, by.qd, by.qdd), basis.values[:, chosen], (*by.q.shape[:2], -1)
+            through = by_splines(values, *orders).reshape(shape)
+            shaken = by_splines(values, *(share * each for share, each in zip(shares, orders, strict=True)))
+            variance[rows] = spread.of_moments(basis.first[chosen], through, shaken.reshape(shape), still)
             impact[rows] = by.impact
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
     variance += uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
@@ -194,20 +200,20 @@ class _MotionSpread:
         diagonal, below = part.band.inverse_blocks(block[0])
         return cls(start, np.append(diagonal, block, axis=0), below, np.append(carried, first, axis=0))
 
-    def of_moments(self, first: np.ndarray, through: np.ndarray, still: np.ndarray, repeats: float) -> np.ndarray:
+    def of_moments(self, first: np.ndarray, through: np.ndarray, shaken: np.ndarray, still: np.ndarray) -> np.ndarray:
         """(d, c) variances of moments.
 
         Args:
             first: (d,) the first active spline of each frame.
             through: (d, c, 6 c) derivatives by the coefficients of the active splines.
+            shaken: the same, for what the markers' errors make of the motion alone.
             still: (d, c, S) what a deviation of each independent part of the static unknowns adds by itself.
-            repeats: how often errors come back: what is left of the motion is that of the errors alone.
         """
         variance = np.empty(through.shape[:2])
         for spline in np.unique(first):
             rows = np.flatnonzero(first == spline)
             own, carried = self._active(int(spline) - self.start)
-            spread = ((through[rows] @ own) * through[rows]).sum(axis=-1) / repeats
+            spread = ((shaken[rows] @ own) * shaken[rows]).sum(axis=-1)
             variance[rows] = spread + np.square(still[rows] - through[rows] @ carried).sum(axis=-1)
         return variance
 

@@ -1,0 +1,93 @@
+"""How strong the markers' errors are where joint moments feel them.
+
+The process that stands for the errors (`marker_errors`) is true to the slowest of them, which tell most of what does
+not move, and to what is new from frame to frame. Between the two, where the body's accelerations are, it may have many
+times the power of skin: on synthetic skin ten to thirty times, on measured walks up to ten times. The estimate hardly
+depends on it, but deviations of joint moments do. So they are told by what the markers leave at the estimate, within
+the band of the motion.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import minimum_filter1d
+
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.problem import MapProblem
+
+_UNSEEN = 3.0
+"""Skin that moves as a block moves the segment and leaves nothing to see: the power of all errors over that of those
+which are seen. Set here; with it, bars hold in a laboratory whose skin moves as blocks."""
+_LEAST_FREE = 0.1
+_ENDS = 3
+"""Knot intervals beside gaps and ends, where a fitted spline swings more than elsewhere."""
+_MOST_FRAMES = 6000
+"""At once: a minute."""
+_FREQUENCIES = 400
+
+
+def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """(3,) power of the errors of trial k, of their rates and of their accelerations, over what the estimate expects.
+
+    At most 1: a single marker that jumps would make all bars longer.
+
+    Args:
+        problem: of the estimate.
+        k: the trial.
+        coefficients: of its motion.
+        static: the static unknowns as they are in it.
+    """
+    trial, basis = problem.trials[k], problem.bases[k]
+    spacing_s = float(basis.knots[1] - basis.knots[0])
+    squares, counts = np.zeros((3, len(trial.marker_sd))), np.zeros(len(trial.marker_sd))
+    parts = np.linspace(0, len(trial.time), 1 + -(-len(trial.time) // _MOST_FRAMES)).astype(int)
+    for frames in (slice(start, stop) for start, stop in pairwise(parts)):
+        left = _left(problem, k, coefficients, static, frames)
+        n, m, _ = left.shape
+        own = MotionBasis(trial.time[frames], spacing_s)
+        around = 1 + 2 * int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
+        inside = minimum_filter1d(np.isfinite(left).all(axis=-1), around, axis=0, mode="constant", cval=0)
+        rows = inside & trial.dynamic[frames][:, None]
+        for square, part in zip(squares, own.evaluate(own.fit(left.reshape(n, -1))), strict=True):
+            square += np.where(rows, np.square(part).reshape(n, m, 3).sum(axis=-1), 0.0).sum(axis=0)
+        counts += 3 * rows.sum(axis=0)
+    seen = counts > 0
+    if not seen.any():
+        return np.ones(3)
+    expected = _expected(problem, k, 0.5 / spacing_s)[:, None] * np.square(trial.marker_process[0][seen])
+    found = (squares[:, seen] / counts[seen] / expected).mean(axis=1) / _free(problem, k, counts)
+    result: np.ndarray = np.minimum(_UNSEEN * found, 1.0)
+    return result
+
+
+def _left(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray, frames: slice) -> np.ndarray:
+    """(n, m, 3) m, what markers and skin leave of the measurement, in the axes of the segments; NaN where not seen."""
+    q = problem.full(problem.bases[k].evaluate(coefficients, frames), static)[0]
+    skeleton = problem.placed(static)
+    pose = skeleton.pose(q)
+    away = problem.trials[k].markers[frames] - skeleton.marker_positions(pose)
+    own = np.einsum("nmji,nmj->nmi", pose.rotation[:, skeleton.marker_segments], away)
+    result: np.ndarray = own - problem.skin[k].cut(frames).displaced(static[problem.layout.skin])
+    return result
+
+
+def _expected(problem: MapProblem, k: int, band_hz: float) -> np.ndarray:
+    """(3,) mean squares of errors of unit deviation, their rates and accelerations, up to this frequency."""
+    trial = problem.trials[k]
+    step_s = float(np.median(np.diff(trial.time)))
+    hz = np.linspace(0.0, band_hz, _FREQUENCIES)
+    process = trial.marker_process[1]
+    one, two = process.of_before
+    turn = np.exp(-2j * np.pi * step_s * hz)
+    power = 2.0 * step_s * process.new / np.square(np.abs(1.0 - one * turn - two * turn**2)) / trial.repeats
+    return np.array([np.trapezoid(power * (2.0 * np.pi * hz) ** (2 * order), hz) for order in range(3)])
+
+
+def _free(problem: MapProblem, k: int, counts: np.ndarray) -> float:
+    """Share of the errors within the band that motion and skin have not taken up, by counting unknowns."""
+    basis = problem.bases[k]
+    shown = counts.sum() * basis.size / len(basis.first)
+    splines = basis.size * problem.trials[k].dynamic.mean() * len(problem.moving)
+    return max(1.0 - float(splines + problem.skin[k].size) / float(shown), _LEAST_FREE)
