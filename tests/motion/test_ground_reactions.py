@@ -103,3 +103,15 @@ def test_a_foot_off_the_ground_keeps_its_last_centre_of_pressure():
     reactions = measured_reactions(kinematics(passed_on()))
     np.testing.assert_allclose(reactions.point[:, 0], np.broadcast_to(PLACES[0], (len(TIME), 3)), atol=1e-9)
     assert not reactions.wrench[:900, 0].any()
+
+
+def test_an_impact_acts_under_the_foot_where_a_light_load_puts_its_centre_of_pressure_metres_away():
+    wrench = struck()
+    lands = (TIME > 0.9) & (TIME < 0.95)
+    wrench[lands, 0, :3] *= 0.2
+    wrench[lands, 0, 3:] = np.cross([-2.7, 0.0, -1.6], wrench[lands, 0, :3])
+    reactions = ground_reactions(kinematics(wrench), 12.0)
+    taken = reactions.impact[lands, 0]
+    assert np.abs(taken[:, 1]).max() > 50.0
+    about_foot = taken[:, 3:] - np.cross(PLACES[0], taken[:, :3])
+    np.testing.assert_allclose(about_foot[:, [0, 2]], 0.0, atol=1e-6)

@@ -26,12 +26,14 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
-from kinertia.trial.data import nearest_samples
+from kinertia.trial.data import LOAD_THRESHOLD_N, nearest_samples
 from kinertia.trial.rms import rms_length
 
 IMPACT_SHARE_OF_WEIGHT = 0.01
 """Forces faster than the motion that stay below this (RMS over about one period, share of the mean vertical force) are
 no impact: twice what rigid segments leave (`observation.FORCE_SD_OF_WEIGHT`)."""
+FIRM_SHARE_OF_PEAK = 0.1
+"""Of the largest vertical force; below it a centre of pressure is too vague to carry an impact."""
 NOISE_LEFT_N = 1.0
 """Deviation of the noise that may stay in the vertical force."""
 _FORGOTTEN = 40
@@ -146,7 +148,8 @@ def _low_passed(time: np.ndarray, wrench: np.ndarray, cutoff_hz: float) -> np.nd
 
 def _impact(measured: GroundReactions, motion_hz: float, inside: np.ndarray) -> np.ndarray:
     """(k, 2, 6): what of the sum of both feet's forces is faster than the motion, and more than rigid segments leave.
-    Each foot has it in proportion to the power of its own fast forces, at its own centre of pressure.
+    Each foot has it in proportion to the power of its own fast forces, at its own centre of pressure; while a foot
+    lands or leaves, at that of its nearest firm load, for an impact can be many times such a load.
 
     The mean vertical force is that of the samples (k,) in which all ground contact is measured.
     """
@@ -160,11 +163,12 @@ def _impact(measured: GroundReactions, motion_hz: float, inside: np.ndarray) -> 
     impact = np.maximum(1.0 - limit / np.maximum(of_both, 1e-12), 0.0) * both
     shares = power / np.maximum(power.sum(axis=1, keepdims=True), 1e-12)
     parts = shares[..., None] * impact[:, None]
-    return np.concatenate([parts, np.cross(_points(measured.wrench), parts)], axis=-1)
+    firm_n = max(FIRM_SHARE_OF_PEAK * measured.wrench[..., 1].max(), LOAD_THRESHOLD_N)
+    return np.concatenate([parts, np.cross(_points(measured.wrench, firm_n), parts)], axis=-1)
 
 
-def _points(wrench: np.ndarray) -> np.ndarray:
-    return np.stack([held_centre_of_pressure(wrench[:, foot]) for foot in range(2)], axis=1)
+def _points(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray:
+    return np.stack([held_centre_of_pressure(wrench[:, foot], least_n) for foot in range(2)], axis=1)
 
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:

@@ -21,11 +21,11 @@ def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
     return np.stack([x, np.full_like(x, height_m), z], axis=-1)
 
 
-def held_centre_of_pressure(wrench: np.ndarray) -> np.ndarray:
-    """(k, 3) m over k samples of one foot's load (k, 6); where it is below LOAD_THRESHOLD_N, that of the nearest sample
-    that is not. The origin for a foot that is never loaded.
+def held_centre_of_pressure(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray:
+    """(k, 3) m over k samples of one foot's load (k, 6); where it is below `least_n`, that of the nearest sample that
+    is not. The origin for a foot that is never loaded.
     """
-    firm = np.flatnonzero(wrench[:, 1] >= LOAD_THRESHOLD_N)
+    firm = np.flatnonzero(wrench[:, 1] >= least_n)
     if not len(firm):
         return np.zeros((len(wrench), 3))
     nearest = firm[np.searchsorted((firm[1:] + firm[:-1]) / 2, np.arange(len(wrench)))]
