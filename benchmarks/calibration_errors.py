@@ -18,7 +18,7 @@ from kinertia.studies.accuracy import held
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 from measured_trials import table
-from synthetic_walks import BANDWIDTH, FIRST_SEED, observation_of
+from synthetic_walks import FIRST_SEED, observation_of
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     prior = literature_prior(person.literature)
 
     def estimate(calibration: CalibrationPrior) -> SimultaneousResult:
-        return estimate_simultaneous(off.skeleton, prior, calibration, [seen], BANDWIDTH.spacing_s)
+        return estimate_simultaneous(off.skeleton, prior, calibration, [seen])
 
     marker_sd = np.full(len(off.skeleton.markers), 0.005)
     centres = dict.fromkeys(HIP_OFFSETS, LARGEST.hips_m)

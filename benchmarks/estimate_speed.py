@@ -45,7 +45,7 @@ def timed(duration_s: float) -> Timing:
     kinematics = kinematics_of(trial, moved)
     with threadpool_limits(1):
         started = time.perf_counter()
-        fitted = fit_simultaneous(trial.skeleton, literature_prior(person.literature), [kinematics], BANDWIDTH)
+        fitted = fit_simultaneous(trial.skeleton, literature_prior(person.literature), [kinematics], [BANDWIDTH])
         seconds = time.perf_counter() - started
     steps = fitted.result.iterations
     return Timing(duration_s, len(trial.time), steps, seconds, 1e6 * bare_calls(trial) / len(trial.time))

@@ -103,7 +103,7 @@ def measured(minutes: float, plates_hz: float) -> Long:
     marks = [(time.process_time(), _most_mb())]
     kinematics = solve_kinematics(skeleton, trial, 0.0, BANDWIDTH.motion_hz)
     marks.append((time.process_time(), _most_mb()))
-    fitted = fit_simultaneous(skeleton, prior, [kinematics], BANDWIDTH)
+    fitted = fit_simultaneous(skeleton, prior, [kinematics], [BANDWIDTH])
     marks.append((time.process_time(), _most_mb()))
     (begun, before), (solved, kinematics_mb), (ended, estimate_mb) = marks
     spent = (solved - begun, ended - solved, before, kinematics_mb, estimate_mb)

@@ -19,7 +19,7 @@ from kinertia.studies.accuracy import at_truth, held
 from kinertia.synthetic.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
 from kinertia.synthetic.walk import SyntheticTrial
 from study_noise import drawn_start, start_prior
-from synthetic_walks import BANDWIDTH, observation_of, study_walk
+from synthetic_walks import observation_of, study_walk
 
 EXACT_N = 0.05
 """Deviation of exact forces."""
@@ -45,9 +45,7 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
         force_sd=EXACT_N,
         moment_sd=0.3 * EXACT_N,
     )
-    problem = MapProblem(
-        trial.skeleton, replace(prior, mean=trial.bsp), held(trial.skeleton), [exact], BANDWIDTH.spacing_s
-    )
+    problem = MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), held(trial.skeleton), [exact])
     normal = problem.normal(0, problem.start[0], problem.start_static)
     motion = dense_band(normal.band) + _of_markers(problem, exact, floor_m)
     theta = problem.layout.theta

@@ -24,7 +24,7 @@ from kinertia.synthetic.noise import camera_noise, study_noise
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.data import Markers
 from measured_trials import table
-from synthetic_walks import BANDWIDTH, FIRST_SEED, observation_of, study_walk
+from synthetic_walks import FIRST_SEED, observation_of, study_walk
 
 UNIFORM_SD = 0.29
 """Deviation of a uniform error of +/-50 %, share."""
@@ -69,10 +69,8 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     if two_level:
         estimates["two-level"] = estimate_two_level(trial.skeleton, start, [_window(trial, noisy)]).bsp
 
-    def simultaneous(
-        observation: Observation, prior: BspPrior = prior, bandwidth: Bandwidth = BANDWIDTH
-    ) -> BodySegmentParameters:
-        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], bandwidth.spacing_s).bsp
+    def simultaneous(observation: Observation, prior: BspPrior = prior) -> BodySegmentParameters:
+        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation]).bsp
 
     seen = observation_of(trial, noisy)
     estimates["simultaneous"] = simultaneous(seen)
@@ -81,9 +79,7 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
     estimates["deviation of the noise doubled"] = simultaneous(replace(seen, marker_sd=2.0 * seen.marker_sd))
     sure = replace(seen, force_sd=0.3 * seen.force_sd, moment_sd=0.3 * seen.moment_sd)
     estimates["forces three times as sure"] = simultaneous(sure)
-    estimates["20 Hz instead of 10 Hz"] = simultaneous(
-        observation_of(trial, noisy, bandwidth=Bandwidth(20.0)), bandwidth=Bandwidth(20.0)
-    )
+    estimates["20 Hz instead of 10 Hz"] = simultaneous(observation_of(trial, noisy, bandwidth=Bandwidth(20.0)))
     estimates["prior widened and moved to where such starts come from"] = simultaneous(seen, moved_prior(prior))
     sharp = observation_of(trial, camera_noise(trial.markers, CAMERA_SD_M, rng))
     sharp = replace(sharp, marker_sd=np.full_like(white, CAMERA_SD_M), marker_frames=1.0)

@@ -40,6 +40,5 @@ def observation_of(
     trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None, bandwidth: Bandwidth = BANDWIDTH
 ) -> Observation:
     """The observation of a synthetic trial with these markers and foot loads (n, 2, 6)."""
-    return observe(trial.skeleton, [kinematics_of(trial, markers, loads)], trial.bsp.total_mass_kg, bandwidth).together[
-        0
-    ]
+    kinematics = kinematics_of(trial, markers, loads)
+    return observe(trial.skeleton, [kinematics], trial.bsp.total_mass_kg, [bandwidth]).together[0]

@@ -55,6 +55,7 @@ def small_observation(trial: SyntheticTrial, seed: int = 0) -> Observation:
         marker_sd=np.linspace(0.01, 0.03, len(KEPT)),
         marker_frames=9.0,
         q=trial.motion.q,
+        spacing_s=0.1,
         dynamic=dynamic,
         ground=small_ground(trial, rng),
         force_sd=6.0,
@@ -90,7 +91,7 @@ def small_problem(n_trials: int = 1) -> MapProblem:
     trial = small_trial()
     calibration = CalibrationPrior(dict.fromkeys(LOCKED, 0.01), np.full(len(KEPT), 0.005), INSTRUMENTS)
     observations = [small_observation(trial, seed) for seed in range(n_trials)]
-    return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations, 0.1)
+    return MapProblem(trial.skeleton, literature_prior(walking_subject().literature), calibration, observations)
 
 
 def curved_problem(path: Path) -> MapProblem:
@@ -114,6 +115,7 @@ def curved_problem(path: Path) -> MapProblem:
         marker_sd=np.linspace(0.01, 0.03, 5),
         marker_frames=9.0,
         q=motion.q,
+        spacing_s=0.1,
         dynamic=np.arange(13) > 1,
         ground=FootPlates.one_per_foot(smooth(time, rng.normal(0.0, 50.0, (13, 12)), 15.0), 13),
         force_sd=6.0,
@@ -122,7 +124,7 @@ def curved_problem(path: Path) -> MapProblem:
     )
     prior = BspPrior(ours.bsp, np.diag(np.square(np.full(20, 0.01))), 13.0, 0.1)
     calibration = CalibrationPrior({"knee/translation2": 0.01}, np.full(5, 0.005), INSTRUMENTS)
-    return MapProblem(skeleton, prior, calibration, [observation], 0.1)
+    return MapProblem(skeleton, prior, calibration, [observation])
 
 
 def point(problem: MapProblem, seed: int = 1) -> tuple[list[np.ndarray], np.ndarray]:

@@ -117,9 +117,8 @@ def test_an_unknown_mass_is_found_within_its_error_bar_and_moments_are_better_fo
     away, errors, moments = [], [], []
     for seed in range(4):
         trial, prior, skeleton, recorded = carrying(np.random.default_rng(seed))
-        bandwidth = Bandwidth.of(recorded)
-        seen = observe(skeleton, recorded, prior.mass_kg, bandwidth)
-        result = estimate_simultaneous(skeleton, prior, calibration_prior(skeleton), seen.together, bandwidth.spacing_s)
+        seen = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
+        result = estimate_simultaneous(skeleton, prior, calibration_prior(skeleton), seen.together)
         assert result.converged
         error = result.bsp.mass_kg[-1] - trial.bsp.mass_kg[-1]
         sd = np.sqrt(result.bsp_covariance[-10, -10])

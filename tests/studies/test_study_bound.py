@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.studies.accuracy import at_truth, held
 from kinertia.synthetic.walk import walking_subject
-from synthetic_walks import BANDWIDTH, observation_of, study_walk
+from synthetic_walks import observation_of, study_walk
 
 
 def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
@@ -36,7 +36,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     plate, floor = (dict.fromkeys(names, exact) for names in (known.plate, known.floor))
     calibration = replace(calibration, instruments=InstrumentPrior(plate, floor, exact))
     own = Information(
-        MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white], BANDWIDTH.spacing_s),
+        MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white]),
         np.ones((1, 1)),
     )
     ours = study_bound.bound(information, replace(prior, mean=trial.bsp))

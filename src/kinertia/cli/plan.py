@@ -11,7 +11,6 @@ from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.estimation.from_files import prepare_subject
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.io.subject_file import read_subject
 from kinertia.report.crossval_page import (
     CROSSVAL_HEADINGS,
@@ -76,8 +75,7 @@ def crossval(
     wanted = read_subject(subject)
     with shown_progress() as progress:
         ready = prepare_subject(wanted, progress)
-        bandwidth = Bandwidth.of(ready.kinematics, wanted.settings.cutoff_hz)
-        held_out = cross_validate(ready, bandwidth, progress)
+        held_out = cross_validate(ready, wanted.settings.cutoff_hz, progress)
     before = "literature" if ready.file is None else "model"
     save_crossval(held_out, before, output)
     table = plain_table(*(heading.replace(" (", "\n(") for heading in CROSSVAL_HEADINGS))

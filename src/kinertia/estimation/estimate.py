@@ -201,13 +201,13 @@ def named_by_source(ready: Prepared) -> ModelUncertainty:
 
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
-    bandwidth = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidth, named_by_source(ready))
+    bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
+    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidths, named_by_source(ready))
     result = fitted.result
-    parts = (fitted.skeletons, fitted.motions, fitted.foot_loads, result.reactions, result.moment_sd, ready.kinematics)
+    parts = (fitted.skeletons, fitted.motions, bandwidths, fitted.foot_loads, result.reactions, result.moment_sd)
     estimates = [
         _Estimated(skeleton, motion, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
-        for skeleton, motion, loads, reactions, moment_sd, k in zip(*parts, strict=True)
+        for skeleton, motion, bandwidth, loads, reactions, moment_sd, k in zip(*parts, ready.kinematics, strict=True)
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
     return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)

@@ -200,13 +200,12 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     person = replace(subject, bsp=prior.draw(of_person))
     trials = [walk(person, scenario.walk_s, trapezoid=False), *(MOTIONS[name](person) for name in scenario.others)]
     skeleton, recorded = measured(trials, scenario.faults, of_noise)
-    bandwidth = Bandwidth.of(recorded)
-    seen = observe(skeleton, recorded, prior.mass_kg, bandwidth)
+    seen = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
-    result = estimate_simultaneous(skeleton, prior, calibration, seen.together, bandwidth.spacing_s)
+    result = estimate_simultaneous(skeleton, prior, calibration, seen.together)
     trial, kinematics = trials[0], recorded[0]
     true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
-    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true, bandwidth.spacing_s)
+    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true)
     bound = Information(there, seen.repeats).root(range(len(true)))
     inside = np.flatnonzero(seen.alone[0].dynamic)
     after = Outcome(result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0])

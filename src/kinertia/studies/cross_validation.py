@@ -9,6 +9,7 @@ compared with that of the literature's parameters, frozen in the same way.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.prepare import Prepared, Progress
@@ -61,7 +62,9 @@ class HeldOut:
 
 @one_blas_thread
 def cross_validate(
-    ready: Prepared, bandwidth: Bandwidth | None = None, progress: Progress = lambda stage, share: None
+    ready: Prepared,
+    cutoff_hz: float | Literal["gcv"] = "gcv",
+    progress: Progress = lambda stage, share: None,
 ) -> tuple[HeldOut, ...]:
     """Hold out every trial in turn.
 
@@ -69,25 +72,26 @@ def cross_validate(
 
     Args:
         ready: the person, with two trials or more.
-        bandwidth: of motion and forces; found from all trials if None.
+        cutoff_hz: as in `Settings`.
         progress: called as the work goes on.
 
     Raises:
         KinertiaError: there are fewer than two trials.
     """
     trials = ready.kinematics
-    bandwidth = bandwidth or Bandwidth.of(trials)
     if len(trials) < 2:
         raise KinertiaError(
             f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
             "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
         )
+    bandwidths = dict(zip(trials, Bandwidth.of(trials, cutoff_hz), strict=True))
     held_out = []
     for k, held in enumerate(trials):
         progress("held out", k / len(trials))
         others = [other for other in trials if other is not held]
-        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidth, ready.uncertainty).result.bsp
-        explained = (_explained(ready, bsp, held, bandwidth) for bsp in (ready.prior.mean, estimate))
+        used = [bandwidths[other] for other in others]
+        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, used, ready.uncertainty).result.bsp
+        explained = (_explained(ready, bsp, held, bandwidths[held]) for bsp in (ready.prior.mean, estimate))
         held_out.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(held_out)
 
@@ -98,7 +102,7 @@ def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
 
 
 def _explained(ready: Prepared, bsp: BodySegmentParameters, held: Kinematics, bandwidth: Bandwidth) -> Explained:
-    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], bandwidth, ready.uncertainty)
+    fitted = fit_simultaneous(ready.skeleton, frozen(ready.prior, bsp), [held], [bandwidth], ready.uncertainty)
     (motion,), (loads,) = fitted.motions, fitted.foot_loads
     model = fitted.skeleton
     left = residual(model, fitted.bsp, motion, loads.sum(axis=1))

@@ -103,13 +103,13 @@ def plan_measured(
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
 ) -> Plan:
     """Predicted standard deviations from measured trials of one person with different names; as `fit_simultaneous`."""
-    bandwidth = Bandwidth.of(trials, cutoff_hz)
+    bandwidths = Bandwidth.of(trials, cutoff_hz)
     used = used_skeleton(skeleton, trials, uncertainty)
 
     def information_of(chosen: Sequence[int]) -> Information:
-        seen = observed(used, prior, [trials[k] for k in chosen], bandwidth, uncertainty)
+        seen = observed(used, prior, [trials[k] for k in chosen], [bandwidths[k] for k in chosen], uncertainty)
         calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-        return Information(MapProblem(used, prior, calibration, seen.alone, bandwidth.spacing_s), seen.repeats)
+        return Information(MapProblem(used, prior, calibration, seen.alone), seen.repeats)
 
     everything = tuple(range(len(trials)))
     whole = information_of(everything)

@@ -281,12 +281,11 @@ def _outcome(
     adults: BspPrior,
     instruments: Instruments,
 ) -> PersonOutcome:
-    bandwidth = Bandwidth.of(recorded)
-    seen: Observations = observe(skeleton, recorded, prior.mass_kg, bandwidth)
+    seen: Observations = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
     calibration = calibration_prior(
         skeleton, replace(GAIT27_UNCERTAINTY, instruments=InstrumentPrior.stated(instruments))
     )
-    result: SimultaneousResult = estimate_simultaneous(skeleton, prior, calibration, seen.together, bandwidth.spacing_s)
+    result: SimultaneousResult = estimate_simultaneous(skeleton, prior, calibration, seen.together)
     information = None
     if np.array_equal(prior.mean.table(), adults.mean.table()):
         information = person_information("", adults, prior, result.bsp, result.bsp_covariance)

@@ -38,11 +38,12 @@ def longer_problem() -> MapProblem:
         time=trial.time,
         markers=markers,
         q=trial.motion.q,
+        spacing_s=0.05,
         dynamic=dynamic,
         ground=small_ground(trial, rng),
         skin=small_skin(trial.skeleton, len(trial.time)),
     )
-    return MapProblem(problem.skeleton, problem.prior, problem.calibration, [observation], 0.05)
+    return MapProblem(problem.skeleton, problem.prior, problem.calibration, [observation])
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +102,12 @@ def test_deviations_of_moments_are_those_of_the_whole(whole, cut, here):
 @pytest.mark.slow
 def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
     """Two trials, whose stretches are as short as can be."""
-    given = (whole.skeleton, whole.prior, whole.calibration, [whole.trials[0], small_problem().trials[0]], 0.05)
+    given = (
+        whole.skeleton,
+        whole.prior,
+        whole.calibration,
+        [whole.trials[0], replace(small_problem().trials[0], spacing_s=0.05)],
+    )
     expected = estimate_simultaneous(*given)
     monkeypatch.setattr(limits, "TOGETHER_BYTES", 1)
     actual = estimate_simultaneous(*given)

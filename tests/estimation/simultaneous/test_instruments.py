@@ -69,7 +69,7 @@ def test_the_session_counts_in_the_normal_equations():
     problem = small_problem()
     session = shown(problem.plates)
     calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(session, session)))
-    with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials, 0.1)
+    with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials)
     places, static = problem.layout.instruments, problem.start_static.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
     (before, right_before, cost_before), (information, right, cost) = (

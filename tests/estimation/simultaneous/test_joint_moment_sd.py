@@ -129,7 +129,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     (trial,) = problem.trials
     sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
     trials = [replace(trial, displacement_sd_m=sd).repeated(2.0), replace(trial, displacement_sd_m=sd[::-1].copy())]
-    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials, 0.1)
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials)
     rng = np.random.default_rng(0)
     here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
     here = here.under(GaussianPrior.of(pair.instruments), pair.layout.instruments)

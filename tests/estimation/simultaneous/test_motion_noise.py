@@ -37,6 +37,7 @@ def found(trial: SyntheticTrial, errors: np.ndarray) -> np.ndarray:
         np.full(markers.shape[1], SD_M),
         FRAMES_ALIKE,
         trial.motion.q,
+        SPACING_S,
         np.arange(len(trial.time)) > 30,
         small_ground(trial, np.random.default_rng(1)),
         6.0,
@@ -44,7 +45,7 @@ def found(trial: SyntheticTrial, errors: np.ndarray) -> np.ndarray:
     )
     calibration = CalibrationPrior({}, np.full(markers.shape[1], 0.005), INSTRUMENTS)
     prior = literature_prior(walking_subject().literature)
-    problem = MapProblem(trial.skeleton, prior, calibration, [seen], SPACING_S)
+    problem = MapProblem(trial.skeleton, prior, calibration, [seen])
     return motion_noise(problem, 0, problem.beginning.coefficients[0], problem.start_static)
 
 

@@ -29,7 +29,7 @@ def observed(trial, markers, motion_hz=10.0):
 
 
 def alone(skeleton, kinematics, motion_hz=10.0):
-    seen = observe(skeleton, [kinematics], MASS_KG, Bandwidth(motion_hz))
+    seen = observe(skeleton, [kinematics], MASS_KG, [Bandwidth(motion_hz)])
     return seen.alone[0], seen.noise[0]
 
 
@@ -159,11 +159,11 @@ def test_trials_of_one_person(trial):
     turned = trial.skeleton.pose(q).rotation[:, trial.skeleton.marker_segments[thigh]]
     positions = walks[1].positions.copy()
     positions[:, thigh] += turned @ [0.0, 0.0, 0.015]
-    alike = observe(trial.skeleton, [kinematics_of(trial, each) for each in walks], MASS_KG, Bandwidth(10.0))
+    alike = observe(trial.skeleton, [kinematics_of(trial, each) for each in walks], MASS_KG, [Bandwidth(10.0)] * 2)
     assert alike.repeats == pytest.approx(np.ones((2, 2)), abs=0.1)
     assert np.max(alike.together[0].displacement_sd_m) < 0.001
     kinematics = [kinematics_of(trial, each) for each in (walks[0], replace(walks[1], positions=positions))]
-    seen = observe(trial.skeleton, kinematics, MASS_KG, Bandwidth(10.0))
+    seen = observe(trial.skeleton, kinematics, MASS_KG, [Bandwidth(10.0)] * 2)
     assert [o.repeats for o in seen.together] == pytest.approx(seen.repeats.sum(axis=1))
     for one, both in zip(seen.alone, seen.together, strict=True):
         assert both.marker_sd == pytest.approx(np.sqrt(both.repeats) * one.marker_sd)
@@ -173,7 +173,7 @@ def test_trials_of_one_person(trial):
         # of two: 15 mm / sqrt 2 along one of three axes; inverse kinematics spreads some of it
         assert displaced[thigh] == pytest.approx(np.full(thigh.sum(), 0.015 / np.sqrt(6.0)), rel=0.35)
         assert np.median(displaced[~thigh]) < 0.2 * displaced[thigh].min()
-    (single,) = observe(trial.skeleton, kinematics[:1], MASS_KG, Bandwidth(10.0)).together
+    (single,) = observe(trial.skeleton, kinematics[:1], MASS_KG, [Bandwidth(10.0)]).together
     assert not np.any(single.displacement_sd_m)
     assert single.repeats == 1.0
 

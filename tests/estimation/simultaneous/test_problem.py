@@ -159,7 +159,7 @@ def test_start_is_the_prior_s_mean(problem):
 def test_trials_share_plates_by_name_and_the_clock():
     pair = small_problem(2)
     other = replace(pair.trials[1], ground=replace(pair.trials[1].ground, plates=("second", "fourth", "third")))
-    pair = MapProblem(pair.skeleton, pair.prior, pair.calibration, [pair.trials[0], other], 0.1)
+    pair = MapProblem(pair.skeleton, pair.prior, pair.calibration, [pair.trials[0], other])
     assert pair.plates == ("first", "second", "third", "fourth")
     coefficients, static = point(pair)
     for k, foreign in ((0, "fourth"), (1, "first")):
@@ -175,7 +175,7 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     trial = problem.trials[0]
     sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
     displaced = replace(trial, displacement_sd_m=sd)
-    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial], 0.1)
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial])
     own = np.random.default_rng(0).normal(size=(len(sd), 3))
     at = Point((coefficients, coefficients), static, (own.ravel(), np.zeros(own.size)))
     moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - static[pair.layout.locals].reshape(-1, 3)

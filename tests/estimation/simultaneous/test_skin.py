@@ -108,7 +108,7 @@ def test_noise_is_what_skin_leaves(trial):
     rng = np.random.default_rng(0)
     skin = SkinMotion.draw(trial.skeleton, trial.motion.q, rng)
     moved = camera_noise(skin.moved(trial.markers, trial.skeleton, trial.motion.q), 0.0005, rng)
-    seen = observe(trial.skeleton, [kinematics_of(trial, moved)], MASS_KG, Bandwidth(10.0))
+    seen = observe(trial.skeleton, [kinematics_of(trial, moved)], MASS_KG, [Bandwidth(10.0)])
     size = np.sqrt(np.square(moved.positions - trial.markers.positions).mean())
     assert 0.0005 < np.median(list(seen.noise[0].sd_m.values())) < 0.6 * size
     assert seen.alone[0].skin is not None

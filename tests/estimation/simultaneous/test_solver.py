@@ -66,6 +66,7 @@ def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: flo
         marker_sd=np.full(markers.shape[1], max(noise_m, 0.001)),
         marker_frames=1.0,
         q=trial.motion.q[frames],
+        spacing_s=SPACING_S,
         dynamic=np.ones(len(time[frames]), dtype=bool),
         ground=FootPlates.one_per_foot(smooth(time, loads, 25.0), len(time[frames])),
         force_sd=3.0,
@@ -75,7 +76,7 @@ def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: flo
 
 @pytest.fixture(scope="module")
 def exact(trial, prior, calibration):
-    return estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)], SPACING_S)
+    return estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)])
 
 
 def test_exact_data_give_back_the_motion(trial, exact):
@@ -103,7 +104,7 @@ def test_exact_data_pull_the_body_towards_the_truth(person, prior, exact):
 
 
 def test_same_input_same_result(trial, prior, calibration, exact):
-    again = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)], SPACING_S)
+    again = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)])
     np.testing.assert_array_equal(again.bsp.table(), exact.bsp.table())
     np.testing.assert_array_equal(again.motions[0].q, exact.motions[0].q)
     assert again.cost == exact.cost
@@ -113,7 +114,7 @@ def test_two_trials_tell_more_than_either(trial, prior, calibration):
     first, second = (observation(trial, noise_m=0.003, seed=seed) for seed in (1, 2))
 
     def deviation(trials):
-        result = estimate_simultaneous(trial.skeleton, prior, calibration, trials, SPACING_S)
+        result = estimate_simultaneous(trial.skeleton, prior, calibration, trials)
         return np.sqrt(np.diag(result.bsp_covariance))
 
     both = deviation([first, second])
@@ -134,7 +135,7 @@ def test_markers_displaced_in_one_trial_are_found_and_hurt_nothing(trial, prior,
 
     def estimate(sd_m):
         trials = [replace(each, displacement_sd_m=np.where(thighs, sd_m, 0.0)) for each in (first, second)]
-        return estimate_simultaneous(trial.skeleton, prior, calibration, trials, SPACING_S)
+        return estimate_simultaneous(trial.skeleton, prior, calibration, trials)
 
     free, stiff = estimate(0.01), estimate(0.0)
     assert free.converged
@@ -154,7 +155,7 @@ def test_halves_pooled_give_about_the_whole(person, prior, calibration):
     middle = len(trial.time) // 2
     halves = [observation(trial, part, 0.003) for part in (slice(None, middle), slice(middle, None))]
     whole, pooled = (
-        estimate_simultaneous(trial.skeleton, prior, calibration, trials, SPACING_S)
+        estimate_simultaneous(trial.skeleton, prior, calibration, trials)
         for trials in ([observation(trial, noise_m=0.003)], halves)
     )
     sd = np.sqrt(np.diag(whole.bsp_covariance)).reshape(-1, 10)
@@ -178,7 +179,7 @@ def test_without_forces_only_markers_count(trial, prior, calibration):
     """A body and instruments that no equation of motion asks about stay as they were believed to be."""
     dynamic = np.zeros(len(trial.time), dtype=bool)
     seen = replace(observation(trial, noise_m=0.003), dynamic=dynamic)
-    result = estimate_simultaneous(trial.skeleton, prior, calibration, [seen], SPACING_S)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [seen])
     np.testing.assert_allclose(result.bsp.table(), prior.mean.table(), rtol=0, atol=1e-6)
     assert result.clock_s == (pytest.approx(0.0, abs=1e-9), pytest.approx(0.005))
     for values, sds in result.plates.values():
@@ -194,7 +195,7 @@ def test_wrong_forces_in_unmeasured_frames_do_not_matter(trial, prior, calibrati
     cut = smooth(trial.time[:28], loads[:28], 25.0)
     results = [
         estimate_simultaneous(
-            trial.skeleton, prior, calibration, [replace(seen, ground=replace(seen.ground, loads=part))], SPACING_S
+            trial.skeleton, prior, calibration, [replace(seen, ground=replace(seen.ground, loads=part))]
         )
         for part in (cut, smooth(trial.time, np.where(np.arange(len(loads))[:, None] < 28, loads, 0.0), 1e6))
     ]
@@ -209,13 +210,13 @@ def test_impossible_priors_still_give_a_possible_body(trial, prior, calibration)
     impossible = BodySegmentParameters.from_table(prior.mean.segments, table)
     assert not impossible.physically_consistent().all()
     start = replace(prior, mean=impossible)
-    result = estimate_simultaneous(trial.skeleton, start, calibration, [observation(trial)], SPACING_S)
+    result = estimate_simultaneous(trial.skeleton, start, calibration, [observation(trial)])
     assert result.bsp.physically_consistent().all()
 
 
 def test_an_unfinished_run_says_so_and_keeps_the_best_iterate(trial, prior, calibration, monkeypatch):
     monkeypatch.setattr(simultaneous, "_MAX_ITERATIONS", 1)
-    result = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)], SPACING_S)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)])
     assert not result.converged
     assert result.iterations == 1
     assert result.cost[1] < result.cost[0]
@@ -227,9 +228,7 @@ def test_deviations_of_every_size_have_a_covariance(trial, prior, calibration):
     sd[:, 7:] = 1e-7
     covariance = with_symmetry(np.diag(np.square(sd.ravel())), prior.mean.segments, 0.9999)
     seen = observation(trial, noise_m=0.003)
-    result = estimate_simultaneous(
-        trial.skeleton, replace(prior, covariance=covariance), calibration, [seen], SPACING_S
-    )
+    result = estimate_simultaneous(trial.skeleton, replace(prior, covariance=covariance), calibration, [seen])
     posterior_sd = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
     assert (posterior_sd > 0).all()
     assert (posterior_sd <= sd * 1.001).all()

@@ -102,7 +102,7 @@ def fit_simultaneous(
     skeleton: Skeleton,
     prior: BspPrior,
     trials: Sequence[Kinematics],
-    bandwidth: Bandwidth | None = None,
+    bandwidths: Sequence[Bandwidth] | None = None,
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
@@ -111,15 +111,14 @@ def fit_simultaneous(
         skeleton: calibrated.
         prior: of the body segment parameters, and the total mass of its segments by the scale.
         trials: kinematics of the trials.
-        bandwidth: of motion and forces; found from the trials if None.
+        bandwidths: per trial, of motion and forces; found from the trials if None.
         uncertainty: what may move beside these segments.
     """
-    bandwidth = bandwidth or Bandwidth.of(trials)
     used = used_skeleton(skeleton, trials, uncertainty)
-    seen = observed(used, prior, trials, bandwidth, uncertainty)
+    seen = observed(used, prior, trials, bandwidths or Bandwidth.of(trials), uncertainty)
     together = seen.together
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-    result = estimate_simultaneous(used, prior, calibration, together, bandwidth.spacing_s)
+    result = estimate_simultaneous(used, prior, calibration, together)
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:
@@ -165,11 +164,11 @@ def observed(
     skeleton: Skeleton,
     prior: BspPrior,
     trials: Sequence[Kinematics],
-    bandwidth: Bandwidth,
+    bandwidths: Sequence[Bandwidth],
     uncertainty: ModelUncertainty,
 ) -> Observations:
     """What the estimate sees of trials of a `used_skeleton`."""
-    return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidth)
+    return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidths)
 
 
 def calibration_prior(

@@ -62,14 +62,16 @@ class Observations:
         return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
 
 
-def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidth: Bandwidth) -> Observations:
+def observe(
+    skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidths: Sequence[Bandwidth]
+) -> Observations:
     """The observations of trials of one person, and the noise of their markers.
 
     Args:
         skeleton: with exactly the markers to use, in the order of the observations; a trial may lack some.
         trials: kinematics of each.
         mass_kg: for the size of force errors.
-        bandwidth: of motion and forces.
+        bandwidths: of each, of motion and forces.
     """
     errors = [_errors(skeleton, each) for each in trials]
     rates = [each.trial.markers.rate_hz for each in trials]
@@ -79,8 +81,10 @@ def observe(skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, ba
     places = np.stack([each.displaced for each in errors])
     rest = WithoutSkin.of([each.varying for each in errors], places, skin, frames)
     pairs = [
-        _observed(skeleton, *each, mass_kg, bandwidth)
-        for each in zip(trials, errors, rest.varying, skin, frames, strict=True)
+        _observed(skeleton, each, bandwidth, *marked, mass_kg)
+        for each, bandwidth, marked in zip(
+            trials, bandwidths, zip(errors, rest.varying, skin, frames, strict=True), strict=True
+        )
     ]
     displaced = _displacement_sd(skeleton, rest.displaced)
     # what the estimate finds to go with the joints comes back, too: it counts as often as before it was found
@@ -180,12 +184,12 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
 def _observed(
     skeleton: Skeleton,
     kinematics: Kinematics,
+    bandwidth: Bandwidth,
     errors: _Errors,
     rest: np.ndarray,
     skin: SkinPatterns,
     frames: float,
     mass_kg: float,
-    bandwidth: Bandwidth,
 ) -> tuple[Observation, MarkerNoise]:
     """One trial on its own."""
     time = errors.time
@@ -204,6 +208,7 @@ def _observed(
             marker_sd=effective,
             marker_frames=alike,
             q=errors.q,
+            spacing_s=bandwidth.spacing_s,
             dynamic=kinematics.inside(time),
             ground=_ground(kinematics, time, bandwidth.motion_hz, bandwidth.force),
             force_sd=force_sd,

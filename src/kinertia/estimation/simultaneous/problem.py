@@ -53,6 +53,7 @@ class Observation:
         marker_sd: (m,) effective deviation of each marker coordinate in one frame, m.
         marker_frames: over how many neighbouring frames these errors are alike (`marker_errors`).
         q: (n, c) start.
+        spacing_s: of the splines that its motion is made of (`bandwidth`).
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
         force_sd, moment_sd: effective deviations of the root residual, N and N m.
@@ -68,6 +69,7 @@ class Observation:
     marker_sd: np.ndarray
     marker_frames: float
     q: np.ndarray
+    spacing_s: float
     dynamic: np.ndarray
     ground: FootPlates
     force_sd: float
@@ -163,7 +165,6 @@ class MapProblem:
         prior: BspPrior,
         calibration: CalibrationPrior,
         trials: Sequence[Observation],
-        spacing_s: float,
     ) -> None:
         self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
         self.free = skeleton.free(calibration.coordinates)
@@ -171,7 +172,7 @@ class MapProblem:
         self.moving = np.array([names.index(name) for name in skeleton.coordinates])
         self.still = np.array([names.index(name) for name in calibration.coordinates], dtype=int)
         self.segments = prior.mean.segments
-        self.bases = [MotionBasis(trial.time, spacing_s) for trial in trials]
+        self.bases = [MotionBasis(trial.time, trial.spacing_s) for trial in trials]
         self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
         self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
         self.grounds = [trial.ground.among(self.plates) for trial in trials]

@@ -89,10 +89,10 @@ _MAX_ITERATIONS = 100
 
 @one_blas_thread
 def estimate_simultaneous(
-    skeleton: Skeleton, prior: BspPrior, calibration: CalibrationPrior, trials: Sequence[Observation], spacing_s: float
+    skeleton: Skeleton, prior: BspPrior, calibration: CalibrationPrior, trials: Sequence[Observation]
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
-    problem = MapProblem(skeleton, prior, calibration, trials, spacing_s)
+    problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem)
     covariance, moment_sd = _deviations(problem, ended.under)
     return _result(problem, ended, covariance, moment_sd)
