@@ -1,6 +1,7 @@
 """What is delivered is what was estimated: OpenSim's Inverse Dynamics, and a second fit, on the result files alone."""
 
 import json
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +12,10 @@ from scipy.interpolate import make_interp_spline
 
 from command_line import fitted
 from kinertia.io.ground_forces import read_forces_with_notes
-from kinertia.io.sto import read_sto
+from kinertia.io.sto import TimeTable, read_sto, write_table
 from kinertia.io.subject_file import read_subject
 from kinertia.report.ground_reactions_file import FORCES_FILE, LOADS_FILE
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
 from osim_tools import inverse_dynamics_tool
 from walks import fit_arguments
@@ -109,6 +111,35 @@ def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tm
             assert np.isfinite(gap).mean() > 0.8
             compared += 1
     assert compared >= 6
+
+
+@pytest.mark.slow
+def test_opensim_finds_our_moments_up_to_the_ends_of_measured_stretches(opensim, demo_run, tmp_path):
+    """The demo's walk on one belt, of both feet's forces the sum: double supports are not measured, and between the
+    stretches the motion goes on.
+    """
+    laboratory = tmp_path / "lab"
+    shutil.copytree(demo_run[0].subject_file.parent, laboratory)
+    loads, _ = read_forces_with_notes(laboratory / "walk_grf.mot")
+    wrench = np.concatenate([loads.force, loads.moment], axis=2).sum(axis=1)
+    point = centre_of_pressure(wrench)
+    torque = wrench[:, 3:] - np.cross(point, wrench[:, :3])
+    labels = tuple(f"{stem}{axis}" for stem in ("ground_force_v", "ground_force_p", "ground_torque_") for axis in "xyz")
+    belt = TimeTable(loads.time, labels, np.hstack([wrench[:, :3], point, torque]), in_degrees=False)
+    write_table(laboratory / "walk_grf.mot", belt, "belt")
+    fit = fitted(tmp_path / "out", laboratory / "subject.toml")
+    stretches = fit.summary["trials"][0]["windows_s"]
+    assert len(stretches) > 1
+    theirs = inverse_dynamics_tool(
+        opensim, fit.folder / "model.osim", fit.folder / "kinematics.mot", fit.folder / LOADS_FILE, tmp_path
+    )
+    ours = read_sto(fit.folder / "inverse_dynamics.sto")
+    assert len(theirs) > len(ours)
+    assert [ours.index[0], ours.index[-1]] == pytest.approx([theirs.index[0], theirs.index[-1]])
+    theirs = theirs.iloc[np.searchsorted(theirs.index, ours.index - 1e-6)]
+    joints = [column for column in ours if not column.startswith("pelvis_")]
+    gap = (ours[joints] - theirs[joints].to_numpy()).abs().max() / ours[joints].abs().max()
+    assert gap.max() < PEAK, f"{gap.idxmax()}: {gap.max():.4f}"
 
 
 @EVERY_CASE

@@ -186,7 +186,7 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
     for k, parts in zip(ready.kinematics, cut, strict=True):
         smoothed = ground_reactions(k, k.cutoff_hz, k.cutoff_hz)
         motion = joined([next(motions) for _ in parts])
-        estimates.append(_Estimated(ready.skeleton, motion, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
+        estimates.append(_Estimated(ready.skeleton, motion, None, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
     trials = _trial_fits(ready, result.bsp, estimates, started)
     warnings = two_level_warnings(result)
     return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
@@ -204,10 +204,20 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
     bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
     fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidths, named_by_source(ready))
     result = fitted.result
-    parts = (fitted.skeletons, fitted.motions, bandwidths, fitted.foot_loads, result.reactions, result.moment_sd)
+    parts = (
+        fitted.skeletons,
+        fitted.motions,
+        fitted.courses,
+        bandwidths,
+        fitted.foot_loads,
+        result.reactions,
+        result.moment_sd,
+    )
     estimates = [
-        _Estimated(skeleton, motion, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
-        for skeleton, motion, bandwidth, loads, reactions, moment_sd, k in zip(*parts, ready.kinematics, strict=True)
+        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
+        for skeleton, motion, course, bandwidth, loads, reactions, moment_sd, k in zip(
+            *parts, ready.kinematics, strict=True
+        )
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
     return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)
@@ -219,7 +229,9 @@ class _Estimated:
 
     Attributes:
         skeleton: with the markers where they are in it.
-        motion, motion_hz: and its bandwidth.
+        motion: in the measured frames.
+        course: (f, c) coordinates, as in `TrialFit`.
+        motion_hz: bandwidth of the motion.
         foot_loads: (w, 2, 6) of the motion's bandwidth.
         reactions, before: for the joint moments after and before the estimate.
         moment_sd: (w, c) of the joint moments, or None.
@@ -227,6 +239,7 @@ class _Estimated:
 
     skeleton: Skeleton
     motion: Motion
+    course: np.ndarray | None
     motion_hz: float
     foot_loads: np.ndarray
     reactions: GroundReactions
@@ -263,7 +276,7 @@ def _trial_fit(
         "corrected": (before, literature, corrected),
     }
     measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
-    motion = joined([_as_opensim(k.time[part], after.motion.q[part]) for part in k.stretches])
+    motion = _as_opensim(k, after)
     narrow = {name: residual(*stage, wrench) for name, stage in stages.items()}
     narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
     full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
@@ -272,6 +285,7 @@ def _trial_fit(
         kinematics=k,
         skeleton=after.skeleton,
         motion=motion,
+        course=after.course,
         motion_hz=after.motion_hz,
         reactions=after.reactions,
         residuals=narrow,
@@ -289,8 +303,14 @@ def _trial_fit(
     )
 
 
-def _as_opensim(time: np.ndarray, q: np.ndarray) -> Motion:
-    """The motion that OpenSim's tools read from a file of these coordinates (w, c)."""
+def _as_opensim(k: Kinematics, estimated: _Estimated) -> Motion:
+    """The motion that OpenSim's tools read from a file of the estimated coordinates, in the measured frames."""
+    if estimated.course is None:
+        return joined([_interpolated(k.time[part], estimated.motion.q[part]) for part in k.stretches])
+    return _interpolated(k.course_time, estimated.course).cut(k.frames - k.frames[0])
+
+
+def _interpolated(time: np.ndarray, q: np.ndarray) -> Motion:
     spline = interpolate(time, q)
     return Motion(*(spline(time, order) for order in range(3)))
 

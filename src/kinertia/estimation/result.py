@@ -85,6 +85,8 @@ class TrialFit:
         motion: coordinates (rad, m) that go with the estimate, and their derivatives as OpenSim's tools will find them
             from `kinematics.mot`: those of natural quintic splines through the frames. They differ from the estimate's
             own in the first and last frames only.
+        course: (f, c) coordinates of all frames from the first to the last of these (`kinematics.course_time`), those
+            between measured stretches included; None after two-level, which has none there.
         motion_hz: its bandwidth.
         reactions: the ground reactions that go with it, at the plates' rate, of instruments put right.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
@@ -116,6 +118,7 @@ class TrialFit:
     joint_load_sd: np.ndarray | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
+    course: np.ndarray | None = None
 
     @property
     def name(self) -> str:

@@ -83,6 +83,12 @@ class Kinematics:
         result: np.ndarray = self.trial.markers.time[self.frames]
         return result
 
+    @property
+    def course_time(self) -> np.ndarray:
+        """(f,) s, all frames from the first to the last of them."""
+        result: np.ndarray = self.trial.markers.time[self.frames[0] : self.frames[-1] + 1]
+        return result
+
     @cached_property
     def stretches(self) -> tuple[slice, ...]:
         """Of the w frames, those of each stretch."""

@@ -125,17 +125,18 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
 
 def _coordinates(fit: Fit, trial: TrialFit) -> TimeTable:
     """Coordinates over time, in degrees and m; of an OpenSim model all that it has."""
+    time, q = (trial.time, trial.motion.q) if trial.course is None else (trial.kinematics.course_time, trial.course)
     if fit.file is None:
-        names, angles, q = fit.skeleton.coordinates, fit.skeleton.rotational, trial.motion.q
+        names, angles = fit.skeleton.coordinates, fit.skeleton.rotational
     else:
         names = tuple(coordinate.name for coordinate in fit.file.coordinates)
         angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
-        q = fit.file.all_coordinates(fit.skeleton, trial.motion.q)
-    return _table(trial, names, np.where(angles, np.degrees(q), q), in_degrees=True)
+        q = fit.file.all_coordinates(fit.skeleton, q)
+    return TimeTable(time, tuple(names), np.where(angles, np.degrees(q), q), in_degrees=True)
 
 
-def _table(trial: TrialFit, labels: Sequence[str], values: np.ndarray, in_degrees: bool = False) -> TimeTable:
-    return TimeTable(trial.time, tuple(labels), values, in_degrees)
+def _table(trial: TrialFit, labels: Sequence[str], values: np.ndarray) -> TimeTable:
+    return TimeTable(trial.time, tuple(labels), values, in_degrees=False)
 
 
 def summary(fit: Fit) -> dict[str, Any]:

@@ -83,6 +83,8 @@ class SimultaneousFit:
         skeletons: the same per trial, with the markers where they are in it.
         posterior: deviations and calibration.
         motions: per trial, at the frames of its measured window.
+        courses: per trial, (f, c) coordinates of all frames from the first to the last of these: markers show the
+            motion between measured stretches, too.
         foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
         warnings: one sentence each.
     """
@@ -93,6 +95,7 @@ class SimultaneousFit:
     skeletons: tuple[Skeleton, ...]
     posterior: Posterior
     motions: tuple[Motion, ...]
+    courses: tuple[np.ndarray, ...]
     foot_loads: tuple[np.ndarray, ...]
     warnings: tuple[str, ...]
 
@@ -123,7 +126,9 @@ def fit_simultaneous(
     staying = uncertainty.marker_sd_m is None
     if staying:
         calibrated = calibrated.with_markers(used.markers)
-    motions = tuple(m.cut(np.flatnonzero(o.dynamic)) for m, o in zip(result.motions, together, strict=True))
+    dynamic = [np.flatnonzero(o.dynamic) for o in together]
+    motions = tuple(m.cut(frames) for m, frames in zip(result.motions, dynamic, strict=True))
+    courses = tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
@@ -148,6 +153,7 @@ def fit_simultaneous(
         ),
         posterior,
         motions,
+        courses,
         loads,
         tuple(_warnings(prior, uncertainty, result, posterior, trials)),
     )
