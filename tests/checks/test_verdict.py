@@ -131,6 +131,17 @@ def test_impossible_segments_are_named_and_bodies_without_mass_are_not():
     assert level(judged, "physically impossible segments: 1 of 3 (thigh_r)") == "fail"
 
 
+def test_light_bodies_that_were_kept_as_a_model_has_them_condemn_nothing():
+    """The toes of LaiArnold's model, 0.2 kg, have moments of inertia that no body has."""
+    toes = np.array([[0.2, 0.03, 0.0, 0.0, 1e-4, 1e-3, 1e-5, 0, 0, 0]])
+    body = BodySegmentParameters.from_table((*BODY.segments, "toes_r"), np.vstack([BODY.table(), toes]))
+    deviations = np.vstack([np.ones_like(BODY.table()), np.zeros(10)])
+    posterior = SimpleNamespace(prior_sd=deviations, sd=0.5 * deviations)
+    judged = verdicts(fit(estimate=body, literature=body, expected=body, posterior=posterior))
+    assert level(judged, "physically impossible in the model, and kept as they are: toes_r") == "caution"
+    assert not stands_against(judged)
+
+
 def test_a_body_without_thickness_is_let_pass():
     """The toes of OpenSim's gait2354: 0.0001 + 0.0001 = 0.0002, but not in binary."""
     toes = np.array([[0.2166, 0.0346, 0.006, -0.0175, 0.0001, 0.0002, 0.0001, 0, 0, 0]])

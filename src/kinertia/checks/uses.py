@@ -11,11 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.checks.verdict import Level, Verdict, expected_source, residual_verdicts, verdict_of_markers, worst_level
+from kinertia.checks.verdict import (
+    Level,
+    Verdict,
+    expected_source,
+    impossible_estimates,
+    residual_verdicts,
+    verdict_of_markers,
+    worst_level,
+)
 from kinertia.estimation.identifiability import INFORMED, MEASURED
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
-from kinertia.model.bsp import impossible_segments
 from kinertia.trial.rms import rms, rms_length
 
 WORDS: dict[Level, str] = {"pass": "use", "caution": "use with care", "fail": "do not use"}
@@ -88,7 +95,7 @@ def _with_convergence(fit: Fit, verdicts: Sequence[Verdict]) -> Level:
 
 def _segments(fit: Fit, name: str, columns: slice) -> Use:
     """By what the data say about these parameters, and by how far they went from the prior's mean."""
-    impossible = impossible_segments(fit.estimate)
+    impossible, _ = impossible_estimates(fit)
     if not fit.converged or impossible:
         why = _NOT_CONVERGED if not fit.converged else f"{len(impossible)} segments are physically impossible"
         return Use(name, "fail", why)

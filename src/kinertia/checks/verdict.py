@@ -9,7 +9,7 @@ forces at full bandwidth, which OpenSim's tools find, stand beside them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.estimation.forces_used import full_bandwidth
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
 from kinertia.estimation.warnings import CONTRADICTING_COM_M
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
+from kinertia.model.bsp import PARAMETERS, impossible_segments
 from kinertia.trial.rms import rms
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Verdict(NamedTuple):
 
 def verdicts(fit: Fit) -> list[Verdict]:
     """Can a fit be used? Convergence, physics, the literature, residuals and markers of every trial."""
-    judged = [_convergence(fit), _physics(fit.estimate), _literature(fit)]
+    judged = [_convergence(fit), _physics(fit), _literature(fit)]
     for trial in fit.trials:
         judged += [*residual_verdicts(trial), verdict_of_markers(fit, trial)]
     return judged
@@ -81,12 +81,30 @@ def _convergence(fit: Fit) -> Verdict:
     return Verdict("fail", "the estimate did not converge: the best step is reported")
 
 
-def _physics(bsp: BodySegmentParameters) -> Verdict:
-    impossible = impossible_segments(bsp)
-    if not impossible:
+def impossible_estimates(fit: Fit) -> tuple[list[str], list[str]]:
+    """Segments that are physically impossible: of those that were estimated, and of the light ones that a model has and
+    that were kept as they are.
+    """
+    impossible = impossible_segments(fit.estimate)
+    held = set()
+    if fit.posterior is not None:
+        kept = np.flatnonzero(~fit.posterior.prior_sd.any(axis=1))
+        held = {fit.estimate.segments[i] for i in kept}
+    return [name for name in impossible if name not in held], [name for name in impossible if name in held]
+
+
+def _physics(fit: Fit) -> Verdict:
+    estimated, kept = impossible_estimates(fit)
+    if not estimated and not kept:
         return Verdict("pass", "every segment is physically possible")
-    named = ", ".join(impossible[:_NAMED]) + (f" and {len(impossible) - _NAMED} more" if impossible[_NAMED:] else "")
-    return Verdict("fail", f"physically impossible segments: {len(impossible)} of {len(bsp.segments)} ({named})")
+    if not estimated:
+        return Verdict("caution", f"physically impossible in the model, and kept as they are: {_some(kept)}")
+    count = f"{len(estimated)} of {len(fit.estimate.segments)}"
+    return Verdict("fail", f"physically impossible segments: {count} ({_some(estimated)})")
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if names[_NAMED:] else "")
 
 
 def _literature(fit: Fit) -> Verdict:

@@ -94,6 +94,7 @@ def prepare_osim(
         *_mass_note(model, own, factor),
         *_idle_note(model, idle),
         *_held_note(skeleton, held),
+        *([] if held is None else _impossible_note(model, held)),
         *_marker_notes(model, trials),
         *(note for k in kinematics for note in k.notes),
     ]
@@ -106,20 +107,34 @@ def prepare_osim(
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=(*warnings, *_impossible_warning(model)),
+        warnings=(*warnings, *_impossible_warning(model, prior.mean)),
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )
 
 
-def _impossible_warning(model: OsimModel) -> list[str]:
-    impossible = impossible_segments(model.bsp)
-    if not impossible:
-        return []
+def _impossible_warning(model: OsimModel, estimated: BodySegmentParameters) -> list[str]:
+    told = _impossible(model, estimated)
+    return [f"{each}; the estimate starts from them, so correct them first ({_what_is_wrong(model)})" for each in told]
+
+
+def _impossible_note(model: OsimModel, held: BodySegmentParameters) -> list[str]:
+    told = _impossible(model, held)
     return [
-        f"{model.path.name}: the model's own mass properties are physically impossible for {', '.join(impossible)}; "
-        f"the estimate starts from them, so correct them first (kinertia check {model.path.name} says what is wrong)"
+        f"{each}, which are kept as they are: too light to change the results ({_what_is_wrong(model)})"
+        for each in told
     ]
+
+
+def _impossible(model: OsimModel, bsp: BodySegmentParameters) -> list[str]:
+    own = [name for name in impossible_segments(model.bsp) if name in bsp.segments]
+    if not own:
+        return []
+    return [f"{model.path.name}: the model's own mass properties are physically impossible for {', '.join(own)}"]
+
+
+def _what_is_wrong(model: OsimModel) -> str:
+    return f"kinertia check {model.path.name} says what is wrong"
 
 
 def _feet(model: OsimModel) -> dict[str, list[str]]:
