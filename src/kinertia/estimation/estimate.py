@@ -202,7 +202,14 @@ def named_by_source(ready: Prepared) -> ModelUncertainty:
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
     bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
-    fitted = fit_simultaneous(ready.skeleton, ready.prior, ready.kinematics, bandwidths, named_by_source(ready))
+    fitted = fit_simultaneous(
+        ready.skeleton,
+        ready.prior,
+        ready.kinematics,
+        bandwidths,
+        named_by_source(ready),
+        lambda share: progress("estimate", share),
+    )
     result = fitted.result
     parts = (
         fitted.skeletons,

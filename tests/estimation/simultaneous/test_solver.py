@@ -110,6 +110,15 @@ def test_same_input_same_result(trial, prior, calibration, exact):
     assert again.cost == exact.cost
 
 
+def test_progress_rises_with_every_step(trial, prior, calibration):
+    shares = []
+    far = observation(trial, noise_m=0.005)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [far], shares.append)
+    assert len(shares) == result.iterations
+    assert shares == sorted(set(shares))
+    assert 0.0 < shares[0] <= shares[-1] < 1.0
+
+
 def test_two_trials_tell_more_than_either(trial, prior, calibration):
     first, second = (observation(trial, noise_m=0.003, seed=seed) for seed in (1, 2))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,6 +107,7 @@ def fit_simultaneous(
     trials: Sequence[Kinematics],
     bandwidths: Sequence[Bandwidth] | None = None,
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -116,12 +117,13 @@ def fit_simultaneous(
         trials: kinematics of the trials.
         bandwidths: per trial, of motion and forces; found from the trials if None.
         uncertainty: what may move beside these segments.
+        progress: told the share of the estimate that is done, roughly.
     """
     used = used_skeleton(skeleton, trials, uncertainty)
     seen = observed(used, prior, trials, bandwidths or Bandwidth.of(trials), uncertainty)
     together = seen.together
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-    result = estimate_simultaneous(used, prior, calibration, together)
+    result = estimate_simultaneous(used, prior, calibration, together, progress)
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:

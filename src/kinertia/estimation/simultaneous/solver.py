@@ -12,7 +12,7 @@ Schur complement is the information on them, and its inverse their covariance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -84,16 +84,25 @@ _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 100
-"""Most trials take 10 to 20; impacts, and arms that reach the ends of their ranges, some 50."""
+"""Most trials take 5 to 20; impacts, and arms that reach the ends of their ranges, some 50."""
+_USUAL_ITERATIONS = 10
+_LEFT_ITERATIONS = 2
+"""What progress counts with: the usual number, and when these are done always so many more."""
 
 
 @one_blas_thread
 def estimate_simultaneous(
-    skeleton: Skeleton, prior: BspPrior, calibration: CalibrationPrior, trials: Sequence[Observation]
+    skeleton: Skeleton,
+    prior: BspPrior,
+    calibration: CalibrationPrior,
+    trials: Sequence[Observation],
+    progress: Callable[[float], None] = lambda share: None,
 ) -> SimultaneousResult:
-    """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials."""
+    """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials; `progress` is told the
+    share done, guessed from the usual number of steps.
+    """
     problem = MapProblem(skeleton, prior, calibration, trials)
-    ended = _searched(problem)
+    ended = _searched(problem, progress)
     covariance, moment_sd = _deviations(problem, ended.under)
     return _result(problem, ended, covariance, moment_sd)
 
@@ -110,13 +119,14 @@ class _Ended(NamedTuple):
     begin: float
 
 
-def _searched(problem: MapProblem) -> _Ended:
+def _searched(problem: MapProblem, progress: Callable[[float], None]) -> _Ended:
     """Gauss-Newton steps from the beginning until one is short."""
     state = _State(problem.at(problem.beginning, _FIRST_DAMPING), GaussianPrior.of(problem.instruments))
     begin, iterations = state.here.cost, 0
     while iterations < _MAX_ITERATIONS and not state.converged and state.damping < _STUCK:
         iterations += 1
         state = _iterated(problem, state, iterations > 1)
+        progress(iterations / (iterations + max(_USUAL_ITERATIONS - iterations, _LEFT_ITERATIONS)))
     under = state.here.under(state.instruments, problem.layout.instruments)
     return _Ended(under, state.instruments, state.converged, iterations, begin)
 
