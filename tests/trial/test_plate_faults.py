@@ -67,5 +67,14 @@ def test_an_amplifier_at_the_end_of_its_range(top_n, lost):
 @pytest.mark.parametrize("digits", [0, -1])
 def test_rounded_forces_are_not_cut(digits):
     vertical = np.where((TIME > 1) & (TIME < 1.6), 700.0 * np.sin(np.pi * (TIME - 1) / 0.6), 0.0).round(digits)
-    force = np.outer(vertical, [0.0, 1.0, 0.0])[:, None]
+    force = np.outer(vertical, [0.1, 1.0, 0.02])[:, None]
     assert loads_doubts(PlateLoads(TIME, ("plate 1",), force, np.zeros_like(force), (None,))) == []
+
+
+@pytest.mark.parametrize(("axis", "name"), [(0, "X"), (2, "Z")])
+def test_a_dead_channel_is_named(axis, name):
+    plate = plates()
+    force = plate.force.copy()
+    force[..., axis] = 0.0
+    (sentence,) = loads_doubts(replace(plate, force=force))
+    assert f"shows no force along {name} in any sample: a channel is dead" in sentence

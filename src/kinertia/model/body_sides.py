@@ -18,6 +18,8 @@ _CLEAR = 0.5
 """Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
 _UPRIGHT = 0.5
 """Cosine of 60 degrees: who sits has the pelvis half beside the feet."""
+_OPPOSED = 0.2
+"""Cosine; the sides of a sound pelvis are up to 70 degrees apart, those of one with a side turned 110 or more."""
 _FLAT = 0.8
 """Cosine of 37 degrees."""
 _BELOW_M = 0.05
@@ -41,6 +43,8 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
     if lying := _lying_trouble(places):
         return lying
     fronts = _fronts(places)
+    if one_sided := _pelvis_side_trouble(places, fronts, marker_set):
+        return one_sided
     if len(fronts) < 2:
         return ""
     turned = _odd_one_out(fronts)
@@ -90,6 +94,22 @@ def _lying_trouble(places: Mapping[str, FloatArray]) -> str:
         f"from the feet to the pelvis it goes {abs(along[axis]):.2f} m along {sign}{'XYZ'[axis]} and {along[1]:.2f} m "
         f"along +Y, which should be up; turn the file's axes so that {sign}{'XYZ'[axis]} becomes +Y"
     )
+
+
+def _pelvis_side_trouble(
+    places: Mapping[str, FloatArray], fronts: Mapping[str, FloatArray], marker_set: MarkerSet
+) -> str:
+    """Front and back exchanged on one side of the pelvis: its sides point to the front and to the back."""
+    if not {"asis_r", "asis_l", "psis_r", "psis_l"} <= set(places):
+        return ""
+    sides = {side: _level(places[f"asis_{side}"] - places[f"psis_{side}"]) for side in "rl"}
+    if not _cosine(sides["r"], sides["l"]) < -_OPPOSED:
+        return ""
+    feet = [front for name, front in fronts.items() if name.startswith("foot")]
+    backwards = [side for side, along in sides.items() if feet and max(_cosine(along, front) for front in feet) < 0.0]
+    which = f"the {_WORDS[backwards[0]]} side" if len(backwards) == 1 else "one side"
+    labels = _names(marker_set, *(f"{name}_{side}" for side in backwards or "rl" for name in ("asis", "psis")))
+    return f"front and back of the pelvis look swapped on {which}, in the labels {labels}; correct them"
 
 
 def _landmarks(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:

@@ -15,6 +15,8 @@ _STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of a person's weight on every plate."""
 _WEAKEST_N = 0.3
+_NOTHING_N, _FEWEST_CARRIED = 0.5, 10
+"""Amplifiers have more noise than this; so many samples under load, at least."""
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes there steeply."""
 _ROUNDED = 6.0
@@ -48,7 +50,7 @@ def loads_trouble(plates: PlateLoads) -> str:
 
 def loads_doubts(plates: PlateLoads) -> list[str]:
     """Saturated amplifiers; zeros that are wrong or drift, by what plates read while nobody stands on them."""
-    doubts = _saturated(plates)
+    doubts = _dead_channels(plates) + _saturated(plates)
     if plates.idle is None:
         return doubts
     for name, idle in zip(plates.names, plates.idle, strict=True):
@@ -64,6 +66,27 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
         if off:
             doubts.append(_wrong_zero(name, off))
     return doubts
+
+
+def _dead_channels(plates: PlateLoads) -> list[str]:
+    """Horizontal axes along which a plate that carries a person shows nothing at all."""
+    doubts = []
+    for name, force in zip(plates.names, np.moveaxis(plates.force, 1, 0), strict=True):
+        carried = force[:, 1] > FIRM_LOAD_N
+        if np.count_nonzero(carried) < _FEWEST_CARRIED or force[:, 1].max() < _STEP_N:
+            continue
+        dead = [axis for axis, values in (("X", force[carried, 0]), ("Z", force[carried, 2])) if _shows_nothing(values)]
+        if dead:
+            doubts.append(
+                f"{name} carries up to {force[:, 1].max():.0f} N and shows no force along {' and '.join(dead)} in any "
+                "sample: a channel is dead, or was not exported; a foot pushes sideways by tens of newtons, and joint "
+                "moments are wrong by tens of N m without"
+            )
+    return doubts
+
+
+def _shows_nothing(values: FloatArray) -> bool:
+    return bool(np.abs(values).max() < _NOTHING_N)
 
 
 def _saturated(plates: PlateLoads) -> list[str]:
