@@ -78,3 +78,12 @@ def test_a_dead_channel_is_named(axis, name):
     force[..., axis] = 0.0
     (sentence,) = loads_doubts(replace(plate, force=force))
     assert f"shows no force along {name} in any sample: a channel is dead" in sentence
+
+
+def test_zeros_in_the_middle_of_stance_are_named():
+    plate = plates()
+    force = plate.force.copy()
+    force[1200:1300] = 0.0
+    sentence = loads_trouble(replace(plate, force=force))
+    assert sentence.startswith("all plates read zero from 1.200 to 1.299 s, between samples of ")
+    assert "samples were lost" in sentence

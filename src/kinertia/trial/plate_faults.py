@@ -15,6 +15,8 @@ _STEP_N, _MOST_IDLE_N, _STEADY_N = 350.0, 150.0, 15.0
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of a person's weight on every plate."""
 _WEAKEST_N = 0.3
+_CARRIED_SHARE = 0.4
+"""Of what plates carry in the middle: a foot that leaves or lands takes some samples to lose or gain so much."""
 _NOTHING_N, _FEWEST_CARRIED = 0.5, 10
 """Amplifiers have more noise than this; so many samples under load, at least."""
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
@@ -34,7 +36,7 @@ def loads_trouble(plates: PlateLoads) -> str:
             f"the largest forces point along {axis} ({peaks.max():.0f} N) and not along Y ({peaks[1]:.0f} N), which is "
             f"up in the markers; export forces and markers in the same axes"
         )
-    if trouble := _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
+    if trouble := _lost_samples(plates) or _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
         return trouble
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
     arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
@@ -83,6 +85,22 @@ def _dead_channels(plates: PlateLoads) -> list[str]:
                 "moments are wrong by tens of N m without"
             )
     return doubts
+
+
+def _lost_samples(plates: PlateLoads) -> str:
+    """The first stretch in which all plates read nothing, between samples that carry a person; empty without one."""
+    total = plates.force[..., 1].sum(axis=1)
+    carried = total[total > FIRM_LOAD_N]
+    much = _CARRIED_SHARE * float(np.median(carried)) if carried.size else np.inf
+    for first, last in runs(np.equal(np.abs(plates.force).sum(axis=(1, 2)), 0.0)):
+        before, after = total[max(first - 1, 0)], total[min(last + 1, len(total) - 1)]
+        if min(before, after) > much:
+            return (
+                f"all plates read zero from {plates.time[first]:.3f} to {plates.time[last]:.3f} s, between samples of "
+                f"{before:.0f} and {after:.0f} N: nobody leaves the ground like that; samples were lost or filled with "
+                "zeros: export the forces again"
+            )
+    return ""
 
 
 def _shows_nothing(values: FloatArray) -> bool:
