@@ -122,7 +122,11 @@
     return subject.replace(/\.[^.]*$/, "");
   }
 
-  // asks how far it is; when it is done the page is loaded again
+  // a page that answered a form has the address that shows it, so that loading it again sends no form
+  const address = document.querySelector("[data-address]")?.dataset.address;
+  if (address) history.replaceState(null, "", address + location.hash);
+
+  // asks how far it is; when it is done the page is asked for again
   class Working {
     constructor(root) {
       this.root = root;
@@ -132,9 +136,9 @@
     async ask() {
       try {
         const answer = await fetch(this.root.dataset.progress, { headers: { accept: "application/json" } });
-        if (answer.status === 404) return location.reload();
+        if (answer.status === 404) return this.again();
         const job = (await answer.json())[this.root.dataset.kind];
-        if (!job) return this.done();
+        if (!job) return this.again();
         this.show(job);
       } catch {
         this.root.querySelector("[data-left]").textContent = "Kinertia does not answer: is it still running?";
@@ -142,9 +146,10 @@
       return setTimeout(() => this.ask(), PAUSE_MS);
     }
 
-    done() {
-      if (this.root.dataset.kind === "fit") location.hash = "results";
-      location.reload();
+    // to another address, since loading the same one again could repeat a form
+    again() {
+      const place = this.root.dataset.kind === "fit" ? "#results" : location.hash;
+      location.replace(`${address}?again${place}`);
     }
 
     show(job) {
