@@ -32,7 +32,9 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
         shutil.copyfile(FILES / name, folder / name)
     (folder / "letter.pdf").write_text("not for Kinertia")
     tab.drop(folder)
-    playwright.expect(tab.page.locator(".problems")).to_contain_text("a '.pdf' file cannot be checked; expected")
+    playwright.expect(tab.page.locator(".problems")).to_contain_text(
+        "a '.pdf' file is none that Kinertia reads"
+    )
     tab.page.get_by_role("link", name="Go on").click()
     tab.arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
