@@ -155,6 +155,12 @@ def test_what_is_no_number_is_said_and_nothing_is_written(person, measured_walk)
         write_form(person, {"mass_kg": "heavy"})
     assert person.subject.read_text(encoding="utf-8") == before
     assert {field.key: field.value for field in fields(entries(person), {"mass_kg": "heavy"})}["mass_kg"] == "heavy"
+    for text in ("1e400", "nan", "-inf"):
+        with pytest.raises(
+            SettingsError, match=rf"Body mass \(kg\): '{text}' is no number that anything"
+        ):
+            write_form(person, {"mass_kg": text})
+    assert person.subject.read_text(encoding="utf-8") == before
 
 
 def test_a_subject_file_that_was_dropped_is_used_with_all_its_entries(person, measured_walk):
