@@ -26,7 +26,7 @@ from kinertia.cli.web.responses import archive, chosen_folder, expect, form, pag
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.measures_file import measures_sheet
-from kinertia.io.output_folder import check_folder, complete_folder, expect_own_folder
+from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
@@ -291,7 +291,6 @@ def _recognised(person: Person) -> None:
 
 def _copied(person: Person, folder: Path) -> None:
     """The results in another folder, complete or not at all."""
-    check_folder(folder)
     expect_own_folder(folder)
     with complete_folder(folder, "fit") as work:
         shutil.copytree(person.results, work, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)
