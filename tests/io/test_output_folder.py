@@ -15,7 +15,7 @@ from kinertia.io.folder_exchange import put_in_place
 from kinertia.io.output_folder import GENERATOR, check_folder, complete_folder, expect_own_folder
 
 
-@pytest.mark.parametrize("name", ["missing", "empty", ".DS_Store", "desktop.ini", ".gitkeep"])
+@pytest.mark.parametrize("name", ["missing", "empty", ".DS_Store", "desktop.ini", ".gitkeep", ".kinertia-cohort.lock"])
 def test_folders_that_hold_nothing(tmp_path, name):
     folder = tmp_path / "out"
     if name != "missing":

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.folder_exchange import put_in_place
-from kinertia.io.working_folder import BEFORE, is_working_folder, sweep, working_folder
+from kinertia.io.working_folder import BEFORE, sweep, working_folder
 
 GENERATOR = '<meta name="generator" content="kinertia'
 """In the head of every HTML page that is a result of its own."""
@@ -27,6 +27,8 @@ INTERRUPTIONS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
 """Ctrl-C, the request to end, and the end of the terminal, as far as the system has them."""
+_OWN = ".kinertia"
+"""How the names of hidden files begin that Kinertia keeps beside results: lists, locks, what is in the making."""
 _ANYWHERE = {".DS_Store", ".localized", ".directory", ".gitkeep", ".gitignore", "desktop.ini", "Thumbs.db"}
 """What file managers and Git leave in folders that hold nothing else."""
 _RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", ".xml", ".toml", ".md", ".png"}
@@ -112,7 +114,7 @@ def expect_own_folder(folder: str | Path, otherwise: str = "") -> None:
     _expect_place(_real(folder))
     if not folder.is_dir() or (folder / _WRITTEN).is_file():
         return
-    found = [path.name for path in folder.iterdir() if path.name not in _ANYWHERE and not is_working_folder(path)]
+    found = [path.name for path in folder.iterdir() if not path.name.startswith(_OWN) and path.name not in _ANYWHERE]
     names = sorted(found, key=lambda name: (name.startswith("."), name))
     if names and not any(_says_kinertia(folder / name) for name in names if name.endswith(_TELLING)):
         listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

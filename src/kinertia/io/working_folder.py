@@ -35,11 +35,6 @@ def working_folder(within: Path) -> Iterator[Path]:
         _remove(folder, lock)
 
 
-def is_working_folder(path: Path) -> bool:
-    """Whether it is one by its name."""
-    return path.name.startswith(_PREFIX) and path.is_dir()
-
-
 def sweep(within: Path) -> None:
     """Remove what processes left that were killed, and put back what one of them had moved out of the way."""
     for folder in within.glob(f"{_PREFIX}*"):
