@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -163,10 +164,14 @@ def _write_uses(person: Person, before: Content, changed: Content, uses: Mapping
 
 
 def _number(key: str, text: str) -> float:
+    label = _LABELS.get(key, key)
     try:
-        return number_of(text)
+        number = number_of(text)
     except ValueError as error:
-        raise SettingsError(f"{_LABELS.get(key, key)}: {error}") from None
+        raise SettingsError(f"{label}: {error}") from None
+    if not math.isfinite(number):
+        raise SettingsError(f"{label}: '{text}' is no number that anything measured can have; write it like 72.6")
+    return number
 
 
 def trouble(person: Person) -> str:
