@@ -52,6 +52,17 @@ def test_a_doubted_segment_is_a_caution_for_its_own_output(fit):
     assert outputs["segment masses"].level == "pass"
 
 
+def test_what_contradicts_the_model_is_not_used(fit):
+    clear = informed(fit, 1.0, slice(0, 10))
+    table = clear.literature.table().copy()
+    table[:, 3] += 4.5 * clear.posterior.prior_sd[:, 3]
+    moved = replace(clear, estimate=BodySegmentParameters.from_table(clear.literature.segments, table))
+    outputs = by_output(moved)
+    assert outputs["centres of mass"].level == "fail"
+    assert "beyond 3 prior SDs" in outputs["centres of mass"].reason
+    assert outputs["segment masses"].level == "pass"
+
+
 def test_nothing_is_used_that_did_not_converge(fit):
     assert {use.level for use in uses(replace(fit, converged=False))} == {"fail"}
 

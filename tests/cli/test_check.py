@@ -46,6 +46,10 @@ def test_subject_file(lab):
     assert outcome.err.splitlines() == ["reading"]
 
 
+def test_a_folder_with_a_subject_file_stands_for_it(lab):
+    assert run("check", lab).out == run("check", lab / "subject.toml").out
+
+
 def test_files_find_each_other_by_name(lab):
     outcome = run("check", lab / "static.trc", lab / "walk_grf.mot", lab / "walk.trc", "--mass", 72.6)
     assert outcome.status == 0
@@ -88,7 +92,7 @@ def test_a_verdict_against_is_status_1(lab, options, words):
         (["subject.toml", "walk.trc"], "give it alone"),
         (["subject.toml", "--mass", "70"], "give it alone"),
         (["subject.toml", "--sex", "male"], "give it alone"),
-        (["."], "is a folder"),
+        ([".."], "is a folder"),
         (["walk.trc", "static.trc", "--loads", "loads.xml"], "but 2 are given"),
         (["model.osim", "--loads", "loads.xml"], "but 0 are given"),
         (["walk.trc", "--markers", "nobodys"], "no such marker set"),

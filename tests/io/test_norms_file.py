@@ -59,3 +59,10 @@ def test_a_wrong_file_is_told_with_its_line(tmp_path, old, new, line, words):
 def test_a_file_without_rows_is_told(tmp_path):
     with pytest.raises(FileError, match="a heading and no rows"):
         norms(tmp_path, PLAIN.partition("\n")[0])
+
+
+def test_percents_that_are_shares_are_told(tmp_path):
+    path = tmp_path / "norms.csv"
+    path.write_text("quantity,percent,mean,sd\nknee_angle_moment,0.0,0.1,0.05\nknee_angle_moment,1.0,0.1,0.05\n")
+    with pytest.raises(FileError, match="percent is at most 1; expected 0 to 100 %"):
+        read_norms(path)

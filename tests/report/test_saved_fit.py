@@ -72,3 +72,14 @@ def test_folders_without_results_are_told(tmp_path):
     (tmp_path / "fit.json").write_text("{}")
     with pytest.raises(FileError, match="run kinertia fit again"):
         kinertia.load_fit(tmp_path)
+
+
+def test_a_file_in_place_of_its_folder_is_told(demo_run):
+    with pytest.raises(FileError, match="is a file; give its folder"):
+        kinertia.load_fit(demo_run[1] / "report.html")
+
+
+def test_in_words_a_fit_is_a_line(fit):
+    assert repr(fit) == "Fit(synthetic walker, 72.6 kg, simultaneous; walk)"
+    assert repr(fit.trials[0]).startswith("TrialFit(walk: ")
+    assert len(repr(fit.trials)) < 100

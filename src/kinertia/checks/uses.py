@@ -14,6 +14,8 @@ import numpy as np
 from kinertia.checks.verdict import (
     Level,
     Verdict,
+    away_from_expected,
+    contradicts,
     expected_source,
     impossible_estimates,
     residual_verdicts,
@@ -108,17 +110,13 @@ def _segments(fit: Fit, name: str, columns: slice) -> Use:
     reason = f"the data show {shown} of {information.size} ({measured} of them well); the others are {start}'s"
     if shown == information.size:
         reason = f"the data show all {shown} ({measured} of them well)"
-    doubted = _doubted(fit, columns)
+    away = away_from_expected(fit)
+    beyond = (away[:, columns] > CONTRADICTION_SD).any(axis=1)
+    doubted = [fit.estimate.segments[i] for i in np.flatnonzero(beyond)]
     if doubted:
         reason += f"; beyond {CONTRADICTION_SD:g} prior SDs from {start}: {', '.join(doubted)}"
+        if contradicts(away):
+            return Use(name, "fail", reason)
     if not shown:
         return Use(name, "fail", f"the data show none of {information.size}: these are {start}'s, not this person's")
     return Use(name, "pass" if shown >= SHOWN_SHARE * information.size and not doubted else "caution", reason)
-
-
-def _doubted(fit: Fit, columns: slice) -> list[str]:
-    """Segments with a parameter of this group far from the prior's mean."""
-    assert fit.posterior is not None
-    scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
-    away = np.abs(fit.estimate.table() - fit.expected.table()) / scale
-    return [fit.estimate.segments[i] for i in np.flatnonzero((away[:, columns] > CONTRADICTION_SD).any(axis=1))]

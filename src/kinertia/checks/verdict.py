@@ -118,12 +118,11 @@ def _literature(fit: Fit) -> Verdict:
         kind, limit = ("centre of mass", "centres of mass"), f"{CONTRADICTING_COM_M * 1e3:g} mm"
         farthest = f"{fit.estimate.segments[worst]}, {moved[worst] * 1e3:.0f} mm"
     else:
-        change = fit.estimate.table() - fit.expected.table()
-        away = np.abs(change) / np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
+        away = away_from_expected(fit)
         row, column = np.unravel_index(int(np.argmax(away)), away.shape)
         far = int((away > CONTRADICTION_SD).sum())
         doubted = [fit.estimate.segments[i] for i in np.flatnonzero((away > CONTRADICTION_SD).any(axis=1))]
-        plain = len(doubted) > MOST_DOUBTED_SEGMENTS or away[row, column] > PLAIN_CONTRADICTION_SD
+        plain = contradicts(away)
         kind, limit = ("parameter", "parameters"), f"{CONTRADICTION_SD:g} prior SDs"
         farthest = f"{PARAMETERS[column]} of {fit.estimate.segments[row]}, {away[row, column]:.1f}"
     source = expected_source(fit)
@@ -134,6 +133,20 @@ def _literature(fit: Fit) -> Verdict:
     if plain:
         return Verdict("fail", f"{said}: the data contradict the model")
     return Verdict("caution", f"{said}: take {' and '.join(doubted)} with care")
+
+
+def away_from_expected(fit: Fit) -> np.ndarray:
+    """(s, 10) how far parameters are from where they were expected, in prior SDs; zero where they were kept."""
+    assert fit.posterior is not None
+    scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
+    result: np.ndarray = np.abs(fit.estimate.table() - fit.expected.table()) / scale
+    return result
+
+
+def contradicts(away: np.ndarray) -> bool:
+    """Whether parameters (s, 10) that are so many prior SDs away contradict the model, and not a segment or two."""
+    doubted = (away > CONTRADICTION_SD).any(axis=1).sum()
+    return bool(doubted > MOST_DOUBTED_SEGMENTS or away.max() > PLAIN_CONTRADICTION_SD)
 
 
 def expected_source(fit: Fit) -> str:

@@ -20,7 +20,7 @@ from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, s
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_file import read_subject, subject_file_in
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
 from kinertia.trial.telling_movements import missing_movements
@@ -87,6 +87,7 @@ def check(
     if output is not None:
         results_folder(output, force)
     check_subject(70.0 if mass is None else mass, 1.7 if height is None else height, sex or "male")
+    files = [subject_file_in(path) if _holds_subject_file(path) else path for path in files]
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
     if subjects and (len(files) > 1 or any(given is not None for given in (loads, mass, height, sex, markers))):
         raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
@@ -108,6 +109,10 @@ def check(
     judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
     status = 2 if mistakes else int(any(map(stands_against, judged)))
     return Outcome(_told(recordings, models, mistakes), status)
+
+
+def _holds_subject_file(path: Path) -> bool:
+    return path.is_dir() and any(each.suffix.lower() == ".toml" for each in path.iterdir())
 
 
 def _told(

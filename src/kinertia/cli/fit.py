@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
+import numpy as np
 import typer
 
 from kinertia.checks.verdict import stands_against, verdicts
@@ -21,6 +22,12 @@ from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.report.files import save_fit, summary
+from kinertia.settings import Settings
+
+
+def _methods(typed: str) -> list[str]:
+    """What the shell offers for --method."""
+    return [name for name in get_args(Settings.model_fields["method"].annotation) if name.startswith(typed)]
 
 
 def fit(
@@ -54,7 +61,9 @@ def fit(
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
     ] = False,
-    method: Annotated[str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.")] = None,
+    method: Annotated[
+        str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.", autocompletion=_methods)
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -108,11 +117,17 @@ def fit(
             continue
         judged = verdicts(result)
         status = max(status, int(stands_against(judged)))
-        summaries.append({"folder": str(one.folder), **summary(result)})
+        summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
         report_fit(result)
         report_verdicts(judged, result, verbose)
         out.print(f"results in {one.folder}", soft_wrap=True)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
+
+
+def _bsp_rows(fit: Fit) -> list[dict[str, Any]]:
+    """The rows of `bsp.csv`."""
+    columns = {name: np.asarray(values).tolist() for name, values in fit.bsp_columns().items()}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,13 @@ import numpy as np
 
 from kinertia.estimation.attached import with_attached
 from kinertia.estimation.forces_used import forces_used
+from kinertia.estimation.free_moment_sign import free_moment_sign_warnings
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
+from kinertia.estimation.simultaneous.instrument_warnings import MIRRORED_FREE_MOMENTS
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.simultaneous.unseen_turn import unseen_turn_note
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
@@ -112,10 +114,13 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
+    signs = list(free_moment_sign_warnings(ready.skeleton, ready.literature, ready.kinematics))
     warnings = (
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
-        *outcome.warnings,
+        *signs,
+        # free moments of the wrong sign are mirror images of what they should be
+        *(sentence for sentence in outcome.warnings if not signs or not sentence.startswith(MIRRORED_FREE_MOMENTS)),
         *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),
         *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
     )

@@ -75,7 +75,7 @@ class FitPictures(Protocol):
         """What the data say about each parameter; None after two-level."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrialFit:
     """One trial of a `Fit`. Arrays cover the w frames of the measured window.
 
@@ -150,6 +150,11 @@ class TrialFit:
         """`joint_load_sd` in the same form."""
         return None if self.joint_load_sd is None else by_coordinate(self.kinematics, self.joint_load_sd)
 
+    def __repr__(self) -> str:
+        """Name, time and size: all its arrays would fill pages."""
+        start, end = self.kinematics.window_s
+        return f"TrialFit({self.name}: {start:.2f} to {end:.2f} s, {len(self.time)} frames)"
+
     def _repr_html_(self) -> str:
         """What a notebook shows: frames used, distances of the markers, residuals."""
         return display.html(self)
@@ -163,7 +168,7 @@ def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:
     return pd.DataFrame(values, index=index, columns=list(kinematics.ik.coordinates))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """Body segment parameters of a person, and what they were estimated from.
 
@@ -328,6 +333,11 @@ class Fit:
         """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
         pictures: FitPictures = display.pictures(self)
         return pictures
+
+    def __repr__(self) -> str:
+        """Who, how, and from which trials: all its arrays would fill pages."""
+        trials = ", ".join(trial.name for trial in self.trials)
+        return f"Fit({self.subject.name}, {self.mass_kg:.1f} kg, {self.settings.method}; {trials})"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, warnings, body segment parameters."""

@@ -19,6 +19,8 @@ from kinertia.errors import FileError
 from kinertia.io.csv_file import Row, read_csv
 
 COLUMNS = ("quantity", "percent", "mean", "sd")
+_LARGEST_SHARE = 1.0
+"""A file whose percents all stay below is one of shares."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,9 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
         if percent in curve:
             raise FileError(row.path, f"{quantity} at {percent:g} % is there already; give each percent once", row.line)
         curve[percent] = (mean, sd)
+    if rows and 0.0 < max(map(max, rows.values())) <= _LARGEST_SHARE:
+        problem = "percent is at most 1; expected 0 to 100 % of the gait cycle: multiply the column by 100"
+        raise FileError(path, problem)
     return {name: _norm(curve) for name, curve in rows.items()}
 
 

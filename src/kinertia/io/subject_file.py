@@ -49,6 +49,7 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path, PureWindowsPath
 from typing import Annotated, Any, Literal
 
@@ -65,7 +66,17 @@ from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, pat
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Attached, Instruments, KnownSegment, PriorSettings, Settings, Subject, Table, folder_of
+from kinertia.settings import (
+    Attached,
+    Instruments,
+    KnownSegment,
+    PriorSettings,
+    Settings,
+    Subject,
+    Table,
+    folder_of,
+    number_of,
+)
 
 
 def _file(value: object, info: ValidationInfo) -> Path:
@@ -380,4 +391,7 @@ def _sentence(detail: Any) -> str:
     problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
     if kind == "value_error":
         problem = str(detail["ctx"]["error"])
+    if kind == "float_type" and isinstance(detail["input"], str):
+        with suppress(ValueError):
+            problem += f"; write it without quotes: {number_of(detail['input']):g}"
     return f"{key} = {json.dumps(detail['input'], default=str, ensure_ascii=False)}: {problem}"

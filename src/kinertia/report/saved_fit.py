@@ -71,6 +71,8 @@ def read_saved(folder: str | Path) -> SavedFit:
         FileError: as `load_fit`.
     """
     path = Path(folder) / FIT_FILE
+    if Path(folder).is_file():
+        raise FileError(folder, f"is a file; give its folder, {Path(folder).parent}")
     if not Path(folder).is_dir():
         raise FileError(folder, "no such folder; give one that kinertia fit has written")
     if not path.is_file():

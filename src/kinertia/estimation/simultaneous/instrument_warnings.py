@@ -1,12 +1,12 @@
 """What a fit says of plates and clock that are off: one sentence each.
 
-**Free moments that are mirror images.** In the measured walks of two laboratories (three people) the motion needs other
-free moments than the plates measure, by 3 to 6 N m/kN, to one side under the right foot and to the other under the
-left; in single stance the vertical moment is off by 1 to 3 N m before the estimate, too, likewise. Two plates have no
-reason to err like that; the body has: it is what legs, trunk and arms that turn against one another would need if their
-angular momentum were wrong by some tenths of a kg m2/s, as a trunk that bends, or skin over pelvis and shoulders, may
-make it. A plate that is wrong shows under one foot, or under both to the same side, as does the mean over whole
-strides (`trial.free_moment`).
+**Free moments that are mirror images.** In some measured walks the motion needs other free moments than the plates
+measure, by 3 to 6 N m/kN, to one side under the right foot and to the other under the left; in single stance the
+vertical moment is off by 1 to 3 N m before the estimate, too, likewise. Where turning their sign does not explain it
+(`free_moment_sign`), two plates have no reason to err like that; the body has: it is what legs, trunk and arms that
+turn against one another would need if their angular momentum were wrong by some tenths of a kg m2/s, as a trunk that
+bends, or skin over pelvis and shoulders, may make it. A plate that is wrong shows under one foot, or under both to the
+same side, as does the mean over whole strides (`trial.free_moment`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+MIRRORED_FREE_MOMENTS = "the motion needs other free moments than measured"
+"""How the sentence about free moments that are mirror images begins."""
 _NOTABLE = 2.0
 _FREE = "free moment"
 _ONE_SIDED = 0.5
@@ -52,7 +54,7 @@ def instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) ->
     if mirrored:
         listed = ", ".join(f"{value * 1e3:+.1f} ({plate})" for plate, value in free.items())
         sentences.append(
-            f"the motion needs other free moments than measured, {listed} N m/kN: mirror images, so rather a trunk "
+            f"{MIRRORED_FREE_MOMENTS}, {listed} N m/kN: mirror images, so rather a trunk "
             f"that is not rigid, or skin, than the plates; moments about the long axes of foot and leg are as uncertain"
         )
     return sentences
