@@ -47,7 +47,7 @@ def _commands() -> str:
 
 
 def _command(name: str, command: Any) -> str:
-    text = command.help.replace("\b\n", "")
+    text = command.help.replace("\b\n", "").replace(r"\[", "[")
     prose, _, examples = re.sub(r"\[bold\](Examples?)\[/\]", r"[bold]", text).partition("[bold]")
     paragraphs = [" ".join(part.split()) for part in prose.strip().split("\n\n")]
     parts = [f"## {name} {{ #{name.replace(' ', '-')} }}", *paragraphs]

@@ -15,14 +15,33 @@ from kinertia.io.folder_exchange import put_in_place
 from kinertia.io.output_folder import GENERATOR, check_folder, complete_folder, expect_own_folder
 
 
-@pytest.mark.parametrize("name", ["missing", "empty", "hidden"])
+@pytest.mark.parametrize("name", ["missing", "empty", ".DS_Store", "desktop.ini", ".gitkeep", ".kinertia-cohort.lock"])
 def test_folders_that_hold_nothing(tmp_path, name):
-    folder = tmp_path / name
+    folder = tmp_path / "out"
     if name != "missing":
         folder.mkdir()
-    if name == "hidden":
-        (folder / ".DS_Store").write_text("x")
+    if name not in ("missing", "empty"):
+        (folder / name).write_text("x")
     expect_own_folder(folder)
+
+
+def test_hidden_files_are_somebody_elses_and_no_folder_inside_is_looked_at(tmp_path, monkeypatch):
+    (tmp_path / ".ssh").mkdir()
+    (tmp_path / ".profile").write_text("x")
+    monkeypatch.delattr(Path, "rglob")
+    with pytest.raises(FileError, match=r"not results of Kinertia \(.profile, .ssh\); give another folder$"):
+        expect_own_folder(tmp_path)
+    (tmp_path / ".kinertia.json").write_text("{}")
+    expect_own_folder(tmp_path)
+
+
+def test_the_home_folder_is_refused_at_once(tmp_path, monkeypatch):
+    for name in ("HOME", "USERPROFILE"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.delattr(Path, "rglob")
+    for refused in (check_folder, expect_own_folder):
+        with pytest.raises(FileError, match=r"is your home folder, .*give a folder inside it"):
+            refused(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -44,8 +63,8 @@ def test_folders_that_hold_something(tmp_path, name, text, own):
     if own:
         expect_own_folder(tmp_path)
         return
-    with pytest.raises(FileError, match=f"not results of Kinertia .*{name}.*--force"):
-        expect_own_folder(tmp_path)
+    with pytest.raises(FileError, match=f"not results of Kinertia .*{name}.* folder, or so$"):
+        expect_own_folder(tmp_path, ", or so")
 
 
 def test_binary_file_of_that_name_is_somebody_elses(tmp_path):

@@ -196,6 +196,7 @@ def test_the_two_tables_agree_in_the_large(sex: str) -> None:
         ((70000.0, 1.7, "male"), "mass_kg", "grams"),
         ((5.0, 1.7, "male"), "mass_kg", "between 10 and 300"),
         ((float("nan"), 1.7, "male"), "mass_kg", "kilograms"),
+        ((float("inf"), 1.7, "male"), "mass_kg", "inf: give the body mass"),
         ((70.0, 170.0, "male"), "height_m", "centimetres"),
         ((70.0, 1700.0, "male"), "height_m", "millimetres"),
         ((70.0, 2.6, "male"), "height_m", "between 0.5 and 2.5"),

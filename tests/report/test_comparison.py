@@ -10,6 +10,7 @@ from command_line import run
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import comparison_columns, differences, moments_figure, remarks, render_comparison
 from kinertia.report.files import save_fit
+from kinertia.report.headline import words
 from report_page import Elements
 
 
@@ -41,6 +42,14 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
     assert '<p class="headline">No error bars: differences only.</p>' in page, "neither pass nor caution"
     assert "<td>no</td>" not in page
     assert "<td>no</td>" in render_comparison({"a": fit, "again": fit})
+
+
+@pytest.mark.parametrize("warnings", [(), ("a doubt",)])
+def test_a_fit_has_the_word_that_its_report_has(fit, warnings):
+    one = replace(fit, warnings=warnings)
+    page = Elements(render_comparison({"one": one, "two": one})).text
+    marks = {"pass": "✓ pass", "caution": "~ caution", "fail": "✗ fail"}
+    assert [mark for mark in marks.values() if mark in page] == [marks[words(one).level]]
 
 
 @pytest.mark.slow

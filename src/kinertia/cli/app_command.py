@@ -34,7 +34,7 @@ def app(
     The page is served on this computer to this computer only, at an address
     with a secret part; nothing is sent anywhere. What it keeps is in a folder
     of yours, in the form that the other commands take. It ends with Ctrl-C or
-    the button on the page. Needs pip install "kinertia[app]".
+    the button on the page. Needs pip install "kinertia\\[app]".
 
     [bold]Examples[/]
 

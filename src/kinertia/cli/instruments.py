@@ -29,7 +29,7 @@ def instruments(
 ) -> Outcome:
     """Read force plates and clock of a session from all its trials, for use in all its fits.
 
-    Writes a file for session = "..." under [instruments] in the subject files
+    Writes a file for session = "..." under \\[instruments] in the subject files
     of the session: what one person's walks leave open of a plate's place, those
     of the others tell. A fit leaves out what its own trials have said.
 

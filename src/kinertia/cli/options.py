@@ -20,9 +20,9 @@ def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ())
     Raises:
         FileError: it cannot be written to, or holds somebody else's files and `force` is False.
     """
-    check_folder(folder, sub_folders)
     if not force:
-        expect_own_folder(folder)
+        expect_own_folder(folder, ", or --force to write among them")
+    check_folder(folder, sub_folders)
 
 
 def number(text: str) -> float:

@@ -37,7 +37,7 @@ def population(
     """Learn the mean body and the spread of a group from the fits of its people.
 
     Each person's trials say little about most parameters, all together say
-    much about their mean. Writes a file for population = "..." under [prior]
+    much about their mean. Writes a file for population = "..." under \\[prior]
     in the subject files of other people of the group.
 
     [bold]Examples[/]

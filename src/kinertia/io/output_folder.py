@@ -27,6 +27,10 @@ INTERRUPTIONS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
 """Ctrl-C, the request to end, and the end of the terminal, as far as the system has them."""
+_OWN = ".kinertia"
+"""How the names of hidden files begin that Kinertia keeps beside results: lists, locks, what is in the making."""
+_ANYWHERE = {".DS_Store", ".localized", ".directory", ".gitkeep", ".gitignore", "desktop.ini", "Thumbs.db"}
+"""What file managers and Git leave in folders that hold nothing else."""
 _RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", ".xml", ".toml", ".md", ".png"}
 """Types of files that results have."""
 
@@ -41,6 +45,20 @@ def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
         sub_folders: names in it that results need as folders.
     """
     folder = _real(folder)
+    _expect_place(folder)
+    if not folder.is_dir():
+        return
+    for path in folder.rglob("*"):
+        if path.is_dir() and path.suffix.lower() in _RESULTS and path.name not in sub_folders:
+            raise FileError(path, "is a folder where a file of the results may go; rename it, or give another folder")
+        if path.is_file() and path.parent == folder and path.name in sub_folders:
+            raise FileError(path, "is a file where a folder of the results goes; rename it, or give another folder")
+    if sys.platform == "win32" and (held := _open_elsewhere(folder)):
+        raise FileError(held[0], "is open in another program; close it there, and try again")
+
+
+def _expect_place(folder: Path) -> None:
+    """Raise FileError unless a folder can be made or replaced here; looks at nothing that is in it."""
     parent = _existing(folder.parent)
     for place in (parent, folder):
         if place.exists() and not place.is_dir():
@@ -48,18 +66,9 @@ def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
     sweep(parent)
     with working_folder(parent):  # Windows does not tell otherwise whether that is allowed
         pass
-    if not folder.is_dir():
-        return
-    if trouble := _irreplaceable(folder):
+    if folder.is_dir() and (trouble := _irreplaceable(folder)):
         problem = f"{trouble}, and results replace their folder as a whole; give a folder inside it ({folder / 'out'})"
         raise FileError(folder, problem)
-    for path in folder.rglob("*"):
-        if path.is_dir() and path.suffix.lower() in _RESULTS and path.name not in sub_folders:
-            raise FileError(path, "is a folder where a file of the results may go; rename it, or give another folder")
-        if path.is_file() and path.parent == folder and path.name in sub_folders:
-            raise FileError(path, "is a file where a folder of the results goes; rename it, or give another folder")
-    if sys.platform == "win32" and (held := _open_elsewhere(folder)):
-        raise FileError(held[0], "is open in another program; close it there, and run the command again")
 
 
 def _real(folder: str | Path) -> Path:
@@ -72,6 +81,8 @@ def _irreplaceable(folder: Path) -> str:
     here = Path.cwd().resolve()
     if folder == here or folder in here.parents:
         return "is the current folder, or holds it"
+    if folder == _real(os.path.expanduser("~")):
+        return "is your home folder"
     if os.path.ismount(folder):
         return "is a drive or mounted folder"
     return "" if os.access(folder, os.W_OK) else "cannot be written to"
@@ -89,22 +100,26 @@ def _open_elsewhere(folder: Path) -> list[Path]:
     return held
 
 
-def expect_own_folder(folder: str | Path) -> None:
+def expect_own_folder(folder: str | Path, otherwise: str = "") -> None:
     """Raise FileError where `folder` holds files and none of them says that Kinertia wrote the results there.
 
-    Hidden files do not count.
+    Hidden files count, but for those that systems and programs leave in any folder. Looks at no folder inside, and so
+    answers at once: worth calling before `check_folder`.
+
+    Args:
+        folder: need not exist yet.
+        otherwise: what else can be done than to give another folder, as the end of the error's sentence.
     """
     folder = Path(folder)
-    if not folder.is_dir():
+    _expect_place(_real(folder))
+    if not folder.is_dir() or (folder / _WRITTEN).is_file():
         return
-    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    found = [path.name for path in folder.iterdir() if not path.name.startswith(_OWN) and path.name not in _ANYWHERE]
+    names = sorted(found, key=lambda name: (name.startswith("."), name))
     if names and not any(_says_kinertia(folder / name) for name in names if name.endswith(_TELLING)):
         listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-        raise FileError(
-            folder,
-            f"holds files that are not results of Kinertia ({listed}); give another folder, or --force to write among "
-            f"them",
-        )
+        problem = f"holds files that are not results of Kinertia ({listed}); give another folder{otherwise}"
+        raise FileError(folder, problem)
 
 
 def _says_kinertia(path: Path) -> bool:
@@ -178,7 +193,7 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
         held = _open_elsewhere(folder) if sys.platform == "win32" else []
         problem = (
             f"cannot be replaced ({error.strerror}): nothing was written; close the program that has it or one of its "
-            "files open, and run the command again"
+            "files open, and try again"
         )
         raise FileError(held[0] if held else folder, problem) from error
     for name in _files(before) - staying - old - _files(folder):  # came in the meantime

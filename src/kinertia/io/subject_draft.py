@@ -214,9 +214,13 @@ def holds_loads(file: Path) -> bool:
 
 
 def holds_forces(file: Path) -> bool:
-    """Whether a motion file has force columns (`..._vx`, `..._vy`, ...) and is not the static trial's."""
-    motion = file.suffix.lower() in (".mot", ".sto") and not STATIC_NAME.search(file.stem)
-    return motion and re.search(r"_v[xyz]\b", _head(file)) is not None
+    """Whether a motion file has force columns and is not the static trial's."""
+    return not STATIC_NAME.search(file.stem) and has_force_columns(file)
+
+
+def has_force_columns(file: Path) -> bool:
+    """Whether it is a motion file with columns `..._vx`, `..._vy`, ..., whichever trial's."""
+    return file.suffix.lower() in (".mot", ".sto") and re.search(r"_v[xyz]\b", _head(file)) is not None
 
 
 def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:

@@ -88,7 +88,7 @@ def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
         SubjectError: mass outside 10-300 kg, height outside 0.5-2.5 m, or another sex.
     """
     if not 10.0 <= mass_kg <= 300.0:
-        hint = "that looks like grams; " if mass_kg > 1000.0 else ""
+        hint = "that looks like grams; " if 1000.0 < mass_kg < np.inf else ""
         raise SubjectError("mass_kg", mass_kg, f"{hint}give the body mass in kilograms, between 10 and 300.")
     if not 0.5 <= height_m <= 2.5:
         unit = "millimetres" if height_m > 300.0 else "centimetres"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.checks.verdict import verdicts, worst_level
+from kinertia.checks.verdict import verdicts
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report import style
@@ -21,6 +21,7 @@ from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
+from kinertia.report.headline import level_of
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
 from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
@@ -173,7 +174,7 @@ def _head(name: str, fit: Fit) -> dict[str, Any]:
         "method": fit.settings.method,
         "model": fit.skeleton.name,
         "trials": ", ".join(trial.name for trial in fit.trials),
-        "level": worst_level(verdicts(fit)),
+        "level": level_of(fit, verdicts(fit)),
     }
 
 

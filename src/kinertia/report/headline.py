@@ -6,6 +6,7 @@ changed to get there, what the data say about the body, and where the estimate l
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,7 @@ class Words:
     """A fit in sentences.
 
     Attributes:
-        level: the worst of the judgements; a warning is worth a caution.
+        level: `level_of`.
         headline: what it means for using the numbers.
         uses: `kinertia.checks.uses.uses`.
         judgements: `kinertia.checks.verdict.verdicts`.
@@ -51,12 +52,16 @@ class Words:
     departures: tuple[str, ...]
 
 
+def level_of(fit: Fit, judgements: Iterable[Verdict]) -> Level:
+    """A fit in one word: the worst of its judgements; a warning is worth a caution."""
+    level = worst_level(judgements)
+    return "caution" if level == "pass" and fit.warnings else level
+
+
 def words(fit: Fit) -> Words:
     """The verdict on a fit."""
     judgements = tuple(verdicts(fit))
-    level = worst_level(judgements)
-    if level == "pass" and fit.warnings:
-        level = "caution"
+    level = level_of(fit, judgements)
     counts = [sum(one.level == wanted for one in judgements) for wanted in ("fail", "caution")]
     warned = f"{len(fit.warnings)} warning{'s' if len(fit.warnings) > 1 else ''}" if fit.warnings else ""
     calls = (

@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
+from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import DESKTOP, PHONE, picture, playwright
 from kinertia.cli.measured_demo import FILES
@@ -32,7 +33,7 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
         shutil.copyfile(FILES / name, folder / name)
     (folder / "letter.pdf").write_text("not for Kinertia")
     tab.drop(folder)
-    playwright.expect(tab.page.locator(".problems")).to_contain_text("a '.pdf' file cannot be checked; expected")
+    playwright.expect(tab.page.locator(".problems")).to_contain_text("a '.pdf' file is none that Kinertia reads")
     tab.page.get_by_role("link", name="Go on").click()
     tab.arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
@@ -67,6 +68,35 @@ def test_a_folder_is_dragged_onto_the_page_and_an_archive_is_refused(tab, tmp_pa
     said = "session.zip: not taken: an archive is not unpacked here; unpack it, and drop the folder"
     playwright.expect(tab.page.locator(".problems")).to_contain_text(said)
     tab.quiet()
+
+
+def test_nobody_stays_in_the_library_of_whom_no_file_was_taken(browser, app, tmp_path):
+    before = {person.name for person in app.library.people()}
+    (tmp_path / "only.pdf").write_text("not for Kinertia")
+    tab = Tab(browser, app).home().drop(tmp_path / "only.pdf")
+    playwright.expect(tab.page.locator("[role=status]")).to_have_text("No file was taken.")
+    playwright.expect(tab.page.locator(".problems")).to_contain_text("only.pdf: not taken")
+    assert {person.name for person in app.library.people()} == before
+    tab.quiet()
+
+
+@pytest.mark.parametrize(
+    ("names", "person"),
+    [
+        (("subject04_static.trc", "subject04_walk_1.trc", "subject04_walk_2.trc"), "subject04"),
+        (("Eva Berg static.trc", "Eva Berg walk.trc"), "Eva Berg"),
+        (("standing.trc", "w1.trc", "carla.toml"), "carla"),
+        (("static.trc", "w1.trc", "subject.toml"), "Person"),
+        (("walk_1.trc", "walk_2.trc"), "Person"),
+    ],
+)
+def test_a_person_is_called_as_the_files_are(browser, tmp_path, names, person):
+    for name in names:
+        (tmp_path / name).write_text("no markers")
+    with running(tmp_path / "library") as own:
+        tab = Tab(browser, own).home().drop(*(tmp_path / name for name in names)).arrived()
+        assert tab.page.get_by_role("heading", level=1).inner_text() == person
+        tab.quiet()
 
 
 def test_a_measured_segment_and_a_rucksack_are_entered_in_the_form(tab):

@@ -90,6 +90,52 @@ def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, shared_data)
     assert trouble(person) == ""
 
 
+def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person, shared_data):
+    put(person, shared_data / "gait2354", *GAIT2354)
+    recognise(person)
+    static, walk, forces, _ = GAIT2354
+    text = person.subject.read_text(encoding="utf-8")
+    marked = next(line for line in text.splitlines() if line.startswith("markers") and walk in line)
+    write_text(person, text.replace(marked, f"{marked}\nwindow_s = [0.5, 1.0]"))
+    before, trial = used(person), entries(person)["trial"]
+
+    def saved(**changed):
+        """As the form does: every file with its use, as shown or changed."""
+        rows = file_table(person.files(), entries(person))
+        write_form(person, {USE + row.name: changed.get(row.name, row.use) for row in rows if row.choices})
+
+    saved(**{walk: ""})
+    assert used(person) == {static: "static"}
+    saved()
+    saved(**{walk: "trial"})
+    assert used(person) == before
+    assert entries(person)["trial"] == trial
+    saved(**{forces: ""})
+    assert used(person) == {name: use for name, use in before.items() if name != forces}, "what is put aside stays so"
+    saved(**{walk: ""})
+    saved(**{walk: "trial"})
+    assert forces not in used(person)
+
+
+def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, shared_data):
+    put(person, shared_data / "gait2354", *GAIT2354)
+    recognise(person)
+    static, walk, forces, _ = GAIT2354
+    shutil.copyfile(person.folder / forces, person.folder / "other_grf.mot")
+    write_form(person, {USE + walk: "", USE + static: "static"})
+    write_form(person, {USE + walk: "trial", USE + "other_grf.mot": f"forces:{walk}"})
+    assert used(person)["other_grf.mot"] == f"forces:{walk}"
+    assert forces not in used(person)
+
+
+def test_forces_of_a_static_trial_are_said_to_be_that(person, shared_data):
+    put(person, shared_data / "subject4", "static1.trc", "static1_grf.mot")
+    recognise(person)
+    (row,) = [row for row in file_table(person.files(), entries(person)) if row.name == "static1_grf.mot"]
+    assert row.kind == "forces of a static trial, by its name: not needed, of that only the markers are used"
+    assert row.use == ""
+
+
 def test_forces_of_another_person_are_not_taken(tmp_path, shared_data):
     library = Library(tmp_path)
     anna, ben = library.add("Anna"), library.add("Ben")
@@ -155,6 +201,10 @@ def test_what_is_no_number_is_said_and_nothing_is_written(person, measured_walk)
         write_form(person, {"mass_kg": "heavy"})
     assert person.subject.read_text(encoding="utf-8") == before
     assert {field.key: field.value for field in fields(entries(person), {"mass_kg": "heavy"})}["mass_kg"] == "heavy"
+    for text in ("1e400", "nan", "-inf"):
+        with pytest.raises(SettingsError, match=rf"Body mass \(kg\): '{text}' is no number that anything"):
+            write_form(person, {"mass_kg": text})
+    assert person.subject.read_text(encoding="utf-8") == before
 
 
 def test_a_subject_file_that_was_dropped_is_used_with_all_its_entries(person, measured_walk):

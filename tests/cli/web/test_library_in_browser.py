@@ -56,6 +56,32 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
         one.quiet()
 
 
+def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
+    """A tab that shows the answer to a form shows the person's page when the fit is done."""
+    go = tmp_path / "go"
+    code = f"import os, time\nwhile not os.path.exists({str(go)!r}): time.sleep(0.05)"
+    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", code))
+    person = ready(app.library, "Copied")
+    person.results.mkdir()
+    (person.results / "fit.json").write_text('{"kinertia": "x"}')
+    tab = Tab(browser, app)
+    page, sent = tab.page, []
+    page.on("request", lambda request: request.method == "POST" and sent.append(request.url.rpartition("/")[2]))
+    page.goto(f"{app.address}people/{person.name}")
+    page.get_by_role("button", name="Estimate again").click()
+    page.get_by_text("Single files, or into a folder").click()
+    page.get_by_label("Folder on this computer").fill(str(tmp_path / "mine"))
+    page.get_by_role("button", name="Write the results there").click()
+    playwright.expect(page.locator(".message.pass")).to_contain_text("The results are in")
+    assert page.url == f"{app.address}people/{person.name}"
+    go.touch()
+    playwright.expect(page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+    playwright.expect(page).to_have_url(f"{app.address}people/{person.name}#results")
+    page.reload()
+    assert sent == ["fit", "copy"]
+    page.close()
+
+
 def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch):
     crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
     monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", crash))

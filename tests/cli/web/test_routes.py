@@ -108,3 +108,13 @@ def test_what_cannot_be_fitted_does_not_wait(app):
     assert app.post("/people/Anna/fit").status == 303
     assert app.post("/people/Anna/explode").status == 404
     assert person.notes() == {}
+
+
+@pytest.mark.parametrize("form", ["copy", "entries", "text", "fit", "delete"])
+def test_the_address_of_a_form_leads_to_the_person(app, form):
+    person = app.library.add("Anna B")
+    answer = app.ask(f"/people/Anna%20B/{form}")
+    assert (answer.status, answer.headers["location"]) == (303, f"{app.root}/people/Anna%20B")
+    assert app.ask(f"/people/nobody/{form}").status == 404
+    assert app.ask("/people/Anna%20B/secret").status == 404
+    assert app.library.people() == [person]

@@ -1,4 +1,4 @@
-"""Dropped files: names made harmless, limits kept, archives and other kinds refused in the command line's words."""
+"""Dropped files: names made harmless, limits kept, archives and other kinds refused."""
 
 import asyncio
 import http.client
@@ -16,7 +16,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app_server import running
-from command_line import run
 from kinertia.cli.web import uploads
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.uploads import harmless_name, receive
@@ -123,7 +122,7 @@ def test_who_sends_a_refused_file_is_heard_out(served, person, size):
     answer = http.client.HTTPResponse(connection.sock, method="POST")
     answer.begin()
     assert answer.status == 422
-    assert "'.pdf' file cannot be checked" in json.loads(answer.read())["problem"]
+    assert "a '.pdf' file is none that Kinertia reads" in json.loads(answer.read())["problem"]
     connection.sock.sendall(bytes(size))
     connection.sock.sendall(
         f"GET {served.root}/ HTTP/1.1\r\nHost: {connection.host}:{connection.port}\r\n\r\n".encode()
@@ -134,14 +133,12 @@ def test_who_sends_a_refused_file_is_heard_out(served, person, size):
     connection.close()
 
 
-def test_other_kinds_are_refused_in_the_words_of_the_command_line(served, person, tmp_path):
-    (tmp_path / "letter.pdf").touch()
-    said = run("check", tmp_path / "letter.pdf").err
-    status, told = drop(served, person, "letter.pdf")
+@pytest.mark.parametrize(("name", "what"), [("letter.pdf", "a '.pdf' file"), ("letter", "a file without an ending")])
+def test_other_kinds_are_refused_with_all_that_are_taken(served, person, name, what):
+    status, told = drop(served, person, name)
     assert status == 422
-    sentence = told["problem"].removeprefix("letter.pdf: ")
-    assert sentence in said
-    assert "a '.pdf' file cannot be checked" in sentence
+    assert told["problem"].startswith(f"{name}: not taken: {what} is none that Kinertia reads; those are ")
+    assert all(ending in told["problem"] for ending in uploads.ENDINGS)
 
 
 def test_a_zip_bomb_is_refused_unread(served, person):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from kinertia.cli.web.file_table import (
     Content,
     file_table,
     is_subject_file,
+    put_aside,
+    taken_up,
     with_new_files,
     with_uses,
     within_folder,
@@ -149,14 +152,26 @@ def write_form(person: Person, form: Mapping[str, str]) -> None:
         changed["model"] = {**_model(content), "markers": form[_MARKER_SET]}
         if not form[_MARKER_SET]:
             del changed["model"]["markers"]
-    write(person, with_uses(changed, known))
+    _write_uses(person, content, changed, known)
+
+
+def _write_uses(person: Person, before: Content, changed: Content, uses: Mapping[str, str]) -> None:
+    """Write the entries with these uses; a trial that is used again has the forces and the rest that it had."""
+    aside = person.notes().get("aside", [])
+    after = with_uses(*taken_up(changed, uses, aside))
+    write(person, after)
+    person.note(aside=put_aside(before, after, aside))
 
 
 def _number(key: str, text: str) -> float:
+    label = _LABELS.get(key, key)
     try:
-        return number_of(text)
+        number = number_of(text)
     except ValueError as error:
-        raise SettingsError(f"{_LABELS.get(key, key)}: {error}") from None
+        raise SettingsError(f"{label}: {error}") from None
+    if not math.isfinite(number):
+        raise SettingsError(f"{label}: '{text}' is no number that anything measured can have; write it like 72.6")
+    return number
 
 
 def trouble(person: Person) -> str:

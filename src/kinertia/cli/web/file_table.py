@@ -16,7 +16,7 @@ from kinertia.io.file_names import last_part
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import is_plate_file
-from kinertia.io.subject_draft import holds_forces, holds_loads, is_capture
+from kinertia.io.subject_draft import STATIC_NAME, has_force_columns, holds_loads, is_capture
 from kinertia.io.subject_file import TABLES
 
 Content = dict[str, Any]
@@ -67,8 +67,10 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
     if capture:
         what = "markers and force plates (C3D)" if suffix == ".c3d" else f"markers ({suffix[1:].upper()})"
         return what, (("static", "static trial"), ("trial", "walk or other motion"), unused)
-    if holds_forces(file):
-        return "forces", (*((f"forces:{one.name}", f"forces of {one.name}") for one in captures), unused)
+    if has_force_columns(file):
+        of_static = " of a static trial, by its name: not needed, of that only the markers are used"
+        what = f"forces{of_static if STATIC_NAME.search(file.stem) else ''}"
+        return what, (*((f"forces:{one.name}", f"forces of {one.name}") for one in captures), unused)
     if holds_loads(file):
         named = ((f"loads:{one.name}", f"explains the forces of {one.name}") for one in captures)
         return "what the columns of forces are (ExternalLoads)", (*named, unused)
@@ -137,6 +139,23 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
     prior = {key: value for key, value in _table(content, "prior").items() if key not in _PRIOR_FILES}
     prior |= {key: own[0] for key in _PRIOR_FILES if (own := by_use.get(key))}
     return {**changed, "prior": prior} if prior else {key: changed[key] for key in changed if key != "prior"}
+
+
+def put_aside(before: Content, after: Content, aside: Iterable[Content]) -> list[Content]:
+    """Entries of trials that are not used, to remember them: what `before` or `aside` has and `after` lacks."""
+    known = {str(trial.get("markers")): dict(trial) for trial in (*aside, *_trials(before))}
+    used = {str(trial.get("markers")) for trial in _trials(after)}
+    return [trial for markers, trial in known.items() if markers not in used]
+
+
+def taken_up(content: Content, uses: Mapping[str, str], aside: Iterable[Content]) -> tuple[Content, dict[str, str]]:
+    """Entries and uses with what was put aside of trials that are used again; files that have another use keep it."""
+    used = {str(trial.get("markers")) for trial in _trials(content)}
+    back = [one for one in aside if uses.get(str(one.get("markers"))) == "trial" and one["markers"] not in used]
+    given = set(uses.values())
+    free = {name: use for name, use in uses_of({"trial": back}).items() if use not in given}
+    again = {name: free.get(name, use) if use == NOT_USED else use for name, use in uses.items()}
+    return ({**content, "trial": [*_trials(content), *back]} if back else content), again
 
 
 def with_new_files(content: Content, draft: Content, present: Iterable[str], seen: Iterable[str]) -> Content:

@@ -105,7 +105,9 @@ class Person:
     def note(self, **values: Any) -> None:
         """Remember this as well."""
         with _NOTING:
-            write_then_rename(self.folder / _RECORD, json.dumps({**self.notes(), **values}, indent=1) + "\n")
+            write_then_rename(
+                self.folder / _RECORD, json.dumps({**self.notes(), **values}, indent=1, default=str) + "\n"
+            )
 
 
 class Library:

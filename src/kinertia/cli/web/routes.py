@@ -26,11 +26,13 @@ from kinertia.cli.web.responses import archive, chosen_folder, expect, form, pag
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.measures_file import measures_sheet
-from kinertia.io.output_folder import check_folder, complete_folder, expect_own_folder
+from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
+_FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", *KINDS)
+"""Addresses below a person's that forms are sent to."""
 
 
 def application(library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> Starlette:
@@ -61,6 +63,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         *marker_routes(library, jobs),
         Route("/people/{name}/{kind}", actions.start, methods=["POST"]),
         Route("/people/{name}/{kind}/cancel", actions.cancel, methods=["POST"]),
+        Route("/people/{name}/{action}", actions.back),
         Mount("/static", StaticFiles(directory=_STATIC)),
     ]
     handlers = {HTTPException: _not_found, KinertiaError: _trouble, OSError: _no_file, Exception: _failed}
@@ -167,6 +170,12 @@ class _Actions:
         person, kind = self._person(request), self._kind(request)
         await run_in_threadpool(self._jobs.cancel, person, kind)
         return to(request, "people", person.name)
+
+    async def back(self, request: Request) -> Response:
+        """Who opens the address of a form, from the browser's history for one, gets the person's page."""
+        if request.path_params["action"] not in _FORMS:
+            raise HTTPException(404, "no such page")
+        return to(request, "people", self._person(request).name)
 
     async def progress(self, request: Request) -> Response:
         """How far the person's check and fit are."""
@@ -282,7 +291,6 @@ def _recognised(person: Person) -> None:
 
 def _copied(person: Person, folder: Path) -> None:
     """The results in another folder, complete or not at all."""
-    check_folder(folder)
     expect_own_folder(folder)
     with complete_folder(folder, "fit") as work:
         shutil.copytree(person.results, work, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)

@@ -7,7 +7,6 @@ import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from kinertia.checks.files import unknown_kind
 from kinertia.cli.web.library import Person
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere, last_part, same_folder
@@ -40,7 +39,8 @@ def harmless_name(given: str) -> str:
     if suffix == ".zip":
         raise FileError(name, "not taken: an archive is not unpacked here; unpack it, and drop the folder")
     if suffix not in ENDINGS:
-        raise unknown_kind(Path(name))
+        kind = f"a '{suffix}' file" if suffix else "a file without an ending"
+        raise FileError(name, f"not taken: {kind} is none that Kinertia reads; those are {', '.join(ENDINGS)}")
     return name
 
 

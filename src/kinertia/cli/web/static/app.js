@@ -46,9 +46,15 @@
       const chosen = files.filter((file) => !file.name.startsWith("."));
       if (!chosen.length) return this.problem("No files in it.");
       try {
-        const person = this.root.dataset.person || (await this.newPerson(folder || stem(chosen)));
+        const person = this.root.dataset.person || (await this.newPerson(folder || nameIn(chosen)));
         const address = `${this.root.dataset.root}/people/${encodeURIComponent(person)}`;
         const taken = await this.send(chosen, address);
+        if (!taken && !this.root.dataset.person) {
+          // nobody stays in the library of whom there is nothing
+          await this.post(`${address}/delete`);
+          this.status.textContent = "No file was taken.";
+          return undefined;
+        }
         if (taken) this.status.textContent = "Looking at the files";
         await this.post(`${address}/recognise`);
         // what was refused can be read before the page goes on
@@ -117,12 +123,22 @@
     return files.length ? (files[0].webkitRelativePath || "").split("/")[0] : "";
   }
 
-  function stem(files) {
-    const subject = files.length === 1 ? files[0].name : "";
-    return subject.replace(/\.[^.]*$/, "");
+  // a subject file's own name, else the words with which the names of all files begin
+  function nameIn(files) {
+    const stems = files.map((file) => file.name.replace(/\.[^.]*$/, ""));
+    const subjects = stems.filter((stem, k) => /\.toml$/i.test(files[k].name) && stem.toLowerCase() !== "subject");
+    if (stems.length === 1 || subjects.length === 1) return subjects[0] || stems[0];
+    const words = stems.map((stem) => stem.split(/[ _-]+/));
+    const differs = words[0].findIndex((word, k) => words.some((other) => other[k] !== word));
+    const common = words[0].slice(0, differs < 0 ? undefined : differs).join(" ");
+    return /^(static|cal|calibration|walk|gait|trial|markers?)?$/i.test(common) ? "" : common;
   }
 
-  // asks how far it is; when it is done the page is loaded again
+  // a page that answered a form has the address that shows it, so that loading it again sends no form
+  const address = document.querySelector("[data-address]")?.dataset.address;
+  if (address) history.replaceState(null, "", address + location.hash);
+
+  // asks how far it is; when it is done the page is asked for again
   class Working {
     constructor(root) {
       this.root = root;
@@ -132,9 +148,9 @@
     async ask() {
       try {
         const answer = await fetch(this.root.dataset.progress, { headers: { accept: "application/json" } });
-        if (answer.status === 404) return location.reload();
+        if (answer.status === 404) return this.again();
         const job = (await answer.json())[this.root.dataset.kind];
-        if (!job) return this.done();
+        if (!job) return this.again();
         this.show(job);
       } catch {
         this.root.querySelector("[data-left]").textContent = "Kinertia does not answer: is it still running?";
@@ -142,9 +158,10 @@
       return setTimeout(() => this.ask(), PAUSE_MS);
     }
 
-    done() {
-      if (this.root.dataset.kind === "fit") location.hash = "results";
-      location.reload();
+    // to another address, since loading the same one again could repeat a form
+    again() {
+      const place = this.root.dataset.kind === "fit" ? "#results" : location.hash;
+      location.replace(`${address}?again${place}`);
     }
 
     show(job) {
