@@ -199,6 +199,8 @@ def test_the_two_tables_agree_in_the_large(sex: str) -> None:
         ((float("inf"), 1.7, "male"), "mass_kg", "inf: give the body mass"),
         ((70.0, 170.0, "male"), "height_m", "centimetres"),
         ((70.0, 1700.0, "male"), "height_m", "millimetres"),
+        ((70.0, 5.9, "male"), "height_m", "feet"),
+        ((70.0, 71.0, "male"), "height_m", "inches"),
         ((70.0, 2.6, "male"), "height_m", "between 0.5 and 2.5"),
         ((70.0, 1.7, "M"), "sex", "'male' and 'female'"),
     ],

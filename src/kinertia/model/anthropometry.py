@@ -81,6 +81,10 @@ class _Part:
     length_m: float
 
 
+_UNITS_OF_HEIGHT = {"millimetres": 300.0, "centimetres": 100.0, "inches": 20.0, "feet": 3.0}
+"""Least height in each."""
+
+
 def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
     """Refuse a mass (kg), height (m) or sex ("male" or "female") that cannot be true.
 
@@ -91,8 +95,8 @@ def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
         hint = "that looks like grams; " if 1000.0 < mass_kg < np.inf else ""
         raise SubjectError("mass_kg", mass_kg, f"{hint}give the body mass in kilograms, between 10 and 300.")
     if not 0.5 <= height_m <= 2.5:
-        unit = "millimetres" if height_m > 300.0 else "centimetres"
-        hint = f"that looks like {unit}; " if height_m > 3.0 else ""
+        unit = next((name for name, least in _UNITS_OF_HEIGHT.items() if height_m > least), "")
+        hint = f"that looks like {unit}; " if unit else ""
         raise SubjectError("height_m", height_m, f"{hint}give the stature in metres, between 0.5 and 2.5.")
     if sex not in _DUMAS_STATURE_M:
         raise SubjectError("sex", sex, "the tables know 'male' and 'female'; give the one to use.")
