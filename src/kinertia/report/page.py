@@ -55,6 +55,9 @@ MOST_TRIALS = 6
 VIEW_FRAMES = 300
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
 
+_SUMMARY_LINES, _LINE_LETTERS = 8, 110
+"""Of warnings in the printed summary, whose first page has no room for more, and letters in one of them."""
+
 
 def render(
     fit: Fit,
@@ -81,6 +84,7 @@ def render(
         words=words(fit),
         start=start_of(fit),
         expected=expected_of(fit),
+        in_summary=warnings_in_summary(fit.warnings),
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         asymmetry=asymmetry_sentences(fit),
@@ -114,6 +118,12 @@ def render(
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
+
+
+def warnings_in_summary(warnings: Sequence[str]) -> int:
+    """How many the printed summary has room for, from the first on; at least one."""
+    lines = np.cumsum([-(-len(warning) // _LINE_LETTERS) for warning in warnings])
+    return max(int(np.searchsorted(lines, _SUMMARY_LINES, side="right")), 1)
 
 
 def _written(figure: Figure | None) -> dict[str, Any] | None:
