@@ -17,6 +17,7 @@ from kinertia.report.cycle_table import stride_rows
 from kinertia.report.files import save_fit
 from kinertia.report.page import render
 from kinertia.report.saved_fit import load_fit
+from kinertia.report.time_figures import moment_figure
 from report_page import Elements
 
 
@@ -133,7 +134,11 @@ def test_titles_tell_unit_and_sign(fit):
     figures = cycle_figures(fit)
     titles = {kind: [note["text"] for note in figure.layout["annotations"]] for kind, figure in figures.items()}
     assert "<b>Knee moment, flexion + (N m/kg)</b>" in titles["moment"]
-    assert "<b>Hip power, flexion + (W/kg)</b>" in titles["power"]
+    over_time = moment_figure(fit.trials[0], fit.skeleton, fit.mass_kg).layout["annotations"]
+    assert [note["text"] for note in over_time] == titles["moment"]
+    assert titles["power"][0] == "<b>Hip flexion power, generation + (W/kg)</b>"
+    assert "<b>Knee power, generation + (W/kg)</b>" in titles["power"]
+    assert len(set(titles["power"])) == len(titles["power"])
     assert "<b>Knee flexion + (deg)</b>" in titles["angle"]
     assert titles["force"][1] == "<b>Upward + (% body weight)</b>"
 

@@ -20,7 +20,7 @@ from kinertia.io.norms_file import Norm
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
-from kinertia.report.coordinate_titles import load_title, panels_of
+from kinertia.report.coordinate_titles import load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.wording import INTERVAL_SD, start_of
@@ -95,7 +95,8 @@ class _Drawn:
         if kind == "power":  # of arms and trunk next to nothing
             legs = _leg_coordinates(self.fit.skeleton)
             coordinates = [one for one in coordinates if legs & set(one.columns.values())]
-        return [(f"{one.name}_{kind}", load_title(one, kind)) for one in coordinates]
+            return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
+        return [(f"{one.name}_moment", load_title(one, "moment")) for one in coordinates]
 
     def _traces(self, quantity: str) -> Iterator[dict[str, Any]]:
         values = start_of(self.fit).values
