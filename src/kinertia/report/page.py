@@ -29,7 +29,7 @@ from kinertia.report.bsp_figures import (
     information_figure,
     segment_name,
 )
-from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures
+from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures, has_spread
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
@@ -48,6 +48,7 @@ from kinertia.report.time_figures import (
 from kinertia.report.truth import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.data import runs
+from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
@@ -90,6 +91,7 @@ def render(
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms),
+        walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
             "mass": _written(body_figure(fit)),
             "information": _written(body_figure(fit, "information")),
@@ -140,6 +142,7 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
         "norms": bool(norms),
+        "spread": has_spread(figures["moment"]),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
         **{kind: written(figure) for kind, figure in figures.items()},
