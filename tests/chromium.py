@@ -28,9 +28,8 @@ class Opened:
     def __init__(self, browser, path, viewport=None, scheme="light"):
         self.page = browser.new_page(viewport=viewport or DESKTOP, color_scheme=scheme)
         self.errors, self.requests = [], []
-        self.page.on(
-            "console", lambda message: message.type in ("error", "warning") and self.errors.append(message.text)
-        )
+        # whatever is said: plotly.js warns in messages of type "trace"
+        self.page.on("console", lambda message: self.errors.append(message.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())

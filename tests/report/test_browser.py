@@ -11,6 +11,7 @@ import pytest
 from chromium import DESKTOP, PHONE, Opened, colour, ink, playwright
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import render_comparison
+from kinertia.report.page import render
 
 SWITCHED = """plot => {
     const panel = plot.closest(".panel");
@@ -220,13 +221,37 @@ def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
     ]
     assert len(headings) == 2
     assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in headings)
-    assert pages(page) == 2
+    assert pages(page, prefer_css_page_size=True) == 2
     assert page.locator("body.summary").count() == 0, "once it is printed, everything is there again"
-    assert pages(page) > 8
+    assert pages(page, prefer_css_page_size=True) > 8
 
 
-def pages(page):
-    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
+def pages(page, **paper):
+    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(**paper)))
+
+
+@pytest.mark.parametrize("count", [1, 3, 12])
+def test_the_summary_is_two_pages_whatever_was_warned_of(browser, fit, tmp_path, count):
+    """On A4 and on Letter; what has no room is counted, and is in the whole report."""
+    path = tmp_path / "report.html"
+    warned = tuple(f"warning {k}: " + "a sentence of some length, " * (4 + 5 * (k % 2)) for k in range(count))
+    path.write_text(render(replace(fit, warnings=warned)), encoding="utf-8")
+    page = Opened(browser, path).page
+    page.evaluate("window.print = () => {}")
+    for paper in ({"prefer_css_page_size": True}, {"format": "Letter"}):
+        page.locator("details.print").evaluate("part => (part.open = true)")
+        page.get_by_role("button", name="Summary, two pages").click()
+        page.emulate_media(media="print")
+        listed = page.locator("#verdict li:visible").filter(has_text=re.compile("warning|more in")).all_inner_texts()
+        wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+        page.emulate_media(media="null")
+        assert pages(page, **paper) == 2
+        assert wide <= 0
+        hidden = count - sum(one.startswith("warning") for one in listed)
+        assert 0 <= hidden < count
+        assert listed[-1].startswith(f"and {hidden} more" if hidden else "warning")
+    assert page.locator("#verdict li:visible").filter(has_text=re.compile(r"^warning \d")).count() == count
+    page.close()
 
 
 @pytest.mark.parametrize("form", ["svg", "png", "csv"])

@@ -1,5 +1,6 @@
 """Curves over the gait cycle: the table, its file, and the figures that are drawn from the same numbers."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from kinertia.report.cycle_table import stride_rows
 from kinertia.report.files import save_fit
 from kinertia.report.page import render
 from kinertia.report.saved_fit import load_fit
+from kinertia.report.time_figures import moment_figure
 from report_page import Elements
 
 
@@ -104,7 +106,9 @@ def test_files_say_what_the_functions_say(fit, cycles, tmp_path):
     folder = save_fit(fit, tmp_path / "out")
     names = {"cycles.csv": cycles, "cycles_literature.csv": fit.cycles("literature")}
     for name, expected in {**names, "spatiotemporal.csv": fit.spatiotemporal}.items():
-        pd.testing.assert_frame_equal(pd.read_csv(folder / name), expected, check_dtype=False, rtol=1e-15, atol=0)
+        cells = (folder / name).read_text(encoding="utf-8").replace("\n", ",").split(",")
+        assert not [cell for cell in cells if re.fullmatch(r"-?[\d.]{14,}", cell)], "six digits are enough"
+        pd.testing.assert_frame_equal(pd.read_csv(folder / name), expected, check_dtype=False, rtol=5e-6, atol=0)
 
 
 def lines_of(figure, panel, ending):
@@ -129,11 +133,40 @@ def test_figures_draw_the_mean_of_the_strides(fit, cycles):
     assert set(usual) == {"right", "left"}
 
 
+def test_dotted_curves_are_called_what_they_are(fit):
+    for kind, figure in cycle_figures(fit).items():
+        (dotted,) = {t["name"].split(", ")[1] for t in figure.data if t.get("line", {}).get("dash") == "dot"}
+        assert dotted == ("usual pipeline" if kind in ("angle", "force") else "literature values")
+        assert dotted in figure.alt
+
+
+@pytest.mark.parametrize("overlap", [True, False])
+def test_bands_between_strides_are_promised_where_there_are_some(fit, overlap):
+    """Of a second stride of each side, of which the same part of the cycle is measured, or the other one."""
+    (trial,) = fit.trials
+    strides = [next(one for one in trial.strides if one.side == side) for side in "rl"]
+    duration = np.ptp(trial.time)
+    later = [replace(one, number=2, start_s=one.start_s + (0 if overlap else duration)) for one in strides]
+    later = [replace(one, end_s=one.end_s + (0 if overlap else 2 * duration)) for one in later]
+    walk = replace(trial)
+    walk.__dict__["strides"] = (*strides, *later)
+    walked = replace(fit, trials=(walk,))
+    names = {trace["name"] for trace in cycle_figure(walked, "moment").data}
+    assert ("right, mean ± SD" in names) == ("right, mean" in names) == overlap
+    text = Elements(render(walked)).text
+    assert ("with a band of ± 1 SD" in text) == overlap
+    assert ("no bands of ± 1 SD" in text) != overlap
+
+
 def test_titles_tell_unit_and_sign(fit):
     figures = cycle_figures(fit)
     titles = {kind: [note["text"] for note in figure.layout["annotations"]] for kind, figure in figures.items()}
     assert "<b>Knee moment, flexion + (N m/kg)</b>" in titles["moment"]
-    assert "<b>Hip power, flexion + (W/kg)</b>" in titles["power"]
+    over_time = moment_figure(fit.trials[0], fit.skeleton, fit.mass_kg).layout["annotations"]
+    assert [note["text"] for note in over_time] == titles["moment"]
+    assert titles["power"][0] == "<b>Hip flexion power, generation + (W/kg)</b>"
+    assert "<b>Knee power, generation + (W/kg)</b>" in titles["power"]
+    assert len(set(titles["power"])) == len(titles["power"])
     assert "<b>Knee flexion + (deg)</b>" in titles["angle"]
     assert titles["force"][1] == "<b>Upward + (% body weight)</b>"
 
@@ -157,6 +190,8 @@ def test_a_motion_without_strides_stays_over_time(fit):
     assert still.cycles().empty
     page = render(still)
     assert 'id="cycle"' not in page
+    assert "No trial shows a whole stride" in page
+    assert "No trial shows a whole stride" not in render(fit)
     assert page.count('<details class="seconds" open>') == page.count('<details class="seconds"') >= 1
     walking = Elements(render(fit))
     assert "cycle-moment" in str(walking.__dict__)

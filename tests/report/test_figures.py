@@ -19,6 +19,7 @@ from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.plots import as_plotly
+from kinertia.report.style import BLUE, between
 from kinertia.report.time_figures import (
     coordinate_figure,
     moment_figure,
@@ -220,9 +221,9 @@ def test_information_map_is_in_percent(fit, two_level):
     expected = 100 * np.clip(fit.posterior.information, 0, 1)
     shown = np.full(expected.shape, np.nan)
     for row, left, colour, text in zip(tiles.y, tiles.base, tiles.marker.color, tiles.text, strict=True):
-        shown[row, round(left + 0.5)] = colour
-        assert text == f"{colour:.0f}"
-    np.testing.assert_allclose(shown, expected, rtol=1e-5)
+        shown[row, round(left + 0.5)] = float(text)
+        assert colour == between("#FFFFFF", BLUE, expected[row, round(left + 0.5)] / 100)
+    np.testing.assert_allclose(shown, expected, atol=0.5)
     assert information_figure(two_level) is None
     assert departure_figure(two_level) is None
     assert not any(trace.error_x.array is not None for trace in as_plotly(change_figure(two_level)).data)

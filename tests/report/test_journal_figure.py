@@ -84,6 +84,11 @@ def test_without_strides_moments_are_over_time(fit, tmp_path):
     drawn = drawing(FIGURES["moments"](still))
     assert drawn.axes[0].get_xlabel() == "time (s)"
     assert any(isinstance(one, FillBetweenPolyCollection) for one in drawn.axes[0].collections), "95 % bands"
+    for name in ("moments", "angles"):
+        (legend,) = drawing(FIGURES[name](still)).legends
+        assert legend.get_title().get_text() == f"Trial {standing.name}"
+    (legend,) = drawing(FIGURES["moments"](fit)).legends
+    assert not legend.get_title().get_text()
     with pytest.raises(KinertiaError, match="no trial of this fit has a stride"):
         still.figure("powers", tmp_path / "powers.svg")
 

@@ -203,11 +203,9 @@ def information_figure(fit: Fit) -> Figure | None:
         "x": [1] * len(values),
         "y": rows.tolist(),
         "width": 1,
+        # colours in place of numbers on a scale: of each number plotly.js warns where it chooses the letters
         "marker": {
-            "color": compact(values),
-            "cmin": 0,
-            "cmax": 100,
-            "colorscale": [[0, "#FFFFFF"], [1, style.BLUE]],
+            "color": [style.between("#FFFFFF", style.BLUE, value / 100) for value in values],
             "line": {"color": "#FFFFFF", "width": 2},
         },
         "text": [f"{value:.0f}" for value in values],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinertia.model.sides import by_side
@@ -63,7 +64,7 @@ def title_of(skeleton: Skeleton, column: int) -> str:
 
 
 def load_title(one: Coordinate, what: str) -> str:
-    """Moment or power of a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +".
+    """The moment about a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +".
 
     Words that a figure of three panels beside one another has no room for are left out: "Trunk bending, to the right +"
     is "Trunk moment, bending right +".
@@ -72,3 +73,16 @@ def load_title(one: Coordinate, what: str) -> str:
         return f"{one.title} {what}"
     joint, _, direction = one.title.partition(" ")
     return f"{joint} {what}, {direction.replace(', to the', '').replace(',', '')}"
+
+
+def power_title(one: Coordinate, others: Sequence[Coordinate]) -> str:
+    """The power of a coordinate, whose sign is not a direction's: "Knee power, generation +".
+
+    Of a joint that has several among `others` it says which: "Hip flexion power, generation +".
+    """
+    name = one.title
+    if name.endswith(" +"):
+        joint = name.partition(" ")[0]
+        alone = sum(other.title.partition(" ")[0] == joint for other in others) == 1
+        name = joint if alone else name.removesuffix(" +").split(",")[0].replace(" internal", "")
+    return f"{name} power, generation +"

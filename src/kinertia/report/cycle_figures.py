@@ -20,10 +20,10 @@ from kinertia.io.norms_file import Norm
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
-from kinertia.report.coordinate_titles import load_title, panels_of
+from kinertia.report.coordinate_titles import load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, small_multiples
-from kinertia.report.wording import INTERVAL_SD, start_of
+from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
 from kinertia.trial.data import FEET, runs
 
 MOST_STRIDES = 100
@@ -77,7 +77,7 @@ class _Drawn:
 
     def figure(self, kind: Kind) -> Figure:
         panels = [
-            Panel(f"{title} ({UNITS[kind]})", [*self._traces(quantity)], self._toe_offs())
+            Panel(f"{title} ({UNITS[kind]})", [*self._traces(quantity, self._usual_name(kind))], self._toe_offs())
             for quantity, title in self._quantities(kind)
             if any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
         ]
@@ -95,10 +95,14 @@ class _Drawn:
         if kind == "power":  # of arms and trunk next to nothing
             legs = _leg_coordinates(self.fit.skeleton)
             coordinates = [one for one in coordinates if legs & set(one.columns.values())]
-        return [(f"{one.name}_{kind}", load_title(one, kind)) for one in coordinates]
+            return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
+        return [(f"{one.name}_moment", load_title(one, "moment")) for one in coordinates]
 
-    def _traces(self, quantity: str) -> Iterator[dict[str, Any]]:
-        values = start_of(self.fit).values
+    def _usual_name(self, kind: Kind) -> str:
+        """Of the dotted curves: body segment parameters are in moments and powers alone."""
+        return USUAL if kind in ("angle", "force") else start_of(self.fit).values
+
+    def _traces(self, quantity: str, usual_name: str) -> Iterator[dict[str, Any]]:
         if norm := self.norms.get(quantity):
             outline = _outline(norm.percent, norm.mean - norm.sd, norm.mean + norm.sd, style.faded(style.GREY, 0.3))
             yield {**outline, "name": "norm, mean ± SD"}
@@ -109,7 +113,7 @@ class _Drawn:
                 yield from _estimate(curves, word, colour)
             if usual:
                 line = {"color": colour, "dash": "dot", "width": 1.6}
-                yield {**mean_line(mean_curve(usual)), "name": f"{word}, {values}", "line": line}
+                yield {**mean_line(mean_curve(usual)), "name": f"{word}, {usual_name}", "line": line}
 
     def _toe_offs(self) -> list[dict[str, Any]]:
         """A vertical line per side at its mean toe off."""
@@ -131,11 +135,16 @@ class _Drawn:
             "force": "Ground reactions",
         }
         counts = [sum(stride.side == side for trial in self.fit.trials for stride in trial.strides) for side in FEET]
-        unit, start = UNITS[kind], start_of(self.fit)
         return (
-            f"{names[kind]} ({unit}) over the gait cycle, estimate against {start.values}; strides: {counts[0]} right, "
-            f"{counts[1]} left."
+            f"{names[kind]} ({UNITS[kind]}) over the gait cycle, estimate against {self._usual_name(kind)}; strides: "
+            f"{counts[0]} right, {counts[1]} left."
         )
+
+
+def has_spread(figure: Figure) -> bool:
+    """Whether strides overlap anywhere, so that there are means and deviations."""
+    ends = tuple(f"{style.SIDES[side][0]}, mean" for side in FEET)
+    return any(trace["name"].startswith(ends) for trace in figure.data)
 
 
 def _leg_coordinates(skeleton: Skeleton) -> set[int]:
@@ -154,12 +163,12 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
         half = INTERVAL_SD * _over_strides(np.nanmean, np.array(sds))
         name = f"{word}, 95 % of the estimate"
         yield {**_band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
-    if len(curves) > 1:
+    if spread is not None:
         shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
         line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
         yield {**_strides(shown), "name": f"{word}, strides", "line": line}
-    name = f"{word}, mean" if len(curves) > 1 else f"{word}, one stride"
-    yield {**mean_line(mean), "name": name, "line": {"color": colour, "width": 2.2}}
+    name = "one stride" if len(curves) < 2 else "strides joined" if spread is None else "mean"
+    yield {**mean_line(mean), "name": f"{word}, {name}", "line": {"color": colour, "width": 2.2}}
 
 
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:

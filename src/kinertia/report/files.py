@@ -67,10 +67,19 @@ def _write_cycles(fit: Fit, folder: Path) -> None:
     """The tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
     if not any(trial.strides for trial in fit.trials):
         return
-    write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials))
+    write_columns(folder / "spatiotemporal.csv", _rounded(spatiotemporal_columns(fit.trials)))
     names: dict[Stage, str] = {"estimate": "cycles.csv", "literature": "cycles_literature.csv"}
     for stage, name in names.items():
-        write_columns(folder / name, cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES))
+        write_columns(folder / name, _rounded(cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES)))
+
+
+def _rounded(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> dict[str, list[Any]]:
+    """Numbers with six significant digits."""
+    cells = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in columns.items()}
+    return {
+        name: [float(f"{cell:.6g}") if isinstance(cell, float) else cell for cell in each]
+        for name, each in cells.items()
+    }
 
 
 def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray]) -> None:

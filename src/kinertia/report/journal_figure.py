@@ -9,17 +9,19 @@ import html
 import re
 import textwrap
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import change_figure
 from kinertia.report.cycle_figures import cycle_figure
 from kinertia.report.extras import expect_matplotlib
 from kinertia.report.figure import Figure
+from kinertia.report.panels import plain
 from kinertia.report.time_figures import coordinate_figure, moment_figure
 from kinertia.report.wording import start_of
 from kinertia.trial.data import runs
@@ -55,12 +57,25 @@ _STYLE: Any = {
 
 
 def _moments(fit: Fit) -> Figure:
-    return cycle_figure(fit, "moment") or moment_figure(fit.trials[0], fit.skeleton, fit.mass_kg, start=start_of(fit))
+    first = fit.trials[0]
+    return cycle_figure(fit, "moment") or _of_trial(
+        first, moment_figure(first, fit.skeleton, fit.mass_kg, start=start_of(fit))
+    )
+
+
+def _angles(fit: Fit) -> Figure:
+    first = fit.trials[0]
+    return cycle_figure(fit, "angle") or _of_trial(first, coordinate_figure(first, fit.skeleton))
+
+
+def _of_trial(trial: TrialFit, figure: Figure) -> Figure:
+    """The figure, which says above its legend which trial it is of."""
+    return replace(figure, layout={**figure.layout, "meta": {**figure.layout["meta"], "trial": plain(trial.name)}})
 
 
 FIGURES: Mapping[str, Callable[[Fit], Figure | None]] = {
     "moments": _moments,
-    "angles": lambda fit: cycle_figure(fit, "angle") or coordinate_figure(fit.trials[0], fit.skeleton),
+    "angles": _angles,
     "powers": lambda fit: cycle_figure(fit, "power"),
     "forces": lambda fit: cycle_figure(fit, "force"),
     "bsp": change_figure,
@@ -98,6 +113,7 @@ def save_figure(fit: Fit, name: str, path: str | Path) -> Path:
 def drawing(figure: Figure) -> Drawing:
     """Small multiples as matplotlib draws them: a panel per pair of axes, in rows of three."""
     from matplotlib.figure import Figure as Drawing
+    from matplotlib.font_manager import FontProperties
 
     suffixes = [name.removeprefix("xaxis") for name in figure.layout if name.startswith("xaxis")]
     rows = -(-len(suffixes) // _COLUMNS)
@@ -118,7 +134,10 @@ def drawing(figure: Figure) -> Drawing:
         _mark(panels[shape["xref"][1:]], shape)
     for suffix, panel in panels.items():
         _finish(panel, figure.layout[f"xaxis{suffix}"], figure.layout[f"yaxis{suffix}"])
-    drawn.legend(*_legend(list(panels.values())), loc="outside upper left", ncols=4, frameon=False)
+    legend = drawn.legend(*_legend(list(panels.values())), loc="outside upper left", ncols=4, frameon=False)
+    if trial := figure.layout["meta"].get("trial"):
+        legend.set_title(f"Trial {_text(trial)}", prop=FontProperties(weight="bold"))
+        legend.set_alignment("left")
     return drawn
 
 

@@ -29,7 +29,7 @@ from kinertia.report.bsp_figures import (
     information_figure,
     segment_name,
 )
-from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures
+from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures, has_spread
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.headline import held_sentence, hidden_combinations, words
@@ -48,12 +48,16 @@ from kinertia.report.time_figures import (
 from kinertia.report.truth import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.data import runs
+from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms_length
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
 VIEW_FRAMES = 300
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
+
+_SUMMARY_LINES, _LINE_LETTERS = 8, 110
+"""Of warnings in the printed summary, whose first page has no room for more, and letters in one of them."""
 
 
 def render(
@@ -81,11 +85,13 @@ def render(
         words=words(fit),
         start=start_of(fit),
         expected=expected_of(fit),
+        in_summary=warnings_in_summary(fit.warnings),
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms),
+        walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
             "mass": _written(body_figure(fit)),
             "information": _written(body_figure(fit, "information")),
@@ -116,6 +122,12 @@ def render(
     )
 
 
+def warnings_in_summary(warnings: Sequence[str]) -> int:
+    """How many the printed summary has room for, from the first on; at least one."""
+    lines = np.cumsum([-(-len(warning) // _LINE_LETTERS) for warning in warnings])
+    return max(int(np.searchsorted(lines, _SUMMARY_LINES, side="right")), 1)
+
+
 def _written(figure: Figure | None) -> dict[str, Any] | None:
     return None if figure is None else written(figure)
 
@@ -130,6 +142,7 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
         "norms": bool(norms),
+        "spread": has_spread(figures["moment"]),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
         **{kind: written(figure) for kind, figure in figures.items()},

@@ -15,7 +15,7 @@ from kinertia.estimation.result import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
-from kinertia.report.coordinate_titles import Coordinate, panels_of
+from kinertia.report.coordinate_titles import Coordinate, load_title, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
@@ -137,8 +137,7 @@ def moment_figure(
             traces += [
                 {**curve, "name": "truth"} for curve in _sides(one, "truth", trial.time, truth / mass_kg, thin, dashed)
             ]
-        unit = "N m/kg" if one.rotational else "N/kg"
-        title = f"{one.title.split(',')[0].removesuffix(' +')} moment ({unit})"
+        title = f"{load_title(one, 'moment')} (N m/kg)" if one.rotational else f"{load_title(one, 'force')} (N/kg)"
         panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))
     peak = np.abs(trial.joint_loads["estimate"][:, 6:]).max() / mass_kg
     alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."

@@ -11,6 +11,8 @@ from kinertia.model.bsp import PARAMETERS, UNITS
 
 INTERVAL_SD = 1.96
 """Half of a 95 % interval, in standard deviations."""
+USUAL = "usual pipeline"
+"""Inverse kinematics, filtered, and forces as measured."""
 _READ_IN = {"m": ("mm", 1e3)}
 _DECIMALS = {"kg": 2, "m": 1}
 _INERTIA_DECIMALS = (4, 6)
