@@ -4,8 +4,8 @@ The vertical moment that the ground reactions have about the body must be what i
 The measured motion with the literature's body says that to some N m, noise of a size that a sign does not know. Free
 moments with the wrong sign are off by twice themselves: turned, they leave less. Of 14 trials from six laboratories,
 among them runs, those with sound signs leave 1.1 to 2 times as much once they are turned; spoilt ones, and all those of
-one public data set, walks and squats alike, 0.5 to 0.75 times. A run at 4 m/s leaves 0.8 times as much with one model and
-1.1 times with another: there the motion is too noisy to say.
+one public data set, walks and squats alike, 0.5 to 0.75 times. A run at 4 m/s leaves 0.8 times as much with one model
+and 1.1 times with another: there the motion is too noisy to say.
 """
 
 from __future__ import annotations
