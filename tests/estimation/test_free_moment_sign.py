@@ -5,47 +5,52 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.free_moment_sign import free_moment_sign_warnings, left_moments_nm
+from kinertia.estimation.free_moment_sign import VERTICAL, free_moment_sign_warnings, left_moments_nm
+from kinertia.motion.dynamics import residual
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 
 
-def turned(kinematics, factor=-1.0):
-    """With these free moments: the sign turned, or none."""
-    loads = kinematics.trial.loads
+def turned(fit, factor=-1.0):
+    """The first trial with these free moments: the sign turned, or none."""
+    trial = fit.trials[0]
+    kinematics, loads = trial.kinematics, trial.kinematics.trial.loads
     moment = loads.moment.copy()
     for foot in range(2):
         carried = np.cross(held_centre_of_pressure(loads.wrench[:, foot]), loads.force[:, foot])
         free = loads.moment[:, foot, 1] - carried[:, 1]
         moment[:, foot, 1] += (factor - 1.0) * np.where(loads.force[:, foot, 1] > 20.0, free, 0.0)
-    return replace(kinematics, trial=replace(kinematics.trial, loads=replace(loads, moment=moment)))
+    kinematics = replace(kinematics, trial=replace(kinematics.trial, loads=replace(loads, moment=moment)))
+    left = residual(fit.skeleton, fit.literature, kinematics.motion, kinematics.foot_loads.sum(axis=1))
+    return replace(trial, kinematics=kinematics, residuals={**trial.residuals, "literature": left})
+
+
+def left_by(trial):
+    return left_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
 
 
 @pytest.fixture(params=["demo", "measured"])
-def walk(request, fit):
-    """Skeleton, literature and kinematics of the package's walks."""
-    of = fit if request.param == "demo" else request.getfixturevalue("measured_demo").fit
-    return of.skeleton, of.literature, of.trials[0].kinematics
+def of_walk(request, fit):
+    """The fits of the package's walks."""
+    return fit if request.param == "demo" else request.getfixturevalue("measured_demo").fit
 
 
-def test_a_sound_sign_is_not_doubted(walk):
-    *body, kinematics = walk
-    as_is, otherwise = left_moments_nm(*body, kinematics)
+def test_a_sound_sign_is_not_doubted(of_walk):
+    as_is, otherwise = left_by(of_walk.trials[0])
     assert otherwise > 1.1 * as_is
-    assert not list(free_moment_sign_warnings(*body, [kinematics]))
+    assert not list(free_moment_sign_warnings(of_walk.trials))
 
 
-def test_a_wrong_sign_is_named(walk):
-    *body, kinematics = walk
-    (sentence,) = free_moment_sign_warnings(*body, [turned(kinematics)])
-    assert sentence.startswith(f"{kinematics.trial.name}: the plates' free moments")
+def test_a_wrong_sign_is_named(of_walk):
+    trial = turned(of_walk)
+    (sentence,) = free_moment_sign_warnings([trial])
+    assert sentence.startswith(f"{trial.name}: the plates' free moments")
     assert "seem to have the wrong sign" in sentence
-    as_is, otherwise = left_moments_nm(*body, turned(kinematics))
+    as_is, otherwise = left_by(trial)
     # not the same to the letter: below FIRM_LOAD_N free moments do not count
-    assert otherwise == pytest.approx(left_moments_nm(*body, kinematics)[0], rel=0.2)
+    assert otherwise == pytest.approx(left_by(of_walk.trials[0])[0], rel=0.2)
     assert as_is > otherwise
 
 
-def test_without_free_moments_there_is_no_sign(walk):
-    *body, kinematics = walk
-    as_is, otherwise = left_moments_nm(*body, turned(kinematics, 0.0))
+def test_without_free_moments_there_is_no_sign(of_walk):
+    as_is, otherwise = left_by(turned(of_walk, 0.0))
     assert as_is == otherwise

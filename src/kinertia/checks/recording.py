@@ -9,7 +9,7 @@ import numpy as np
 
 from kinertia.checks.marker_set_match import MarkerSetMatch, judged_labels, match_labels
 from kinertia.checks.plates import ForceMass, PlateCheck, check_plates, mass_by_strides
-from kinertia.checks.verdict import Verdict
+from kinertia.checks.verdict import Verdict, first_few
 from kinertia.errors import KinertiaError, MarkerSetError, TrialError
 from kinertia.estimation.doubts import Doubt, motion_doubts, static_doubts, trial_doubts
 from kinertia.estimation.force_mass import CONTRADICTING_MASS, UNMEASURED_HINT, unit_hint
@@ -174,7 +174,9 @@ def _never(seen: Sequence[Visibility]) -> list[Verdict]:
     never = [one.label for one in seen if one.share == 0.0]
     if not never:
         return []
-    return [Verdict("caution", f"visible in no frame, left out: {_some(never)}; label them if they were worn")]
+    return [
+        Verdict("caution", f"visible in no frame, left out: {first_few(never, _LISTED)}; label them if they were worn")
+    ]
 
 
 def _gaps(markers: Markers) -> list[Verdict]:
@@ -189,16 +191,12 @@ def _gaps(markers: Markers) -> list[Verdict]:
     where = f"from {markers.time[0]:.3f} to {markers.time[-1]:.3f} s"
     verdicts = []
     if rare:
-        verdicts.append(Verdict("caution", f"seen in less than half of the frames {where}: {_some(rare)}"))
+        verdicts.append(Verdict("caution", f"seen in less than half of the frames {where}: {first_few(rare, _LISTED)}"))
     if long:
-        verdicts.append(Verdict("caution", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {_some(long)}"))
+        verdicts.append(
+            Verdict("caution", f"gaps longer than {LONGEST_BRIDGE_S:g} s {where}: {first_few(long, _LISTED)}")
+        )
     return verdicts or [Verdict("pass", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
-
-
-def _some(names: Sequence[str]) -> str:
-    """The first few of a list, and how many more there are."""
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | None, list[Verdict]]:

@@ -98,13 +98,17 @@ def _physics(fit: Fit) -> Verdict:
     if not estimated and not kept:
         return Verdict("pass", "every segment is physically possible")
     if not estimated:
-        return Verdict("caution", f"physically impossible in the model, and kept as they are: {_some(kept)}")
+        return Verdict(
+            "caution", f"physically impossible in the model, and kept as they are: {first_few(kept, _NAMED)}"
+        )
     count = f"{len(estimated)} of {len(fit.estimate.segments)}"
-    return Verdict("fail", f"physically impossible segments: {count} ({_some(estimated)})")
+    return Verdict("fail", f"physically impossible segments: {count} ({first_few(estimated, _NAMED)})")
 
 
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if names[_NAMED:] else "")
+def first_few(names: Sequence[str], most: int) -> str:
+    """The first of a list, and how many more there are."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def _literature(fit: Fit) -> Verdict:

@@ -114,7 +114,7 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
-    signs = list(free_moment_sign_warnings(ready.skeleton, ready.literature, ready.kinematics))
+    signs = list(free_moment_sign_warnings(outcome.trials))
     warnings = (
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),

@@ -14,47 +14,40 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import residual
-from kinertia.motion.kinematics import Kinematics
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
+from kinertia.estimation.result import TrialFit
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
 
 _LESS = 0.8
 """Share of what is left as measured, below which what is left with the sign turned speaks against the sign."""
 _LARGE = 0.5
 """Share of what is left, below which twice the free moments are too small to be judged."""
-_VERTICAL = 4
+VERTICAL = 4
 """Moment about the upward axis, among force and moment."""
 
 
-def free_moment_sign_warnings(
-    skeleton: Skeleton, literature: BodySegmentParameters, trials: Iterable[Kinematics]
-) -> Iterator[str]:
+def free_moment_sign_warnings(trials: Iterable[TrialFit]) -> Iterator[str]:
     """A sentence for each trial whose free moments go with the motion once their sign is turned."""
-    for kinematics in trials:
-        as_is, turned = left_moments_nm(skeleton, literature, kinematics)
+    for trial in trials:
+        as_is, turned = left_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
         if turned < _LESS * as_is:
             yield (
-                f"{kinematics.trial.name}: the plates' free moments (about the vertical, under each foot) seem to have "
-                f"the wrong sign: with it turned, {turned:.1f} N m (RMS) are left between forces and motion in place "
-                f"of {as_is:.1f}; check the sign of the vertical moment (Mz of a C3D file, the torque about the upward "
+                f"{trial.name}: the plates' free moments (about the vertical, under each foot) seem to have the wrong "
+                f"sign: with it turned, {turned:.1f} N m (RMS) are left between forces and motion in place of "
+                f"{as_is:.1f}; check the sign of the vertical moment (Mz of a C3D file, the torque about the upward "
                 f"axis of a force file), and export the forces again"
             )
 
 
-def left_moments_nm(
-    skeleton: Skeleton, literature: BodySegmentParameters, kinematics: Kinematics
-) -> tuple[float, float]:
-    """What forces and motion leave of the vertical moment, RMS about its mean, N m: as measured, and with the free
+def left_moments_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
+    """RMS about its mean of what forces and motion leave of the vertical moment, N m: as measured, and with the free
     moments' sign turned. Both alike where the free moments are too small to tell.
+
+    Args:
+        left: (w,) N m, as measured.
+        foot_loads: (w, 2, 6) on both feet.
     """
-    loads = kinematics.foot_loads
-    left = residual(skeleton, literature, kinematics.motion, loads.sum(axis=1))[:, _VERTICAL]
-    firm = loads[..., 1] >= FIRM_LOAD_N
-    points = centre_of_pressure(np.where(firm[..., None], loads, 0.0))
-    about_points = loads[..., 3:] - np.cross(points, loads[..., :3])
-    free = np.where(firm, about_points[..., 1], 0.0).sum(axis=1)
+    firm = foot_loads[..., 1] >= FIRM_LOAD_N
+    free = free_moment(np.where(firm[..., None], foot_loads, 0.0)).sum(axis=1)
     as_is = float(np.std(left))
     if 2.0 * np.std(free) < _LARGE * as_is:
         return as_is, as_is

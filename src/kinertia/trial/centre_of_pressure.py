@@ -21,6 +21,12 @@ def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
     return np.stack([x, np.full_like(x, height_m), z], axis=-1)
 
 
+def free_moment(wrench: np.ndarray) -> np.ndarray:
+    """(...) N m about the vertical through the centre of pressure of a wrench (..., 6)."""
+    result: np.ndarray = (wrench[..., 3:] - np.cross(centre_of_pressure(wrench), wrench[..., :3]))[..., 1]
+    return result
+
+
 def held_centre_of_pressure(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray:
     """(k, 3) m over k samples of one foot's load (k, 6); where it is below `least_n`, that of the nearest sample that
     is not. The origin for a foot that is never loaded.

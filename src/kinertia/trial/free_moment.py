@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.centre_of_pressure import free_moment
 from kinertia.trial.data import FloatArray, FootLoads
 from kinertia.trial.strides import periods
 
@@ -89,8 +89,7 @@ def mean_turning(loads: FootLoads, time: FloatArray, centre: FloatArray) -> Turn
         return None
     body = np.stack([np.interp(loads.time[inside], time, centre[:, axis]) for axis in range(3)], axis=1)
     # the height of the floor cancels
-    pressure = centre_of_pressure(loads.wrench[inside])
-    free = np.where(loaded, _vertical_moment(force, moment, pressure), 0.0).mean(axis=0)
+    free = np.where(loaded, free_moment(loads.wrench[inside]), 0.0).mean(axis=0)
     return Turning(
         float(_vertical_moment(force, moment, body[:, None]).sum(axis=1).mean()),
         (float(free[0]), float(free[1])),

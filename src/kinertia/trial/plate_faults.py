@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads, runs
 
 _LONGEST_ARM_M = 0.15
@@ -39,7 +39,7 @@ def loads_trouble(plates: PlateLoads) -> str:
     if trouble := _lost_samples(plates) or _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
         return trouble
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
-    arms = np.abs(_free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
+    arms = np.abs(free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
     arms /= plates.force[..., 1][plates.force[..., 1] > FIRM_LOAD_N]
     typical = float(np.median(arms)) if arms.size else 0.0
     if typical > _LONGEST_ARM_M:
@@ -174,9 +174,3 @@ def _hardly_loaded(plates: PlateLoads) -> str:
         f"the largest vertical force is {peak:.2g}: the forces are in kN, or in multiples of the body weight; export "
         "them in N"
     )
-
-
-def _free_moment(wrench: FloatArray) -> FloatArray:
-    point = centre_of_pressure(wrench)
-    result: FloatArray = (wrench[..., 3:] - np.cross(point, wrench[..., :3]))[..., 1]
-    return result
