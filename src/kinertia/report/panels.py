@@ -124,6 +124,15 @@ def base_layout(alt: str) -> dict[str, Any]:
     }
 
 
+def sentence_figure(text: str) -> Figure:
+    """Words in the place of a figure that has nothing to show."""
+    layout = base_layout(text)
+    hidden = {"visible": False}
+    place = {"xref": "paper", "yref": "paper", "x": 0, "y": 0.5, "xanchor": "left", "showarrow": False}
+    layout |= {"height": 90, "xaxis": hidden, "yaxis": hidden, "annotations": [{"text": plain(text), **place}]}
+    return Figure([], layout)
+
+
 def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:
     """Domains of all axes, top margin and height of the figure, for this many columns and entries of the legend.
 
