@@ -51,9 +51,8 @@ def test_error_bars_are_explained_where_there_are_any(fit, two_level):
     assert "the two-level method gives no error bars, so nothing tells a change from chance: b" in without
     both = Elements(render_comparison({"a": fit, "b": two_level, "c": fit})).text
     assert all(words in both for words in explained)
-    assert remarks({"a": two_level, "b": fit}) == [
-        "the two-level method gives no error bars, so nothing tells a change from chance: a, which all are compared with"
-    ]
+    (said,) = remarks({"a": two_level, "b": fit})
+    assert said.endswith("so nothing tells a change from chance: a, which all are compared with")
 
 
 @pytest.mark.parametrize("warnings", [(), ("a doubt",)])

@@ -127,9 +127,7 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
         "first": first_name,
         "remarks": remarks(fits),
         "against_first": {
-            name: [
-                {**asdict(one), "change": one.change, "changed": one.changed} for one in differences(first, other)
-            ]
+            name: [{**asdict(one), "change": one.change, "changed": one.changed} for one in differences(first, other)]
             for name, other in others
         },
     }
