@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.colors import to_hex
 
@@ -78,6 +79,15 @@ def test_every_figure_is_drawn_with_and_without_error_bars(fit, two_level):
             drawn = getattr(FitFigures(one, drawing), name)()
             assert all(axes.has_data() for axes in drawn.axes), name
             drawn.draw_without_rendering()
+
+
+@pytest.mark.parametrize("name", ["moments", "residuals", "bsp"])
+def test_the_legend_is_inside_the_figure(fit, name):
+    with rc_context({"font.size": 7}):
+        drawn = getattr(FitFigures(fit, drawing), name)()
+        drawn.draw_without_rendering()
+    (legend,) = drawn.legends
+    assert legend.get_window_extent().x1 < drawn.bbox.x1
 
 
 def test_without_strides_moments_are_over_time(fit, tmp_path):

@@ -32,6 +32,8 @@ _POINTS_PER_PX = 0.5
 """Of lines and marks: those of the report are for screens, and a journal's panels are half as wide."""
 _TITLE_LETTERS = 36
 """In a line, beyond which it would leave the panel."""
+_MOST_BESIDE, _LEGEND_LETTERS, _HANDLE_LETTERS = 4, 145, 8
+"""In a row of the legend: entries, letters, and letters that the line before each takes the room of."""
 _DOTS_PER_INCH = 600
 _FORMATS = (".svg", ".pdf", ".eps", ".png", ".tif", ".tiff")
 _DASHES = {"dot": ":", "dash": "--"}
@@ -115,7 +117,9 @@ def drawing(figure: Figure) -> Drawing:
         _mark(panels[shape["xref"][1:]], shape)
     for suffix, panel in panels.items():
         _finish(panel, figure.layout[f"xaxis{suffix}"], figure.layout[f"yaxis{suffix}"])
-    legend = drawn.legend(*_legend(list(panels.values())), loc="outside upper left", ncols=4, frameon=False)
+    handles, labels = _legend(list(panels.values()))
+    beside = min(_MOST_BESIDE, _LEGEND_LETTERS // (_HANDLE_LETTERS + max(map(len, labels))))
+    legend = drawn.legend(handles, labels, loc="outside upper left", ncols=beside, frameon=False)
     if trial := figure.layout["meta"].get("trial"):
         legend.set_title(f"Trial {_text(trial)}", prop=FontProperties(weight="bold"))
         legend.set_alignment("left")
