@@ -97,3 +97,26 @@ def test_pictures_are_those_of_the_report(fit, page):
         figure.layout.meta.pop("trial", None)
         assert figure.to_json() == go.Figure(**written[name]).to_json(), name
     assert len(plot.skeleton().frames) > 30
+
+
+@pytest.mark.slow
+def test_a_page_of_a_notebook_shows_pictures_without_network(fit, browser, tmp_path):
+    """By `nbconvert --to html --execute`; the library is in the page once."""
+    fit.save(tmp_path / "out")
+    notebook = pytest.importorskip("nbformat").v4
+    executor, exporter = pytest.importorskip("nbconvert.preprocessors"), pytest.importorskip("nbconvert").HTMLExporter()
+    cells = [
+        f"import kinertia; fit = kinertia.load_fit({str(tmp_path / 'out')!r})",
+        "fit.plot.bsp()",
+        "fit.plot.body()",
+    ]
+    made = notebook.new_notebook(cells=[notebook.new_code_cell(cell) for cell in cells])
+    executor.ExecutePreprocessor(kernel_name="python3").preprocess(made)
+    (tmp_path / "page.html").write_text(exporter.from_notebook_node(made)[0], encoding="utf-8")
+    assert (tmp_path / "page.html").stat().st_size < 8e6
+    page = browser.new_page()
+    page.route("**/*", lambda route: route.continue_() if route.request.url.startswith("file:") else route.abort())
+    page.goto((tmp_path / "page.html").as_uri(), wait_until="domcontentloaded")
+    page.wait_for_function("document.querySelectorAll('.plotly-graph-div .main-svg .trace').length > 20")
+    assert page.locator(".plotly-graph-div:has(.trace)").count() == 2
+    page.close()

@@ -35,9 +35,9 @@ def as_plotly(figure: Figure) -> go.Figure:
         KinertiaError: plotly is not installed.
     """
     expect_plotly()
-    import plotly.graph_objects as go
+    from kinertia.report.notebook_figure import NotebookFigure
 
-    return go.Figure(figure.data, figure.layout, figure.frames)
+    return NotebookFigure(figure.data, figure.layout, figure.frames)
 
 
 @dataclass(frozen=True, eq=False)
