@@ -15,6 +15,7 @@ from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
 from kinertia.estimation.simultaneous.instrument_warnings import MIRRORED_FREE_MOMENTS
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
@@ -223,13 +224,11 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         bandwidths,
         fitted.foot_loads,
         result.reactions,
-        result.moment_sd,
+        result.curve_deviations,
     )
     estimates = [
-        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
-        for skeleton, motion, course, bandwidth, loads, reactions, moment_sd, k in zip(
-            *parts, ready.kinematics, strict=True
-        )
+        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), sd)
+        for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
     return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)
@@ -246,7 +245,7 @@ class _Estimated:
         motion_hz: bandwidth of the motion.
         foot_loads: (w, 2, 6) of the motion's bandwidth.
         reactions, before: for the joint moments after and before the estimate.
-        moment_sd: (w, c) of the joint moments, or None.
+        deviations: of the curves, or None.
     """
 
     skeleton: Skeleton
@@ -256,7 +255,7 @@ class _Estimated:
     foot_loads: np.ndarray
     reactions: GroundReactions
     before: GroundReactions
-    moment_sd: np.ndarray | None
+    deviations: CurveDeviations | None
 
 
 def _trial_fits(
@@ -306,7 +305,7 @@ def _trial_fit(
             "literature": inverse_dynamics(before, literature, k.motion, measured),
             "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
-        joint_load_sd=after.moment_sd,
+        deviations=after.deviations,
         marker_errors_m={
             "ik": _of_worn(k, k.ik.errors_m[k.frames]),
             "final": _marker_errors(after.skeleton, k, after.motion),
