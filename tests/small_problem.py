@@ -14,9 +14,10 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
-from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.model.skeleton import Skeleton
@@ -169,8 +170,9 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
     left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
-    moved = (coefficients - _start(problem, k)) / COEFFICIENT_SD
-    return np.concatenate([errors, left[trial.dynamic].ravel(), moved.ravel()])
+    moved = coefficients - _start(problem, k)
+    tied = (moved / AWAY_SD).ravel(), (np.diff(moved, axis=0) / CHANGE_SD).ravel()
+    return np.concatenate([errors, left[trial.dynamic].ravel(), *tied])
 
 
 @lru_cache(maxsize=1)
