@@ -265,7 +265,8 @@
       if (!this.pen || !this.width) return;
       const root = 3 * this.frame;
       this.centre = [this.data.centre[root], this.data.centre[root + 2]];
-      const high = this.top * Math.cos(this.from) + 2 * this.aside * Math.abs(Math.sin(this.from));
+      const deep = this.aside * Math.abs(Math.sin(this.from)); // feet reach as far, the head does not
+      const high = Math.max(this.top * Math.cos(this.from) + deep, 2 * deep);
       this.scale = (this.zoom * Math.min(this.tall / high, this.width / (2 * this.aside))) / AROUND;
       this.pen.clearRect(0, 0, this.width, this.tall);
       this.pen.lineCap = "round";
