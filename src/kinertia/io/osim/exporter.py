@@ -7,16 +7,15 @@ stay as axes that do not move. OpenSim 4.0 and later open it. There are no muscl
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.rotations import three_angles
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, inverse, placed, placed_by
 
 _FORMAT = 40000
@@ -126,8 +125,7 @@ def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
 
 
 def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:
-    with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
-        angles = Rotation.from_matrix(np.asarray(rotation)).as_euler("XYZ")
+    angles = three_angles(np.asarray(rotation), np.eye(3))
     return (
         f"<PhysicalOffsetFrame name={quoteattr(name)}><socket_parent>{parent}</socket_parent>"
         f"<translation>{_numbers(translation)}</translation><orientation>{_numbers(angles)}</orientation>"
