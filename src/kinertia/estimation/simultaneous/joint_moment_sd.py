@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.elimination import Factored, Reduced
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
@@ -26,6 +25,7 @@ from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.moving_mean import moving_mean
 from kinertia.motion.regressor import regressor
 from kinertia.motion.rigid_body import axis_force_derivatives
 
@@ -89,7 +89,7 @@ def joint_moment_sd(
             variance[rows] = spread.of_moments(basis.first[chosen], through, shaken.reshape(shape), still)
             impact[rows] = by.impact
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    variance += uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
+    variance += moving_mean(np.square(impact), around)
     return np.sqrt(np.maximum(variance, 0.0))
 
 
