@@ -34,6 +34,8 @@ CLOCK = SoundOrFaulty.certain(0.01)
 INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK)
 SWITCH_S = 0.1
 """When the right foot steps from one plate to another, without a flight."""
+NOISE_N = 0.7
+"""Of the plates, in the forces for joint moments."""
 LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
 
 
@@ -82,7 +84,7 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
     at_samples, at_frames = carriers
     impact = rng.normal(0.0, 5.0, wrench.shape)
     turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
-    reactions = GroundReactions(fine, wrench, at_samples, impact, None)
+    reactions = GroundReactions(fine, wrench, at_samples, impact, None, NOISE_N)
     middles = np.array([[0.2, 0.0, 0.1], [0.9, 0.0, -0.2], [1.5, 0.0, 0.3]])
     return FootPlates(loads, reactions, ("first", "second", "third"), at_frames, turn, middles)
 

@@ -14,6 +14,7 @@ from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
@@ -97,7 +98,8 @@ class TrialFit:
         joint_loads: joint inverse dynamics (w, c: N m, N of translations) per stage: "literature" (with forces as
             measured), "estimate" (with `reactions`); of the two-level estimate both with forces of the motion's
             bandwidth. `moments` has them as tables.
-        joint_load_sd: posterior deviations of those of the estimate; None after two-level. `moment_sd` as a table.
+        deviations: posterior standard deviations of the estimate's curves; None after two-level. `coordinate_sd` and
+            `moment_sd` are tables of them.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
 
@@ -115,7 +117,7 @@ class TrialFit:
     residuals: Mapping[str, np.ndarray]
     full_residuals: Mapping[str, np.ndarray]
     joint_loads: Mapping[str, np.ndarray]
-    joint_load_sd: np.ndarray | None
+    deviations: CurveDeviations | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
     course: np.ndarray | None = None
@@ -136,6 +138,11 @@ class TrialFit:
         return by_coordinate(self.kinematics, self.motion.q)
 
     @cached_property
+    def coordinate_sd(self) -> pd.DataFrame | None:
+        """Their posterior deviations, in the same form; None after two-level."""
+        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.coordinates)
+
+    @cached_property
     def strides(self) -> tuple[Stride, ...]:
         """Strides of the whole trial, by plates where they saw the foot land, else by the motion; none in squats."""
         return strides_of(self.skeleton, self.kinematics)
@@ -147,8 +154,8 @@ class TrialFit:
 
     @cached_property
     def moment_sd(self) -> pd.DataFrame | None:
-        """`joint_load_sd` in the same form."""
-        return None if self.joint_load_sd is None else by_coordinate(self.kinematics, self.joint_load_sd)
+        """Posterior deviations of those of the estimate, in the same form; None after two-level."""
+        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.moments)
 
     def __repr__(self) -> str:
         """Name, time and size: all its arrays would fill pages."""
@@ -231,7 +238,7 @@ class Fit:
         quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle
         grows), "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward",
         "..._medial" (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value`
-        is NaN. `sd` is the posterior deviation of moments, and of powers as far as the moment makes it.
+        is NaN. `sd` is the posterior deviation.
 
         Args:
             stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.

@@ -110,6 +110,10 @@ def _write_model(fit: Fit, folder: Path) -> None:
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     names, rotational = fit.skeleton.coordinates, fit.skeleton.rotational
     motion = f"Motion: {trial.motion_hz:.3g} Hz"
+    if trial.deviations is not None:
+        sd = trial.deviations.coordinates
+        table = TimeTable(trial.time, tuple(names), np.where(rotational, np.degrees(sd), sd), in_degrees=True)
+        write_table(folder / "kinematics_sd.sto", table, "kinematics_sd", motion)
     forces = f"Ground reactions: {forces_used(trial.reactions, fit.settings, trial.motion_hz).which}. {motion}"
     write_table(folder / "kinematics.mot", _coordinates(fit, trial), "kinematics", motion)
     window_s, feet = trial.kinematics.window_s, fit.skeleton.feet
@@ -120,11 +124,11 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     files = {
         "inverse_dynamics": (trial.joint_loads["estimate"], forces),
         "inverse_dynamics_literature": (trial.joint_loads["literature"], before),
-        "inverse_dynamics_sd": (trial.joint_load_sd, forces),
     }
+    if trial.deviations is not None:
+        files["inverse_dynamics_sd"] = (trial.deviations.moments, forces)
     for file, (values, remark) in files.items():
-        if values is not None:
-            write_table(folder / f"{file}.sto", _table(trial, loads, values), file, remark)
+        write_table(folder / f"{file}.sto", _table(trial, loads, values), file, remark)
     stages = {**trial.residuals, "estimate_full": trial.full_residuals["estimate"]}
     columns = [f"{stage}_{name}" for stage in stages for name in _RESIDUALS]
     residuals = _table(trial, columns, np.hstack(list(stages.values())))

@@ -173,7 +173,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
                 None if truth is None else truth.joint_loads[trial.name],
             )
         ),
-        "bands": trial.joint_load_sd is not None,
+        "bands": trial.deviations is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(
