@@ -189,11 +189,13 @@ class _Source:
     def _measured(self, time: np.ndarray, curves: Sequence[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
         """Values at these times of each stretch's curve; NaN outside."""
         windows = self.kinematics.windows_s
-        result: np.ndarray = np.full_like(curves[0](np.clip(time, *windows[0])), np.nan)
-        for window, curve in zip(windows, curves, strict=True):
-            here = inside(time, [window])
-            if here.any():
-                result[here] = curve(np.clip(time[here], *window))
+        places = [inside(time, [window]) for window in windows]
+        values = [
+            curve(np.clip(time[here], *window)) for here, window, curve in zip(places, windows, curves, strict=True)
+        ]
+        result = np.full((len(time), *values[0].shape[1:]), np.nan)
+        for here, own in zip(places, values, strict=True):
+            result[here] = own
         return result
 
 

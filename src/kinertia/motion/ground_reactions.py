@@ -90,7 +90,7 @@ class GroundReactions:
         """(n, 2, 6) loads at these times: natural cubic splines of force, point and torque, as OpenSim's tools lay them
         through the columns of the file that is written of them.
         """
-        return np.concatenate([self._at(time[some]) for some in pieces(len(time))])
+        return np.concatenate([np.empty((0, 2, 6)), *(self._at(time[some]) for some in pieces(len(time)))])
 
     def rate(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) derivative of `at` by time, N/s and N m/s."""
