@@ -55,15 +55,16 @@ def basis(t: np.ndarray, k: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     are (k + 1, m), by the recurrence of Cox and de Boor.
     """
     interval = np.clip(np.searchsorted(t, x, side="right") - 1, k, len(t) - k - 2)
-    values = np.empty((k + 1, len(x)))
+    near = t[interval + np.arange(1 - k, k + 1)[:, None]]
+    beyond, values = x - near, np.empty((k + 1, len(x)))
     values[0] = 1.0
     for degree in range(1, k + 1):
         carried = np.zeros(len(x))
         for j in range(degree):
-            left, right = t[interval + 1 - degree + j], t[interval + 1 + j]
-            part = values[j] / (right - left)
-            values[j] = carried + (right - x) * part
-            carried = (x - left) * part
+            left, right = k - degree + j, k + j
+            part = values[j] / (near[right] - near[left])
+            values[j] = carried - beyond[right] * part
+            carried = beyond[left] * part
         values[degree] = carried
     return interval - k, values
 
@@ -94,11 +95,15 @@ def _through(x: np.ndarray, y: np.ndarray, k: int, t: np.ndarray, vanishing: ran
     columns, rows = first + np.arange(k + 1)[:, None], ends + np.arange(len(x))
     matrix[2 * k + rows - columns, columns] = values
     right[rows] = y.reshape(len(y), -1)
-    own, only = np.arange(k + 1), np.eye(k + 1)
-    for i, order in enumerate(vanishing):
-        for row, column, end in ((i, 0, x[0]), (n - ends + i, n - k - 1, x[-1])):
-            at_end = BSpline(t[column : column + 2 * k + 2], only, k)(end, order)
-            matrix[2 * k + row - column - own, column + own] = at_end
+    own = np.arange(k + 1)
+    for row, column, at in ((0, 0, 0), (n - ends, n - k - 1, -1)):
+        slopes = BSpline(t[column : column + 2 * k + 2], np.eye(k + 1), k)
+        for order in range(1, k if ends else 1):
+            slopes = slopes.derivative()
+            if order in vanishing:
+                # a spline's first and last coefficient are its values at the ends
+                i = row + vanishing.index(order)
+                matrix[2 * k + i - column - own, column + own] = slopes.c[at]
     _, _, c, _ = lapack.dgbsv(k, k, matrix, right)
     return BSpline(t, c.reshape(n, *y.shape[1:]), k)
 

@@ -9,7 +9,6 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +184,7 @@ def summary(fit: Fit) -> dict[str, Any]:
 def _posterior_summary(fit: Fit) -> dict[str, Any]:
     if fit.posterior is None:
         return {}
-    noise = {trial.name: asdict(noise) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
+    noise = {trial.name: dict(vars(noise)) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
     return {
         "iterations": fit.posterior.iterations,
         "calibration": {name: dict(entry) for name, entry in fit.posterior.calibration.items()},
@@ -206,7 +205,7 @@ def _identifiability(bsp: Mapping[str, Sequence[Any]], base: BaseParameters) -> 
             "count": base.count,
             "shown": base.shown,
             "condition": base.condition if math.isfinite(base.condition) else None,
-            "best_shown": [asdict(combination) for combination in base.best],
+            "best_shown": [dict(vars(combination)) for combination in base.best],
             "never_shown": list(base.never),
         },
     }
