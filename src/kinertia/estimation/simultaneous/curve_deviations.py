@@ -110,8 +110,8 @@ class _Seen:
         values: (3, d, 6) of the active splines and their first two derivatives.
         shares: (3,) deviations of places, rates and accelerations by the markers' errors alone, over what the estimate
             expects of them.
-        through: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines.
-        shaken: the same, for what the markers' errors make of the motion alone.
+        shaken: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines, for what the markers'
+            errors make of the motion alone.
     """
 
     by: MomentDerivatives
@@ -119,17 +119,15 @@ class _Seen:
     first: np.ndarray
     values: np.ndarray
     shares: np.ndarray
-    through: np.ndarray
     shaken: np.ndarray
 
     @classmethod
     def of(
         cls, by: MomentDerivatives, speed: np.ndarray, first: np.ndarray, values: np.ndarray, shares: np.ndarray
     ) -> _Seen:
-        orders, shape = (by.q, by.qd, by.qdd), (*by.q.shape[:2], -1)
-        through = by_splines(values, *orders).reshape(shape)
+        orders = (by.q, by.qd, by.qdd)
         shaken = by_splines(values, *(share * each for share, each in zip(shares, orders, strict=True)))
-        return cls(by, speed, first, values, shares, through, shaken.reshape(shape))
+        return cls(by, speed, first, values, shares, shaken.reshape(*by.q.shape[:2], -1))
 
 
 @dataclass(frozen=True)
@@ -172,12 +170,13 @@ class _MotionSpread:
             own = np.flatnonzero(seen.first == spline)
             covariance, carried = self._active(int(spline) - self.start)
             shaken, by_errors = seen.shaken[own], seen.shaken[own] @ covariance
-            moment = still[own] - seen.through[own] @ carried
+            # how the static unknowns carry places, rates and accelerations along, and these the moments
+            q, qd, qdd = (-np.tensordot(value, carried.reshape(6, c, -1), (1, 0)) for value in seen.values[:, own])
+            moment = still[own] + by.q[own] @ q + by.qd[own] @ qd + by.qdd[own] @ qdd
             each = np.arange(c)
             blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of every coordinate alone
             place, rate = (share * value for share, value in zip(seen.shares[:2], seen.values[:2, own], strict=True))
             alone = [np.einsum("da,cab,db->dc", one, blocks, one, optimize=True) for one in (place, rate)]
-            q, qd = (-np.tensordot(value, carried.reshape(6, c, -1), (1, 0)) for value in seen.values[:2, own])
             together = by_errors.reshape(len(own), c, 6, c)[:, each, :, each].transpose(1, 0, 2)
             into.coordinates[rows][own] = alone[0] + np.square(q).sum(axis=-1)
             moved[0, own] = (by_errors * shaken).sum(axis=-1) + np.square(moment).sum(axis=-1)
