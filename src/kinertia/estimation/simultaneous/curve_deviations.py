@@ -176,12 +176,12 @@ class _MotionSpread:
             each = np.arange(c)
             blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of every coordinate alone
             place, rate = (share * value for share, value in zip(seen.shares[:2], seen.values[:2, own], strict=True))
-            alone = [np.einsum("da,cab,db->dc", one, blocks, one, optimize=True) for one in (place, rate)]
+            alone = [((one @ blocks) * one).sum(axis=-1).T for one in (place, rate)]
             together = by_errors.reshape(len(own), c, 6, c)[:, each, :, each].transpose(1, 0, 2)
             into.coordinates[rows][own] = alone[0] + np.square(q).sum(axis=-1)
             moved[0, own] = (by_errors * shaken).sum(axis=-1) + np.square(moment).sum(axis=-1)
             moved[1, own] = alone[1] + np.square(qd).sum(axis=-1)
-            moved[2, own] = np.einsum("dca,da->dc", together, rate) + (moment * qd).sum(axis=-1)
+            moved[2, own] = (together * rate[:, None]).sum(axis=-1) + (moment * qd).sum(axis=-1)
         into.moments[rows] = moved[0]
         speed, value = seen.speed, by.value
         into.powers[rows] = speed**2 * moved[0] + value**2 * moved[1] + 2.0 * speed * value * moved[2]
