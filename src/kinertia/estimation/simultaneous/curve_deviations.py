@@ -67,9 +67,11 @@ def curve_deviations(
         k: the trial.
         coefficients, static: the estimate.
         eliminated: the trial's normal equations there, undamped.
-        root: (S, S) root of the posterior covariance of the static unknowns.
+        root: (S, S) root of the posterior covariance of the static unknowns, as `StaticInformation` has it: rows of
+            those that root equations depend on, which come first, have as many columns that are not zero.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
+    in_root = problem.layout.in_root
     size = (len(frames), coefficients.shape[1])
     variance, impact, speed = CurveDeviations.filled(*size, 0.0), np.empty(size), np.empty(size)
     reactions, spread = problem.reactions(k, static), None
@@ -85,7 +87,7 @@ def curve_deviations(
             by = moment_derivatives(problem, k, motion, static, reactions, chosen)
             impact[rows], speed[rows] = by.impact, motion[1][:, problem.moving]
             seen = _Seen.of(by, speed[rows], basis.first[chosen], basis.values[:, chosen], shares)
-            spread.variances(seen, root[problem.layout.in_root], variance, rows)
+            spread.variances(seen, root[in_root, in_root], variance, rows)
             loaded = reactions.at(problem.trials[k].time[chosen])[..., :3] != 0.0
             variance.ground_forces[rows] += np.square(reactions.noise_n * loaded)
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
@@ -159,7 +161,7 @@ class _MotionSpread:
         return cls(start, np.append(diagonal, block, axis=0), below, np.append(carried, first, axis=0))
 
     def variances(self, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
-        """Write the variances of some frames into rows of `into`; `root` are those of the static unknowns that root
+        """Write the variances of some frames into rows of `into`; `root` (n, n) is of the static unknowns that root
         equations depend on.
         """
         by, c = seen.by, self.carried.shape[1]
@@ -172,7 +174,8 @@ class _MotionSpread:
             shaken, by_errors = seen.shaken[own], seen.shaken[own] @ covariance
             # how the static unknowns carry places, rates and accelerations along, and these the moments
             q, qd, qdd = (-np.tensordot(value, carried.reshape(6, c, -1), (1, 0)) for value in seen.values[:, own])
-            moment = still[own] + by.q[own] @ q + by.qd[own] @ qd + by.qdd[own] @ qdd
+            moment = by.q[own] @ q + by.qd[own] @ qd + by.qdd[own] @ qdd
+            moment[..., : len(root)] += still[own]
             each = np.arange(c)
             blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of every coordinate alone
             place, rate = (share * value for share, value in zip(seen.shares[:2], seen.values[:2, own], strict=True))
