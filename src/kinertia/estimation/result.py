@@ -33,47 +33,59 @@ if TYPE_CHECKING:
 
 
 class FitPictures(Protocol):
-    """Plotly figures of a fit. Those of one trial take its name; left out, it is the first.
+    """Plotly figures of a fit; `Fit.figure` draws those of them that are for papers by the same names.
+
+    Those over time are of one trial; its name left out, of the first.
 
     Raises:
-        KeyError: there is no trial of this name; names those there are.
+        KinertiaError: no such trial, no strides or error bars to draw from (says which figure there is in its place),
+            or plotly (the extra `plots`) is missing.
     """
 
-    def residuals(self, trial: str | None = None) -> Figure:
-        """Root residual force and moment over time, stage by stage."""
-
-    def coordinates(self, trial: str | None = None) -> Figure:
-        """Every coordinate by inverse kinematics and as estimated."""
-
     def moments(self, trial: str | None = None) -> Figure:
-        """Joint moments per body mass, before against estimate."""
+        """Joint moments over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
 
-    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure | None:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides.
+    def angles(self, trial: str | None = None) -> Figure:
+        """Joint angles over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
+
+    def powers(self) -> Figure:
+        """Joint powers over the gait cycle."""
+
+    def forces(self) -> Figure:
+        """Ground reactions over the gait cycle."""
+
+    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle, in front of norms.
 
         `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
         """
 
-    def markers(self, trial: str | None = None) -> Figure:
-        """Distance between every measured and modelled marker."""
+    def coordinates(self, trial: str | None = None) -> Figure:
+        """Every coordinate over time, by inverse kinematics and as estimated."""
 
-    def gaps(self, trial: str | None = None) -> Figure | None:
-        """When markers were not seen; None where all always were."""
-
-    def skeleton(self, trial: str | None = None) -> Figure:
-        """The skeleton in motion, with markers, centres of mass and ground reactions."""
-
-    def body(self, shown: Literal["mass", "information"] = "mass") -> Figure | None:
-        """The body, coloured by change of mass or by what the data say of it ("information"; None after two-level)."""
+    def residuals(self, trial: str | None = None) -> Figure:
+        """Root residual force and moment over time, stage by stage."""
 
     def bsp(self) -> Figure:
         """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
 
-    def departures(self) -> Figure | None:
-        """The same in prior SDs; None after two-level."""
+    def departures(self) -> Figure:
+        """The same in prior SDs; not after two-level."""
 
-    def information(self) -> Figure | None:
-        """What the data say about each parameter; None after two-level."""
+    def information(self) -> Figure:
+        """What the data say about each parameter; not after two-level."""
+
+    def body(self, shown: Literal["mass", "information"] = "mass") -> Figure:
+        """The body, coloured by change of mass or by what the data say of it ("information"; not after two-level)."""
+
+    def markers(self, trial: str | None = None) -> Figure:
+        """Distance between every measured and modelled marker."""
+
+    def gaps(self, trial: str | None = None) -> Figure:
+        """When markers were not seen; a sentence where all always were."""
+
+    def skeleton(self, trial: str | None = None) -> Figure:
+        """The skeleton in motion, with markers, centres of mass and ground reactions."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -291,19 +303,21 @@ class Fit:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
         return display.save(self, folder)
 
-    def figure(self, name: str, path: str | Path) -> Path:
+    def figure(self, name: str, path: str | Path, trial: str | None = None) -> Path:
         """Draw a figure for a paper into a file: 180 mm wide, three panels in a row; returns the file.
 
         Args:
-            name: "moments", "angles", "powers" or "forces" over the gait cycle (moments and angles without strides over
-                time, of the first trial), or "bsp": changes of body segment parameters.
+            name: as in `plot`: "moments", "angles", "powers", "forces", "cycles", "coordinates", "residuals", "bsp" or
+                "departures".
             path: .svg, .pdf, .eps, .png or .tif.
+            trial: of moments, angles, coordinates and residuals: this trial's, over time.
 
         Raises:
-            KinertiaError: no such figure, no strides to draw it from, or matplotlib (the extra `plots`) is missing.
+            KinertiaError: no such figure or trial, no strides or error bars to draw it from, or matplotlib (the extra
+                `plots`) is missing.
             FileError: a format that is not known, or the file cannot be written.
         """
-        return display.figure(self, name, path)
+        return display.figure(self, name, path, trial)
 
     @property
     def covariance(self) -> pd.DataFrame | None:
@@ -337,7 +351,7 @@ class Fit:
 
     @property
     def plot(self) -> FitPictures:
-        """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
+        """Pictures for a notebook: `fit.plot.moments()`, `.bsp()`, `.residuals()`, `.skeleton()` and others."""
         pictures: FitPictures = display.pictures(self)
         return pictures
 

@@ -56,7 +56,7 @@ MOST_TRIALS = 6
 VIEW_FRAMES = 300
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
 
-_SUMMARY_LINES, _LINE_LETTERS = 8, 110
+_SUMMARY_LINES, _LINE_LETTERS = 8, 95
 """Of warnings in the printed summary, whose first page has no room for more, and letters in one of them."""
 
 
