@@ -15,13 +15,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.elimination import Factored, Reduced
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.motion.moving_mean import moving_mean
 
 _FRAMES_AT_ONCE = 100
 """Larger arrays would leave the processor's cache."""
@@ -67,9 +67,11 @@ def curve_deviations(
         k: the trial.
         coefficients, static: the estimate.
         eliminated: the trial's normal equations there, undamped.
-        root: (S, S) root of the posterior covariance of the static unknowns.
+        root: (S, S) root of the posterior covariance of the static unknowns, as `StaticInformation` has it: rows of
+            those that root equations depend on, which come first, have as many columns that are not zero.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
+    in_root = problem.layout.in_root
     size = (len(frames), coefficients.shape[1])
     variance, impact, speed = CurveDeviations.filled(*size, 0.0), np.empty(size), np.empty(size)
     reactions, spread = problem.reactions(k, static), None
@@ -85,11 +87,11 @@ def curve_deviations(
             by = moment_derivatives(problem, k, motion, static, reactions, chosen)
             impact[rows], speed[rows] = by.impact, motion[1][:, problem.moving]
             seen = _Seen.of(by, speed[rows], basis.first[chosen], basis.values[:, chosen], shares)
-            spread.variances(seen, root[problem.layout.in_root], variance, rows)
+            spread.variances(seen, root[in_root, in_root], variance, rows)
             loaded = reactions.at(problem.trials[k].time[chosen])[..., :3] != 0.0
             variance.ground_forces[rows] += np.square(reactions.noise_n * loaded)
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    lost = uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
+    lost = moving_mean(np.square(impact), around)
     parts = (
         variance.coordinates,
         variance.moments + lost,
@@ -110,8 +112,8 @@ class _Seen:
         values: (3, d, 6) of the active splines and their first two derivatives.
         shares: (3,) deviations of places, rates and accelerations by the markers' errors alone, over what the estimate
             expects of them.
-        through: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines.
-        shaken: the same, for what the markers' errors make of the motion alone.
+        shaken: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines, for what the markers'
+            errors make of the motion alone.
     """
 
     by: MomentDerivatives
@@ -119,17 +121,15 @@ class _Seen:
     first: np.ndarray
     values: np.ndarray
     shares: np.ndarray
-    through: np.ndarray
     shaken: np.ndarray
 
     @classmethod
     def of(
         cls, by: MomentDerivatives, speed: np.ndarray, first: np.ndarray, values: np.ndarray, shares: np.ndarray
     ) -> _Seen:
-        orders, shape = (by.q, by.qd, by.qdd), (*by.q.shape[:2], -1)
-        through = by_splines(values, *orders).reshape(shape)
+        orders = (by.q, by.qd, by.qdd)
         shaken = by_splines(values, *(share * each for share, each in zip(shares, orders, strict=True)))
-        return cls(by, speed, first, values, shares, through, shaken.reshape(shape))
+        return cls(by, speed, first, values, shares, shaken.reshape(*by.q.shape[:2], -1))
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class _MotionSpread:
         return cls(start, np.append(diagonal, block, axis=0), below, np.append(carried, first, axis=0))
 
     def variances(self, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
-        """Write the variances of some frames into rows of `into`; `root` are those of the static unknowns that root
+        """Write the variances of some frames into rows of `into`; `root` (n, n) is of the static unknowns that root
         equations depend on.
         """
         by, c = seen.by, self.carried.shape[1]
@@ -172,12 +172,14 @@ class _MotionSpread:
             own = np.flatnonzero(seen.first == spline)
             covariance, carried = self._active(int(spline) - self.start)
             shaken, by_errors = seen.shaken[own], seen.shaken[own] @ covariance
-            moment = still[own] - seen.through[own] @ carried
+            # how the static unknowns carry places, rates and accelerations along, and these the moments
+            q, qd, qdd = (-np.tensordot(value, carried.reshape(6, c, -1), (1, 0)) for value in seen.values[:, own])
+            moment = by.q[own] @ q + by.qd[own] @ qd + by.qdd[own] @ qdd
+            moment[..., : len(root)] += still[own]
             each = np.arange(c)
             blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of every coordinate alone
             place, rate = (share * value for share, value in zip(seen.shares[:2], seen.values[:2, own], strict=True))
             alone = [((one @ blocks) * one).sum(axis=-1).T for one in (place, rate)]
-            q, qd = (-np.tensordot(value, carried.reshape(6, c, -1), (1, 0)) for value in seen.values[:2, own])
             together = by_errors.reshape(len(own), c, 6, c)[:, each, :, each].transpose(1, 0, 2)
             into.coordinates[rows][own] = alone[0] + np.square(q).sum(axis=-1)
             moved[0, own] = (by_errors * shaken).sum(axis=-1) + np.square(moment).sum(axis=-1)

@@ -219,7 +219,7 @@ def _step(
     information = here.information + sum(each.information for each in displaced)
     right = here.right + sum(each.right for each in displaced)
     information[np.diag_indices_from(information)] += held
-    step = np.linalg.solve(information, right)
+    step = StaticInformation.of(information, problem.layout.in_root.stop).solution(right)
     moved_sd = float(np.sqrt(step @ information @ step))
     coefficients, moved = [], []
     promised = 0.5 * float(here.right @ step)
