@@ -28,6 +28,7 @@ GRAVITY = 9.80665
 RESULTS = {
     *("report.html", "fit.json", "bsp.csv", "model.osim", "kinematics.mot", "residuals.sto"),
     *("inverse_dynamics.sto", "inverse_dynamics_literature.sto", "inverse_dynamics_sd.sto"),
+    "kinematics_sd.sto",
     *("ground_reactions.mot", "external_loads.xml", "fit.npz"),
     *("cycles.csv", "cycles_literature.csv", "spatiotemporal.csv"),
 }
