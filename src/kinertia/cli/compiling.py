@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
-_MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.4, 0.5, 0.75
+_MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.4, 0.5, 0.8
 """Of the time, after which the synthetic walk, inverse kinematics and the rest before the estimate are done."""
 
 

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import sys
 import zipfile
 from pathlib import Path
 from urllib.parse import quote
@@ -15,7 +16,7 @@ from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import DESKTOP, PHONE, picture, playwright
 from kinertia.cli.measured_demo import FILES
-from kinertia.cli.web import jobs
+from kinertia.cli.web import work
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_file import read_subject
@@ -191,7 +192,7 @@ def press(page, name, key="Enter", most=60):
 
 
 def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", "pass"))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
     person = app.library.add("Keyboard")
     with_everything(person)
     tab = Tab(browser, app).home()
@@ -215,7 +216,7 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
 
 
 def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monkeypatch):
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", "pass"))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
     person = app.library.add("Rows by keyboard")
     for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)

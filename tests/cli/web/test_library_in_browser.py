@@ -1,6 +1,7 @@
 """The life of the page in a browser: several tabs, reloads, cancelled and crashed fits, the library, the end."""
 
 import shutil
+import sys
 from urllib.parse import quote
 
 import pytest
@@ -11,7 +12,7 @@ from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import playwright
 from kinertia.cli.measured_demo import FILES
-from kinertia.cli.web import jobs
+from kinertia.cli.web import work
 
 WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share': 0.3}), flush=True)\ntime.sleep(90)"
 """A fit that is not done before it is cancelled."""
@@ -30,7 +31,7 @@ def ready(library, name):
 @pytest.fixture
 def waiting(monkeypatch, app):
     """A person whose fit does not end by itself."""
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", WAITING))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", WAITING))
     return ready(app.library, "Waiting")
 
 
@@ -60,7 +61,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
     """A tab that shows the answer to a form shows the person's page when the fit is done."""
     go = tmp_path / "go"
     code = f"import os, time\nwhile not os.path.exists({str(go)!r}): time.sleep(0.05)"
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", code))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", code))
     person = ready(app.library, "Copied")
     person.results.mkdir()
     (person.results / "fit.json").write_text('{"kinertia": "x"}')
@@ -84,7 +85,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
 
 def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch):
     crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", crash))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", crash))
     tab = Tab(browser, app)
     for name, said in (("Crashing", "Kinertia failed"), ("Next", "")):
         tab.page.goto(f"{app.address}people/{ready(app.library, name).name}")

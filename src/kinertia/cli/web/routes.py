@@ -22,7 +22,7 @@ from kinertia.cli.web.jobs import KINDS, Jobs
 from kinertia.cli.web.library import Library, Person
 from kinertia.cli.web.marker_routes import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
-from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, to
+from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.measures_file import measures_sheet
@@ -46,6 +46,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/compare/page", actions.compared),
         Route("/measures.csv", actions.measures_sheet),
         Route("/measures.svg", actions.measures_picture),
+        Route("/preparing", actions.preparing),
         Route("/stop", actions.end, methods=["POST"]),
         Route("/people/{name}", actions.person),
         Route("/people/{name}/files", actions.upload, methods=["POST"]),
@@ -67,7 +68,9 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Mount("/static", StaticFiles(directory=_STATIC)),
     ]
     handlers = {HTTPException: _not_found, KinertiaError: _trouble, OSError: _no_file, Exception: _failed}
-    return Starlette(routes=routes, exception_handlers=handlers)
+    served = Starlette(routes=routes, exception_handlers=handlers)
+    served.state.jobs = jobs
+    return served
 
 
 class _Actions:
@@ -180,6 +183,11 @@ class _Actions:
     async def progress(self, request: Request) -> Response:
         """How far the person's check and fit are."""
         return JSONResponse(progress(self._person(request), self._jobs))
+
+    async def preparing(self, request: Request) -> Response:
+        """The time left until the first estimate can begin, in words; null once it can."""
+        work = self._jobs.preparing
+        return JSONResponse({"left": None if work is None else time_left(work)})
 
     async def delete(self, request: Request) -> Response:
         """Remove the person with files and results; a fit at work is given up."""
