@@ -1,5 +1,6 @@
 """The life of the page in a browser: several tabs, reloads, cancelled and crashed fits, the library, the end."""
 
+import json
 import shutil
 import sys
 from urllib.parse import quote
@@ -125,6 +126,22 @@ def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run,
         playwright.expect(page.locator(".people a")).to_have_text(["Spring"])
         assert [path.name for path in library.iterdir() if not path.name.startswith(".")] == ["Spring"]
         tab.quiet()
+
+
+def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app):
+    person = ready(app.library, "Person to rename")
+    with_everything(person)
+    outcome = json.loads((person.results / "outcome.json").read_text())
+    (person.results / "outcome.json").write_text(json.dumps({**outcome, "inputs": person.inputs}))
+    tab.page.goto(f"{app.address}people/{quote(person.name)}")
+    tab.page.get_by_text("Rename", exact=True).click()
+    tab.page.get_by_label("Name in the library").fill("Eva (spring)")
+    tab.page.get_by_label("Name in the library").press("Enter")
+    playwright.expect(tab.page.get_by_role("heading", level=1)).to_have_text("Eva (spring)")
+    results = tab.page.locator("section[aria-labelledby=results]")
+    playwright.expect(results.locator(".headline")).to_have_text("Usable with care.")
+    playwright.expect(results.get_by_text("before your last change")).to_have_count(0)
+    tab.quiet()
 
 
 def test_a_report_reaches_nothing(browser, app):

@@ -31,7 +31,7 @@ from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
-_FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", *KINDS)
+_FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", "rename", *KINDS)
 """Addresses below a person's that forms are sent to."""
 
 
@@ -54,6 +54,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/people/{name}/remove", actions.remove, methods=["POST"]),
         Route("/people/{name}/entries", actions.entries, methods=["POST"]),
         Route("/people/{name}/text", actions.text, methods=["POST"]),
+        Route("/people/{name}/rename", actions.rename, methods=["POST"]),
         Route("/people/{name}/delete", actions.delete, methods=["POST"]),
         Route("/people/{name}/progress", actions.progress),
         Route("/people/{name}/subject.toml", actions.subject_file),
@@ -188,6 +189,12 @@ class _Actions:
         """The time left until the first estimate can begin, in words; null once it can."""
         work = self._jobs.preparing
         return JSONResponse({"left": None if work is None else time_left(work)})
+
+    async def rename(self, request: Request) -> Response:
+        """Give the person another name in the library; nothing else changes."""
+        person = self._idle(request)
+        renamed = self._library.rename(person, (await form(request)).get("name", ""))
+        return to(request, "people", renamed.name)
 
     async def delete(self, request: Request) -> Response:
         """Remove the person with files and results; a fit at work is given up."""
