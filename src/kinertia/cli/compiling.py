@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
-_MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.4, 0.5, 0.8
-"""Of the time, after which the synthetic walk, inverse kinematics and the rest before the estimate are done."""
+_POSE_SHARE, _MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.15, 0.4, 0.5, 0.8
+"""Of the time, after which a pose, the synthetic walk, inverse kinematics and the rest before the estimate are done."""
 
 
 def compile_once(progress: Callable[[str, float], None]) -> None:
@@ -21,6 +21,8 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
         return
     progress(_STAGE, 0.0)
     with _without_looking_for_garbage(), _markers_beside():
+        import numpy as np
+
         from kinertia.estimation.prior import literature_prior
         from kinertia.estimation.simultaneous.fit import fit_simultaneous
         from kinertia.motion.dynamics import axis_motion, residual_terms, root_regressor
@@ -30,6 +32,8 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
         from kinertia.trial.data import FootLoads, Trial
 
         subject = walking_subject()
+        subject.skeleton.pose(np.zeros((1, len(subject.skeleton.coordinates))))
+        progress(_STAGE, _POSE_SHARE)
         short = walk(subject, 0.8)
         progress(_STAGE, _MOTION_SHARE)
         feet = FootLoads(short.time, short.foot_loads[..., :3], short.foot_loads[..., 3:])

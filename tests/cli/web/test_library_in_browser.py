@@ -41,6 +41,7 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
     address = f"{app.address}people/{waiting.name}"
     first.page.goto(address)
     first.estimate()
+    playwright.expect(first.page.locator("progress")).to_be_in_viewport()
     stage = first.page.locator("[data-stage]")
     playwright.expect(stage).to_have_text("estimate", timeout=PATIENCE_MS)
     playwright.expect(first.page.locator("[data-left]")).to_contain_text("left")
@@ -75,7 +76,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
     page.get_by_label("Folder on this computer").fill(str(tmp_path / "mine"))
     page.get_by_role("button", name="Write the results there").click()
     playwright.expect(page.locator(".message.pass")).to_contain_text("The results are in")
-    assert page.url == f"{app.address}people/{person.name}"
+    playwright.expect(page).to_have_url(f"{app.address}people/{person.name}")
     go.touch()
     playwright.expect(page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
     playwright.expect(page).to_have_url(f"{app.address}people/{person.name}#results")

@@ -52,9 +52,10 @@ def time_left(work: Work) -> str:
     return f"about {seconds:.0f} s left" if seconds < 90 else f"about {seconds / 60:.0f} min left"
 
 
-def to(request: Request, *parts: str) -> RedirectResponse:
-    """On to another page, as after a form."""
-    return RedirectResponse("/".join([request.scope["root_path"], *(quote(part, safe="") for part in parts)]), 303)
+def to(request: Request, *parts: str, section: str = "") -> RedirectResponse:
+    """On to another page, or to a section of it, as after a form."""
+    address = "/".join([request.scope["root_path"], *(quote(part, safe="") for part in parts)])
+    return RedirectResponse(f"{address}#{section}" if section else address, 303)
 
 
 async def form(request: Request) -> dict[str, str]:

@@ -33,6 +33,8 @@ Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
 _FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", "rename", *KINDS)
 """Addresses below a person's that forms are sent to."""
+_SECTIONS = {"check": "check", "fit": "results"}
+"""Where on a person's page it is seen how far a check or a fit is."""
 
 
 def application(library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> Starlette:
@@ -167,13 +169,13 @@ class _Actions:
         person, kind = self._person(request), self._kind(request)
         if not trouble(person):
             self._jobs.add(person, kind)
-        return to(request, "people", person.name)
+        return to(request, "people", person.name, section=_SECTIONS[kind])
 
     async def cancel(self, request: Request) -> Response:
         """Give up a check or a fit."""
         person, kind = self._person(request), self._kind(request)
         await run_in_threadpool(self._jobs.cancel, person, kind)
-        return to(request, "people", person.name)
+        return to(request, "people", person.name, section=_SECTIONS[kind])
 
     async def back(self, request: Request) -> Response:
         """Who opens the address of a form, from the browser's history for one, gets the person's page."""
@@ -290,9 +292,10 @@ class _Actions:
 
     def _checked(self, request: Request, person: Person) -> Response:
         person.note(saved=True)
-        if not trouble(person):
-            self._jobs.add(person, "check")
-        return to(request, "people", person.name)
+        if trouble(person):
+            return to(request, "people", person.name)
+        self._jobs.add(person, "check")
+        return to(request, "people", person.name, section=_SECTIONS["check"])
 
 
 def _recognised(person: Person) -> None:

@@ -160,7 +160,7 @@
 
     // to another address, since loading the same one again could repeat a form
     again() {
-      const place = this.root.dataset.kind === "fit" ? "#results" : location.hash;
+      const place = this.root.dataset.kind === "fit" ? "#results" : "#check";
       location.replace(`${address}?again${place}`);
     }
 
