@@ -14,6 +14,7 @@ from kinertia.cli.web.entries import USE, entries, fields, marker_set_field, tro
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import Person
+from kinertia.cli.web.plain_words import told
 from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
@@ -65,14 +66,14 @@ def standing(person: Person, jobs: Jobs) -> Standing:
 
 def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
     """How far the person's check and fit are; null for what neither waits nor is at work."""
-    told: dict[str, Any] = {}
+    far: dict[str, Any] = {}
     preparing = jobs.preparing
     for kind in KINDS:
         job = jobs.of(person, kind)
-        told[kind] = None if job is None else {"stage": _stage(job, jobs), "share": job.share, "left": time_left(job)}
+        far[kind] = None if job is None else {"stage": _stage(job, jobs), "share": job.share, "left": time_left(job)}
         if job is not None and kind == "fit" and preparing is not None:
-            told[kind] = {"stage": _PREPARING, "share": preparing.share, "left": time_left(preparing)}
-    return told
+            far[kind] = {"stage": _PREPARING, "share": preparing.share, "left": time_left(preparing)}
+    return far
 
 
 def _stage(job: Job, jobs: Jobs) -> str:
@@ -128,6 +129,7 @@ def person_page(
         broken=broken,
         problem=problem,
         trouble=found,
+        told=told(person, found),
         draft=notes.get("draft", "") if person.files() else "",
         said=said,
         saved=notes.get("saved", False),
