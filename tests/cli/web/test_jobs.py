@@ -96,6 +96,28 @@ def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
     assert ben.notes()["fit"] == {}
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not tell who ended a process")
+def test_a_fit_that_was_killed_is_no_failure_of_ours(library, worker):
+    worker("import signal\nos.kill(os.getpid(), signal.SIGKILL)")
+    with fitting(library, "Anna") as (jobs, person):
+        until(lambda: not jobs.busy(person))
+    assert "ended from outside" in person.notes()["fit"]["message"]
+    assert "memory" in person.notes()["fit"]["message"]
+    assert not (person.folder / jobs_module.LOG).exists()
+
+
+def test_the_log_of_a_failure_is_none_of_the_files_and_goes_with_the_next_success(library, worker):
+    worker("if not (folder / 'sound').exists(): os.abort()")
+    with fitting(library, "Anna") as (jobs, person):
+        until(lambda: not jobs.busy(person))
+        assert (person.folder / jobs_module.LOG).is_file()
+        assert person.files() == []
+        (person.folder / "sound").touch()
+        jobs.add(person, "fit")
+        until(lambda: not jobs.busy(person))
+    assert not (person.folder / jobs_module.LOG).exists()
+
+
 def test_who_waits_and_who_is_at_work_are_cancelled(library, worker):
     worker("say(stage='estimate', share=0.1); time.sleep(60)")
     with fitting(library, "Anna", "Ben") as (jobs, anna, ben):

@@ -164,7 +164,8 @@ def _write_uses(person: Person, before: Content, changed: Content, uses: Mapping
     """Write the entries with these uses; a trial that is used again has the forces and the rest that it had."""
     aside = person.notes().get("aside", [])
     after = with_uses(*taken_up(changed, uses, aside))
-    write(person, after)
+    if after != before:
+        write(person, after)
     person.note(aside=put_aside(before, after, aside))
 
 

@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from kinertia.cli.web.library import Person, started
+from kinertia.cli.web.library import LOG, Person, started
 from kinertia.cli.web.work import Work
 from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit")
-LOG = "failure.log"
 _PATIENCE_S = 5.0
+_ENDED_FROM_OUTSIDE = (-9, -15)
+"""SIGKILL and SIGTERM, as Python tells them."""
+_OUTSIDE = "It was ended from outside, as the system does where memory runs out: close other programs, start it again."
 
 
 class Job(Work):
@@ -34,11 +36,14 @@ class Job(Work):
         ended = self.done(self.kind, str(self.person.folder))
         if self.cancelled:
             return {"how": "cancelled"}
+        path = self.person.folder / LOG
+        path.unlink(missing_ok=True)
         if ended.status == 0:
             return {}
         if ended.error:
             return {"how": "failed", "message": ended.error}
-        path = self.person.folder / LOG
+        if ended.status in _ENDED_FROM_OUTSIDE:
+            return {"how": "failed", "message": _OUTSIDE}
         path.write_text(ended.log, encoding="utf-8")
         told = ended.log.strip().rpartition("\n")[2] or f"its process ended with status {ended.status}"
         sentence = f"Kinertia failed, which it should not on any input ({told}); please send {path} to its developers"

@@ -32,6 +32,8 @@ from kinertia.io.working_folder import sweep
 from kinertia.studies.cohort_record import inputs_of
 
 SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
+LOG = "failure.log"
+"""What a crash left for the developers."""
 _RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
 _STARTED, _INTERRUPTED = "started", "interrupted"
 _LONGEST_NAME = 80
@@ -71,11 +73,11 @@ class Person:
         return (self.results / SUMMARY).is_file()
 
     def files(self) -> list[Path]:
-        """What was dropped: everything but the subject file."""
+        """What was dropped: everything but the subject file and what a crash left."""
         return sorted(
             path
             for path in self.folder.iterdir()
-            if path.is_file() and path.name != SUBJECT and not path.name.startswith(".")
+            if path.is_file() and path.name not in (SUBJECT, LOG) and not path.name.startswith(".")
         )
 
     def changed(self) -> float:

@@ -165,8 +165,14 @@ class _Actions:
         return self._checked(request, person)
 
     async def start(self, request: Request) -> Response:
-        """Let the person wait for a check or a fit."""
+        """Let the person wait for a check or a fit, of what is in the form if it was sent."""
         person, kind = self._person(request), self._kind(request)
+        given = await form(request)
+        if given and not self._jobs.busy(person):
+            try:
+                write_form(person, given)
+            except KinertiaError as error:
+                return await run_in_threadpool(person_page, request, person, self._jobs, str(error), given)
         if not trouble(person):
             self._jobs.add(person, kind)
         return to(request, "people", person.name, section=_SECTIONS[kind])
