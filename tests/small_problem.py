@@ -14,9 +14,10 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
-from kinertia.estimation.simultaneous.problem import COEFFICIENT_SD, CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.model.skeleton import Skeleton
@@ -34,6 +35,8 @@ CLOCK = SoundOrFaulty.certain(0.01)
 INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK)
 SWITCH_S = 0.1
 """When the right foot steps from one plate to another, without a flight."""
+NOISE_N = 0.7
+"""Of the plates, in the forces for joint moments."""
 LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
 
 
@@ -82,7 +85,7 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
     at_samples, at_frames = carriers
     impact = rng.normal(0.0, 5.0, wrench.shape)
     turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
-    reactions = GroundReactions(fine, wrench, at_samples, impact, None)
+    reactions = GroundReactions(fine, wrench, at_samples, impact, None, NOISE_N)
     middles = np.array([[0.2, 0.0, 0.1], [0.9, 0.0, -0.2], [1.5, 0.0, 0.3]])
     return FootPlates(loads, reactions, ("first", "second", "third"), at_frames, turn, middles)
 
@@ -167,8 +170,9 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
     left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
-    moved = (coefficients - _start(problem, k)) / COEFFICIENT_SD
-    return np.concatenate([errors, left[trial.dynamic].ravel(), moved.ravel()])
+    moved = coefficients - _start(problem, k)
+    tied = (moved / AWAY_SD).ravel(), (np.diff(moved, axis=0) / CHANGE_SD).ravel()
+    return np.concatenate([errors, left[trial.dynamic].ravel(), *tied])
 
 
 @lru_cache(maxsize=1)

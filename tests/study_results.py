@@ -41,7 +41,7 @@ ACCURACIES = {
         f"laboratory {name}",
         5,
         {each: ClassAccuracy(0.95, 0.01, 0.8, 0.01, 0.02, 0.008, 0.9) for each in CLASSES},
-        {joint: JointAccuracy(1.0, 1.1, 0.94, 2.0, 0.01, 0.02, 0.01, 0.02) for joint in JOINTS},
+        {joint: JointAccuracy(1.0, 1.1, 0.94, 0.95, 2.0, 0.01, 0.012, 0.96, 0.02, 0.01, 0.02) for joint in JOINTS},
         1.0,
     )
     for name in ("one", "two")

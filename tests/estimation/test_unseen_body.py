@@ -61,9 +61,9 @@ def test_joint_moments_of_the_legs_stay_within_their_deviations(fits, name):
     full, less = whole.trials[0], fit.trials[0]
     for coordinate in LEGS:
         i, j = (trial.skeleton.coordinates.index(coordinate) for trial in (full, less))
-        n = min(len(full.joint_load_sd), len(less.joint_load_sd))
+        n = min(len(full.deviations.moments), len(less.deviations.moments))
         apart = np.abs(full.joint_loads["estimate"][:n, i] - less.joint_loads["estimate"][:n, j])
-        sd = np.hypot(full.joint_load_sd[:n, i], less.joint_load_sd[:n, j])
+        sd = np.hypot(full.deviations.moments[:n, i], less.deviations.moments[:n, j])
         assert (apart < 2.0 * sd).mean() > 0.95, coordinate
     assert np.sqrt(np.square(less.residuals["estimate"][:, :3]).sum(axis=1).mean()) < 8.0
 

@@ -21,6 +21,9 @@ SWITCHED = """plot => {
 }"""
 """Name of the choice that shows a plot, and which of its answers; null for a plot that always shows."""
 
+SMALLEST_LETTERS_PX = 11
+POINTS_PER_PX = 0.75
+
 pytestmark = pytest.mark.slow
 
 
@@ -196,7 +199,9 @@ def panel_places(page):
 def test_print_draws_everything_in_the_width_of_the_paper(demo):
     demo.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     widths = demo.page.locator(".plot .main-svg").evaluate_all("drawn => drawn.map(svg => svg.clientWidth)")
-    assert set(widths) == {960}
+    assert set(widths) == {370, 580, 960}
+    beside = demo.page.locator(".overview .plot .main-svg").evaluate_all("all => all.map(svg => svg.clientWidth)")
+    assert set(beside) == {370, 580}, "body and changes share the width"
     assert demo.page.locator("details:not([open])").count() == 0
     demo.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
 
@@ -210,7 +215,12 @@ def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
     page.emulate_media(media="print")
     shown = page.locator("h2:visible, h3:visible").all_text_contents()
     headings = page.locator(".ident:visible").all_inner_texts()
+    scales = page.locator(".plot:visible").evaluate_all(
+        "plots => plots.map(plot => Number(getComputedStyle(plot).zoom))"
+    )
     page.emulate_media(media="null")
+    assert len(scales) == 3
+    assert min(scales) * SMALLEST_LETTERS_PX * POINTS_PER_PX > 5.5, "points, of the smallest letters"
     assert shown == [
         "Verdict",
         "What may be used",

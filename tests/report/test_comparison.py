@@ -36,12 +36,23 @@ def test_what_changed_beyond_its_error_bars_is_found(fit):
 
 
 def test_without_error_bars_nothing_is_called_changed(fit, two_level):
-    assert not any(one.changed for one in differences(fit, two_level))
-    assert remarks({"a": fit, "b": two_level}) == ["no error bars, so nothing is marked as changed: b (two-level)"]
+    assert {one.changed for one in differences(fit, two_level)} == {None}
+    assert set(comparison_columns({"a": fit, "b": two_level})["changed"]) == {None}
     page = render_comparison({"a": fit, "b": two_level})
     assert '<p class="headline">No error bars: differences only.</p>' in page, "neither pass nor caution"
     assert "<td>no</td>" not in page
     assert "<td>no</td>" in render_comparison({"a": fit, "again": fit})
+
+
+def test_error_bars_are_explained_where_there_are_any(fit, two_level):
+    explained = ("beyond 1.96 times its own deviation", "by more than the error bars say", "± sd")
+    without = Elements(render_comparison({"a": fit, "b": two_level})).text
+    assert not [words for words in explained if words in without]
+    assert "the two-level method gives no error bars, so nothing tells a change from chance: b" in without
+    both = Elements(render_comparison({"a": fit, "b": two_level, "c": fit})).text
+    assert all(words in both for words in explained)
+    (said,) = remarks({"a": two_level, "b": fit})
+    assert said.endswith("so nothing tells a change from chance: a, which all are compared with")
 
 
 @pytest.mark.parametrize("warnings", [(), ("a doubt",)])

@@ -57,6 +57,7 @@ def test_values_are_those_over_time(fit, cycles):
         np.testing.assert_allclose(angle.value[inside], np.degrees(over_time(trial.coordinates)), atol=0.2)
         sd = over_time(trial.moment_sd) / fit.subject.mass_kg
         np.testing.assert_allclose(moment.sd[inside], sd, rtol=1e-9)
+        np.testing.assert_allclose(angle.sd[inside], np.degrees(over_time(trial.coordinate_sd)), rtol=1e-9)
         assert np.array_equal(moment.value.notna(), inside)
         assert np.array_equal(angle.value.notna(), inside)
 

@@ -80,9 +80,13 @@ def test_coordinates_are_drawn_in_degrees_by_side(fit):
     trial, figure = fit.trials[0], figures_of(render(fit))["trial1-coordinates"]
     titles = [note["text"] for note in figure["layout"]["annotations"]]
     knee = titles.index("<b>Knee flexion + (degrees)</b>")
-    drawn = {trace["name"]: numbers(trace["y"]) for trace in figure["data"] if trace["xaxis"] == f"x{knee + 1}"}
-    for side, word in (("r", "right"), ("l", "left")):
+    panel = [trace for trace in figure["data"] if trace["xaxis"] == f"x{knee + 1}"]
+    drawn = {trace["name"]: numbers(trace["y"]) for trace in panel if "name" in trace}
+    lows = [numbers(trace["y"]) for trace in panel if "name" not in trace]
+    for low, side, word in zip(lows, "rl", ("right", "left"), strict=True):
         column = fit.skeleton.coordinates.index(f"knee_angle_{side}")
+        width = drawn[f"{word} 95 % band"] - low
+        np.testing.assert_allclose(width, 2 * 1.96 * np.degrees(trial.coordinate_sd[f"knee_angle_{side}"]), rtol=1e-3)
         np.testing.assert_allclose(drawn[f"{word}, estimate"], np.degrees(trial.motion.q[:, column]), atol=1e-4)
         ik = np.degrees(trial.kinematics.ik.q[:, column])
         measured = drawn[f"{word}, inverse kinematics"]
@@ -142,7 +146,7 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
     trial = fit.trials[0]
     mass = fit.literature.total_mass_kg
     assert trial.moment_sd is not None
-    plain = as_plotly(moment_figure(replace(trial, joint_load_sd=None), fit.skeleton, mass))
+    plain = as_plotly(moment_figure(replace(trial, deviations=None), fit.skeleton, mass))
     trace = next(t for t in plain.data if t.name == "right, estimate")
     np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
     assert not any("band" in (t.name or "") for t in plain.data)

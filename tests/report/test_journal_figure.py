@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.colors import to_hex
 
 from kinertia.errors import FileError, KinertiaError
 from kinertia.report.bsp_figures import change_figure
 from kinertia.report.cycle_figures import cycle_figure
-from kinertia.report.journal_figure import FIGURES, drawing
+from kinertia.report.journal_figure import FOR_PAPERS, drawing
+from kinertia.report.plots import FitFigures
 
 
 def panel(figure, title):
@@ -71,23 +73,34 @@ def test_a_figure_is_a_file(fit, tmp_path, ending, begin):
 @pytest.mark.slow
 def test_every_figure_is_drawn_with_and_without_error_bars(fit, two_level):
     for one in (fit, two_level):
-        for name, make in FIGURES.items():
-            drawn = drawing(make(one))
+        for name in FOR_PAPERS:
+            if name == "departures" and one is two_level:
+                continue
+            drawn = getattr(FitFigures(one, drawing), name)()
             assert all(axes.has_data() for axes in drawn.axes), name
             drawn.draw_without_rendering()
+
+
+@pytest.mark.parametrize("name", ["moments", "residuals", "bsp"])
+def test_the_legend_is_inside_the_figure(fit, name):
+    with rc_context({"font.size": 7}):
+        drawn = getattr(FitFigures(fit, drawing), name)()
+        drawn.draw_without_rendering()
+    (legend,) = drawn.legends
+    assert legend.get_window_extent().x1 < drawn.bbox.x1
 
 
 def test_without_strides_moments_are_over_time(fit, tmp_path):
     standing = replace(fit.trials[0])
     standing.__dict__["strides"] = ()
     still = replace(fit, trials=(standing,))
-    drawn = drawing(FIGURES["moments"](still))
+    drawn = FitFigures(still, drawing).moments()
     assert drawn.axes[0].get_xlabel() == "time (s)"
     assert any(isinstance(one, FillBetweenPolyCollection) for one in drawn.axes[0].collections), "95 % bands"
     for name in ("moments", "angles"):
-        (legend,) = drawing(FIGURES[name](still)).legends
+        (legend,) = getattr(FitFigures(still, drawing), name)().legends
         assert legend.get_title().get_text() == f"Trial {standing.name}"
-    (legend,) = drawing(FIGURES["moments"](fit)).legends
+    (legend,) = FitFigures(fit, drawing).moments().legends
     assert not legend.get_title().get_text()
     with pytest.raises(KinertiaError, match="no trial of this fit has a stride"):
         still.figure("powers", tmp_path / "powers.svg")
@@ -96,6 +109,12 @@ def test_without_strides_moments_are_over_time(fit, tmp_path):
 def test_what_cannot_be_drawn_is_told(fit, tmp_path, without):
     with pytest.raises(KinertiaError, match="no figure 'moment'; expected one of moments, angles"):
         fit.figure("moment", tmp_path / "a.svg")
+    with pytest.raises(KinertiaError, match=r"for the screen: fit\.plot\.skeleton\(\); in files, .* bsp, departures"):
+        fit.figure("skeleton", tmp_path / "a.svg")
+    with pytest.raises(KinertiaError, match="the figure 'bsp' is of all trials; one trial has moments"):
+        fit.figure("bsp", tmp_path / "a.svg", trial=fit.trials[0].name)
+    with pytest.raises(KinertiaError, match="no trial 'nowhere'"):
+        fit.figure("residuals", tmp_path / "a.svg", trial="nowhere")
     with pytest.raises(FileError, match=r"'\.docx' is no format of figures; expected one of \.svg"):
         fit.figure("moments", tmp_path / "a.docx")
     with pytest.raises(FileError, match=r"cannot be written: No such file"):

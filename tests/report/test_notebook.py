@@ -1,12 +1,10 @@
-"""What notebooks show of fits, trials and recordings, and that their pictures are those of the report."""
+"""What notebooks show of fits, trials and recordings."""
 
 import numpy as np
-import plotly.graph_objects as go
-import pytest
 
 from kinertia.report.headline import words
 from kinertia.trial.data import Markers, PlateLoads, Recording
-from report_page import Elements, figures_of
+from report_page import Elements
 
 
 def test_fit_trial_and_parameters_show_themselves(fit, two_level):
@@ -45,26 +43,3 @@ def test_recording_shows_itself():
     still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
     assert "1 frames" not in still
     assert "no force plates" in still
-
-
-@pytest.mark.slow
-def test_pictures_are_those_of_the_report(fit, page):
-    written = figures_of(page)
-    plot = fit.plot
-    for name, figure in (
-        ("trial1-residuals", plot.residuals()),
-        ("trial1-coordinates", plot.coordinates()),
-        ("trial1-moments", plot.moments()),
-        ("trial1-markers", plot.markers()),
-        ("bsp-change", plot.bsp()),
-        ("bsp-departure", plot.departures()),
-        ("body-mass", plot.body()),
-        ("body-information", plot.body("information")),
-        ("bsp-information", plot.information()),
-    ):
-        assert figure.to_json() == go.Figure(**written[name]).to_json(), name
-    assert isinstance(plot.skeleton(fit.trials[0].name), go.Figure)
-    assert len(plot.skeleton().frames) > 30
-    assert plot.gaps() is None or isinstance(plot.gaps(), go.Figure)
-    with pytest.raises(KeyError, match=fit.trials[0].name):
-        plot.residuals("nowhere")

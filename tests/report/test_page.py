@@ -13,6 +13,7 @@ import pytest
 
 from command_line import run
 from kinertia.checks.verdict import verdicts
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
@@ -293,7 +294,7 @@ def prolonged(trial, times):
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
         full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},
         joint_loads={stage: again(values) for stage, values in trial.joint_loads.items()},
-        joint_load_sd=again(trial.joint_load_sd),
+        deviations=CurveDeviations(*(again(each) for each in vars(trial.deviations).values())),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
     )
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from chromium import colour, playwright
+from chromium import Opened, colour, playwright
 
 pytestmark = pytest.mark.slow
 
@@ -16,6 +16,44 @@ def canvas(demo):
         "slider => { slider.value = 0; slider.dispatchEvent(new Event('input')); }"
     )
     return demo.page.locator("#motion-view canvas")
+
+
+BORDER = """canvas => {
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const drawn = (x, y) => {
+        const at = 4 * (y * canvas.width + x);
+        const [r, g, b] = data.slice(at, at + 3);
+        return data[at + 3] > 30 && !(r === g && g === b && r > 200);
+    };
+    let count = 0;
+    for (let x = 0; x < canvas.width; x++) count += drawn(x, 0) + drawn(x, canvas.height - 1);
+    for (let y = 0; y < canvas.height; y++) count += drawn(0, y) + drawn(canvas.width - 1, y);
+    return count;
+}"""
+"""Pixels of the canvas's edge that have a colour, as limbs and ellipsoids have; lines of the floor are pale grey."""
+
+
+@pytest.mark.parametrize(("width", "height"), [(340, 512), (576, 576), (900, 360), (260, 700)])
+def test_the_whole_body_is_in_view_from_every_side_that_has_a_key(browser, fit_of, width, height):
+    """Of somebody without markers on the head, whose ellipsoid is above them all."""
+    page = Opened(browser, fit_of("rajagopal").folder / "report.html").page
+    page.add_style_tag(content=f".view canvas {{ width: {width}px !important; height: {height}px !important; }}")
+    view = page.locator("#motion-view")
+    view.locator("[data-show=arrows]").uncheck()
+    canvas = view.locator("canvas")
+    page.wait_for_function(
+        "([canvas, wide]) => Math.abs(canvas.width - wide) < 4", arg=[canvas.element_handle(), width]
+    )
+    canvas.focus()
+    for key in "0123":
+        page.keyboard.press(key)
+        for share in (0, 0.3, 0.6, 1):
+            view.locator("input[type=range]").evaluate(
+                "(slider, share) => { slider.value = share * slider.max; slider.dispatchEvent(new Event('input')); }",
+                share,
+            )
+            assert canvas.evaluate(BORDER) == 0, (key, share)
+    page.close()
 
 
 def frame(canvas):

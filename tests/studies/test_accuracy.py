@@ -37,7 +37,9 @@ def made_up(scale: float, seed: int = 0) -> Draw:
     prior = np.full((12, 10), 2.0)
     sd = np.tile([0.5, 1.2, 1.9, 1.0, 1.0, 1.0, 1.0, 1.9, 1.9, 1.9], (12, 1))
     shares = dict.fromkeys(CLASSES, 0.8)
-    joints = dict.fromkeys(JOINTS, JointErrors(4.0, 9.0, 0.9, (25.0, 16.0, 36.0), 0.01, 0.04, 0.0025, 0.09))
+    joints = dict.fromkeys(
+        JOINTS, JointErrors(4.0, 9.0, 0.9, 0.8, (25.0, 16.0, 36.0), 0.01, 0.0225, 0.7, 0.04, 0.0025, 0.09)
+    )
     return Draw(scale * rng.normal(0.0, sd), rng.normal(0.0, prior), prior, sd, sd, shares, joints, True)
 
 
@@ -53,6 +55,7 @@ def test_summary_knows_error_bars_that_hold_from_those_that_do_not():
     assert good.classes["mass"].better > 0.99
     knee = good.joints["knee"]
     assert (knee.moment_nm, knee.moment_sd_nm, knee.coverage, knee.usual_nm) == pytest.approx((2.0, 3.0, 0.9, 4.0))
+    assert (knee.angle_sd_rad, knee.angle_coverage, knee.power_coverage) == pytest.approx((0.15, 0.7, 0.8))
     angles = (knee.angle_rad, knee.angle_ik_rad, knee.change_rad, knee.change_ik_rad)
     assert angles == pytest.approx((0.1, 0.2, 0.05, 0.3))
 

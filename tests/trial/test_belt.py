@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.errors import FileError
 from kinertia.io.belt_file import read_belt
 from kinertia.trial.belt import Belt
 from kinertia.trial.foot_ways import belt_doubts, foot_ways
@@ -63,6 +64,32 @@ def test_files(tmp_path, kind):
     belt = read_belt(path)
     assert belt.way_m(0.0, 2.0) == pytest.approx(3.0)
     assert belt.velocity(np.array([1.0, 9.0]), np.array([0.0, 0.0, -3.0])).tolist() == [[0, 0, -1.5], [0, 0, -2]]
+
+
+@pytest.mark.parametrize("kind", ["csv", "mot"])
+def test_files_of_two_belts(tmp_path, kind):
+    path = tmp_path / f"speeds.{kind}"
+    if kind == "mot":
+        rows = "time\tbelt_speed_left\tbelt_speed_right\n0\t0.5\t1\n2\t0.5\t2\n"
+        path.write_text(f"grf\nnRows=2\nnColumns=3\nendheader\n{rows}")
+    else:
+        path.write_text("left_m_s;time_s;right_m_s\n0,5;0;1,0\n0,5;2;2,0\n")
+    belt = read_belt(path)
+    assert [belt.under(foot).way_m(0.0, 2.0) for foot in range(2)] == pytest.approx([3.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.csv", "time_s,right_m_s\n0,1\n", "lacks the column speed_m_s; found time_s, right_m_s; expected a row per"),
+        ("a.csv", "time_s,right_m_s,left_m_s\n0,1,50\n", "speeds from 1 to 50; expected 0 to 15 m/s"),
+        ("a.mot", "grf\nendheader\ntime\tbelt_speed_left\n0\t1\n1\t1\n", "nor belt_speed_right and belt_speed_left"),
+    ],
+)
+def test_files_without_speeds(tmp_path, name, text, words):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(FileError, match=words):
+        read_belt(tmp_path / name)
 
 
 def test_a_constant():

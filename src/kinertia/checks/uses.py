@@ -70,7 +70,7 @@ def _moments(fit: Fit) -> Use:
         for part in (slice(0, 3), slice(3, 6))
     )
     reason = f"residual at most {force:.1f} N and {moment:.1f} N m (RMS)"
-    sds = [trial.joint_load_sd[:, 6:] for trial in fit.trials if trial.joint_load_sd is not None]
+    sds = [trial.deviations.moments[:, 6:] for trial in fit.trials if trial.deviations is not None]
     turns = fit.skeleton.rotational[6:]
     if sds and turns.any():
         half = _BAND_SD * rms(np.concatenate(sds)[:, turns]) / fit.mass_kg
@@ -88,6 +88,11 @@ def _motion(fit: Fit) -> Use:
     verdicts = [verdict_of_markers(fit, trial) for trial in fit.trials]
     apart = 1e3 * max(rms(trial.marker_errors_m["final"]) for trial in fit.trials)
     reason = f"model and measured markers are at most {apart:.1f} mm apart (RMS)"
+    sds = [trial.deviations.coordinates[:, 6:] for trial in fit.trials if trial.deviations is not None]
+    turns = fit.skeleton.rotational[6:]
+    if sds and turns.any():
+        half = np.degrees(_BAND_SD * rms(np.concatenate(sds)[:, turns]))
+        reason += f"; 95 % of the joint angles lie within ± {half:.1f} degrees"
     return Use("motion", _with_convergence(fit, verdicts), reason if fit.converged else _NOT_CONVERGED)
 
 

@@ -10,6 +10,9 @@ import io
 import sys
 from importlib.metadata import version
 
+_NEW_OBJECTS = 100_000
+"""After so many more than were freed, garbage is looked for: a fit makes arrays, which are few and large."""
+
 
 def main() -> None:
     """Run the command line on the arguments of this process."""
@@ -24,5 +27,6 @@ def main() -> None:
 
     app = application_for(given)
     gc.freeze()
+    gc.set_threshold(_NEW_OBJECTS)
     gc.enable()
     run(app, given)

@@ -11,10 +11,11 @@ from functools import partial
 from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.model.sides import by_side
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.model.splines import not_a_knot
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
@@ -60,8 +61,8 @@ class Estimated(Protocol):
         """Per stage (w, c), N m."""
 
     @property
-    def joint_load_sd(self) -> np.ndarray | None:
-        """(w, c), if there is any."""
+    def deviations(self) -> CurveDeviations | None:
+        """Of its curves, if there are any."""
 
     @property
     def strides(self) -> tuple[Stride, ...]:
@@ -78,8 +79,7 @@ class CycleCurve:
         kind: "angle" (deg), "moment" (N m/kg, internal), "power" (W/kg) or "force" (ground reaction, % body weight).
         quantity: "hip_flexion_angle", "knee_angle_moment", ..., "ground_force_upward".
         value: (101,) at 0, 1, ..., 100 %; NaN where nothing was measured.
-        sd: (101,) standard deviation of the estimate; None where there is none. That of a power is the moment's times
-            the speed of the joint.
+        sd: (101,) standard deviation of the estimate; NaN where there is none.
     """
 
     trial: str
@@ -87,7 +87,7 @@ class CycleCurve:
     kind: Kind
     quantity: str
     value: np.ndarray
-    sd: np.ndarray | None
+    sd: np.ndarray
 
 
 def cycle_curves(
@@ -109,22 +109,26 @@ def cycle_curves(
     paths = travelled(feet_under_pelvis(skeleton, trial.kinematics), chosen, trial.kinematics.trial.belt)
     for stride, path in zip(chosen, paths, strict=True):
         time, curve = stride.time, partial(CycleCurve, trial.name, stride)
-        angle, speed, moment, spread = source.angle(time), source.speed(time), source.moment(time), source.sd(time)
-        moment, spread = moment / mass_kg, None if spread is None else spread / mass_kg
-        curves = []
+        angle, speed, moment = source.angle(time), source.speed(time), source.moment(time) / mass_kg
+        sd = source.deviations(time)
+        by_kind: dict[Kind, tuple[np.ndarray, np.ndarray]] = {
+            "angle": (np.degrees(angle), np.degrees(sd.coordinates)),
+            "moment": (moment, sd.moments / mass_kg),
+            "power": (moment * speed, sd.powers / mass_kg),
+        }
+        curves: list[CycleCurve] = []
         for base, columns in sides.items():
             column = columns.get(stride.side, columns.get(""))
             if column is None or not skeleton.rotational[column]:
                 continue
-            curves.append(curve("angle", f"{base}_angle", np.degrees(angle[:, column]), None))
-            if column >= _ROOT_COORDINATES:
-                sd = None if spread is None else spread[:, column]
-                power_sd = None if sd is None else sd * np.abs(speed[:, column])
-                curves.append(curve("moment", f"{base}_moment", moment[:, column], sd))
-                curves.append(curve("power", f"{base}_power", moment[:, column] * speed[:, column], power_sd))
-        ground = source.force(time)[:, FEET.index(stride.side)] @ _directions(path, stride.side).T
-        share = 100.0 * ground / (mass_kg * GRAVITY_M_S2)
-        curves += [curve("force", name, values, None) for name, values in zip(FORCES, share.T, strict=True)]
+            for kind, (values, own_sd) in by_kind.items():
+                if kind == "angle" or column >= _ROOT_COORDINATES:
+                    curves.append(curve(kind, f"{base}_{kind}", values[:, column], own_sd[:, column]))
+        foot, directions = FEET.index(stride.side), _directions(path, stride.side)
+        share = 100.0 / (mass_kg * GRAVITY_M_S2)
+        ground = share * source.force(time)[:, foot] @ directions.T
+        ground_sd = share * np.sqrt(np.square(sd.ground_forces[:, foot]) @ np.square(directions).T)
+        curves += [curve("force", *each) for each in zip(FORCES, ground.T, ground_sd.T, strict=True)]
         yield from (one for one in curves if np.isfinite(one.value).any())
 
 
@@ -140,12 +144,12 @@ class _Source:
 
     def __init__(self, trial: Estimated, stage: Stage) -> None:
         self.kinematics, self.stage = trial.kinematics, stage
-        self.reactions = trial.reactions if stage == "estimate" else measured_reactions(trial.kinematics)
+        self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(trial.kinematics)
         own, parts = trial.kinematics.time, trial.kinematics.stretches
         self.motion = [interpolate(own[part], trial.motion.q[part]) for part in parts]
-        self.loads = self._by_stretch(partial(make_interp_spline, k=3), trial.joint_loads[stage])
-        spread = trial.joint_load_sd if stage == "estimate" else None
-        self.spread = None if spread is None else self._by_stretch(partial(make_interp_spline, k=1), spread)
+        self.loads = self._by_stretch(partial(not_a_knot, k=3), trial.joint_loads[stage])
+        spread, linear = trial.deviations if stage == "estimate" else None, partial(not_a_knot, k=1)
+        self.spread = None if spread is None else [self._by_stretch(linear, each) for each in vars(spread).values()]
 
     def angle(self, time: np.ndarray) -> np.ndarray:
         """(n, c) coordinates; those of the usual pipeline wherever inverse kinematics knew them."""
@@ -159,9 +163,11 @@ class _Source:
         """(n, c) joint loads."""
         return self._measured(time, self.loads)
 
-    def sd(self, time: np.ndarray) -> np.ndarray | None:
-        """(n, c) their standard deviations."""
-        return None if self.spread is None else self._measured(time, self.spread)
+    def deviations(self, time: np.ndarray) -> CurveDeviations:
+        """Standard deviations of all that; NaN where there are none."""
+        if self.spread is None:
+            return CurveDeviations.filled(len(time), len(self.kinematics.ik.coordinates), np.nan)
+        return CurveDeviations(*(self._measured(time, each) for each in self.spread))
 
     def force(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 3) N on right and left foot."""
@@ -183,11 +189,13 @@ class _Source:
     def _measured(self, time: np.ndarray, curves: Sequence[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
         """Values at these times of each stretch's curve; NaN outside."""
         windows = self.kinematics.windows_s
-        result: np.ndarray = np.full_like(curves[0](np.clip(time, *windows[0])), np.nan)
-        for window, curve in zip(windows, curves, strict=True):
-            here = inside(time, [window])
-            if here.any():
-                result[here] = curve(np.clip(time[here], *window))
+        places = [inside(time, [window]) for window in windows]
+        values = [
+            curve(np.clip(time[here], *window)) for here, window, curve in zip(places, windows, curves, strict=True)
+        ]
+        result = np.full((len(time), *values[0].shape[1:]), np.nan)
+        for here, own in zip(places, values, strict=True):
+            result[here] = own
         return result
 
 
@@ -201,7 +209,6 @@ def cycle_columns(
         for one in cycle_curves(trial, mass_kg, stage, spread_evenly(trial.strides, most_strides))
     ]
     samples = len(PERCENT)
-    unknown = np.full(samples, np.nan)
     return {
         "trial": [one.trial for one in curves for _ in range(samples)],
         "side": [one.stride.side for one in curves for _ in range(samples)],
@@ -209,7 +216,7 @@ def cycle_columns(
         "percent": np.tile(PERCENT, len(curves)).astype(int),
         "quantity": [one.quantity for one in curves for _ in range(samples)],
         "value": np.concatenate([one.value for one in curves]) if curves else np.zeros(0),
-        "sd": np.concatenate([unknown if one.sd is None else one.sd for one in curves]) if curves else np.zeros(0),
+        "sd": np.concatenate([one.sd for one in curves]) if curves else np.zeros(0),
     }
 
 

@@ -11,12 +11,13 @@ import numpy as np
 from kinertia.estimation.attached import with_attached
 from kinertia.estimation.forces_used import forces_used
 from kinertia.estimation.free_moment_sign import free_moment_sign_warnings
+from kinertia.estimation.mirrored_free_moments import mirrored_free_moments_warning
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
-from kinertia.estimation.simultaneous.instrument_warnings import MIRRORED_FREE_MOMENTS
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.simultaneous.unseen_turn import unseen_turn_note
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
@@ -114,13 +115,11 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
-    signs = list(free_moment_sign_warnings(outcome.trials))
     warnings = (
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
-        *signs,
-        # free moments of the wrong sign are mirror images of what they should be
-        *(sentence for sentence in outcome.warnings if not signs or not sentence.startswith(MIRRORED_FREE_MOMENTS)),
+        *_free_moment_warnings(outcome),
+        *outcome.warnings,
         *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),
         *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
     )
@@ -142,6 +141,14 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         ),
         file=ready.file,
     )
+
+
+def _free_moment_warnings(outcome: _Outcome) -> list[str]:
+    """Free moments of the wrong sign are off like mirror images, too."""
+    signs = list(free_moment_sign_warnings(outcome.trials))
+    if signs or outcome.posterior is None:
+        return signs
+    return list(filter(None, [mirrored_free_moments_warning(outcome.posterior.calibration)]))
 
 
 def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
@@ -223,13 +230,11 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         bandwidths,
         fitted.foot_loads,
         result.reactions,
-        result.moment_sd,
+        result.curve_deviations,
     )
     estimates = [
-        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), moment_sd)
-        for skeleton, motion, course, bandwidth, loads, reactions, moment_sd, k in zip(
-            *parts, ready.kinematics, strict=True
-        )
+        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), sd)
+        for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
     return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)
@@ -246,7 +251,7 @@ class _Estimated:
         motion_hz: bandwidth of the motion.
         foot_loads: (w, 2, 6) of the motion's bandwidth.
         reactions, before: for the joint moments after and before the estimate.
-        moment_sd: (w, c) of the joint moments, or None.
+        deviations: of the curves, or None.
     """
 
     skeleton: Skeleton
@@ -256,7 +261,7 @@ class _Estimated:
     foot_loads: np.ndarray
     reactions: GroundReactions
     before: GroundReactions
-    moment_sd: np.ndarray | None
+    deviations: CurveDeviations | None
 
 
 def _trial_fits(
@@ -306,7 +311,7 @@ def _trial_fit(
             "literature": inverse_dynamics(before, literature, k.motion, measured),
             "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
-        joint_load_sd=after.moment_sd,
+        deviations=after.deviations,
         marker_errors_m={
             "ik": _of_worn(k, k.ik.errors_m[k.frames]),
             "final": _marker_errors(after.skeleton, k, after.motion),

@@ -14,6 +14,7 @@ from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
@@ -32,47 +33,59 @@ if TYPE_CHECKING:
 
 
 class FitPictures(Protocol):
-    """Plotly figures of a fit. Those of one trial take its name; left out, it is the first.
+    """Plotly figures of a fit; `Fit.figure` draws those of them that are for papers by the same names.
+
+    Those over time are of one trial; its name left out, of the first.
 
     Raises:
-        KeyError: there is no trial of this name; names those there are.
+        KinertiaError: no such trial, no strides or error bars to draw from (says which figure there is in its place),
+            or plotly (the extra `plots`) is missing.
     """
 
-    def residuals(self, trial: str | None = None) -> Figure:
-        """Root residual force and moment over time, stage by stage."""
-
-    def coordinates(self, trial: str | None = None) -> Figure:
-        """Every coordinate by inverse kinematics and as estimated."""
-
     def moments(self, trial: str | None = None) -> Figure:
-        """Joint moments per body mass, before against estimate."""
+        """Joint moments over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
 
-    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure | None:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides.
+    def angles(self, trial: str | None = None) -> Figure:
+        """Joint angles over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
+
+    def powers(self) -> Figure:
+        """Joint powers over the gait cycle."""
+
+    def forces(self) -> Figure:
+        """Ground reactions over the gait cycle."""
+
+    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle, in front of norms.
 
         `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
         """
 
-    def markers(self, trial: str | None = None) -> Figure:
-        """Distance between every measured and modelled marker."""
+    def coordinates(self, trial: str | None = None) -> Figure:
+        """Every coordinate over time, by inverse kinematics and as estimated."""
 
-    def gaps(self, trial: str | None = None) -> Figure | None:
-        """When markers were not seen; None where all always were."""
-
-    def skeleton(self, trial: str | None = None) -> Figure:
-        """The skeleton in motion, with markers, centres of mass and ground reactions."""
-
-    def body(self, shown: Literal["mass", "information"] = "mass") -> Figure | None:
-        """The body, coloured by change of mass or by what the data say of it ("information"; None after two-level)."""
+    def residuals(self, trial: str | None = None) -> Figure:
+        """Root residual force and moment over time, stage by stage."""
 
     def bsp(self) -> Figure:
         """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
 
-    def departures(self) -> Figure | None:
-        """The same in prior SDs; None after two-level."""
+    def departures(self) -> Figure:
+        """The same in prior SDs; not after two-level."""
 
-    def information(self) -> Figure | None:
-        """What the data say about each parameter; None after two-level."""
+    def information(self) -> Figure:
+        """What the data say about each parameter; not after two-level."""
+
+    def body(self, shown: Literal["mass", "information"] = "mass") -> Figure:
+        """The body, coloured by change of mass or by what the data say of it ("information"; not after two-level)."""
+
+    def markers(self, trial: str | None = None) -> Figure:
+        """Distance between every measured and modelled marker."""
+
+    def gaps(self, trial: str | None = None) -> Figure:
+        """When markers were not seen; a sentence where all always were."""
+
+    def skeleton(self, trial: str | None = None) -> Figure:
+        """The skeleton in motion, with markers, centres of mass and ground reactions."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,7 +110,8 @@ class TrialFit:
         joint_loads: joint inverse dynamics (w, c: N m, N of translations) per stage: "literature" (with forces as
             measured), "estimate" (with `reactions`); of the two-level estimate both with forces of the motion's
             bandwidth. `moments` has them as tables.
-        joint_load_sd: posterior deviations of those of the estimate; None after two-level. `moment_sd` as a table.
+        deviations: posterior standard deviations of the estimate's curves; None after two-level. `coordinate_sd` and
+            `moment_sd` are tables of them.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
 
@@ -115,7 +129,7 @@ class TrialFit:
     residuals: Mapping[str, np.ndarray]
     full_residuals: Mapping[str, np.ndarray]
     joint_loads: Mapping[str, np.ndarray]
-    joint_load_sd: np.ndarray | None
+    deviations: CurveDeviations | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
     course: np.ndarray | None = None
@@ -136,6 +150,11 @@ class TrialFit:
         return by_coordinate(self.kinematics, self.motion.q)
 
     @cached_property
+    def coordinate_sd(self) -> pd.DataFrame | None:
+        """Their posterior deviations, in the same form; None after two-level."""
+        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.coordinates)
+
+    @cached_property
     def strides(self) -> tuple[Stride, ...]:
         """Strides of the whole trial, by plates where they saw the foot land, else by the motion; none in squats."""
         return strides_of(self.skeleton, self.kinematics)
@@ -147,8 +166,8 @@ class TrialFit:
 
     @cached_property
     def moment_sd(self) -> pd.DataFrame | None:
-        """`joint_load_sd` in the same form."""
-        return None if self.joint_load_sd is None else by_coordinate(self.kinematics, self.joint_load_sd)
+        """Posterior deviations of those of the estimate, in the same form; None after two-level."""
+        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.moments)
 
     def __repr__(self) -> str:
         """Name, time and size: all its arrays would fill pages."""
@@ -231,7 +250,7 @@ class Fit:
         quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle
         grows), "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward",
         "..._medial" (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value`
-        is NaN. `sd` is the posterior deviation of moments, and of powers as far as the moment makes it.
+        is NaN. `sd` is the posterior deviation.
 
         Args:
             stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.
@@ -284,19 +303,21 @@ class Fit:
         """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
         return display.save(self, folder)
 
-    def figure(self, name: str, path: str | Path) -> Path:
+    def figure(self, name: str, path: str | Path, trial: str | None = None) -> Path:
         """Draw a figure for a paper into a file: 180 mm wide, three panels in a row; returns the file.
 
         Args:
-            name: "moments", "angles", "powers" or "forces" over the gait cycle (moments and angles without strides over
-                time, of the first trial), or "bsp": changes of body segment parameters.
+            name: as in `plot`: "moments", "angles", "powers", "forces", "cycles", "coordinates", "residuals", "bsp" or
+                "departures".
             path: .svg, .pdf, .eps, .png or .tif.
+            trial: of moments, angles, coordinates and residuals: this trial's, over time.
 
         Raises:
-            KinertiaError: no such figure, no strides to draw it from, or matplotlib (the extra `plots`) is missing.
+            KinertiaError: no such figure or trial, no strides or error bars to draw it from, or matplotlib (the extra
+                `plots`) is missing.
             FileError: a format that is not known, or the file cannot be written.
         """
-        return display.figure(self, name, path)
+        return display.figure(self, name, path, trial)
 
     @property
     def covariance(self) -> pd.DataFrame | None:
@@ -330,7 +351,7 @@ class Fit:
 
     @property
     def plot(self) -> FitPictures:
-        """Pictures for a notebook: `fit.plot.residuals()`, `.bsp()`, `.coordinates()`, `.skeleton()` and others."""
+        """Pictures for a notebook: `fit.plot.moments()`, `.bsp()`, `.residuals()`, `.skeleton()` and others."""
         pictures: FitPictures = display.pictures(self)
         return pictures
 

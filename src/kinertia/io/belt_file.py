@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.csv_file import read_csv
+from kinertia.io.csv_file import has_columns, read_csv
 from kinertia.io.sto import read_table
 from kinertia.trial.belt import Belt
 
-COLUMNS = ("time_s", "speed_m_s")
-_COLUMN = "belt_speed"
+_ONE_CSV, _TWO_CSV = ("speed_m_s",), ("right_m_s", "left_m_s")
+_ONE, _TWO = ("belt_speed",), ("belt_speed_right", "belt_speed_left")
 _FASTEST_M_S = 15.0
 
 
@@ -20,10 +20,11 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
     """The speed of a treadmill's belt as a subject file states it: m/s, of two belts that under the right foot and that
     under the left, or a file with it over the markers' time.
 
-    CSV has the columns `time_s` and `speed_m_s`; MOT and STO, which may be the force file, a column `belt_speed`.
+    CSV has the columns `time_s` and `speed_m_s`, of two belts `time_s`, `right_m_s` and `left_m_s`; MOT and STO, which
+    may be the force file, a column `belt_speed`, of two belts `belt_speed_right` and `belt_speed_left`.
 
     Raises:
-        FileError: the file is missing or broken, lacks the column, time does not grow, or a speed is no
+        FileError: the file is missing or broken, lacks the columns, time does not grow, or a speed is no
             treadmill's.
     """
     if stated is None:
@@ -31,15 +32,7 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
     if isinstance(stated, float | tuple):
         return Belt(np.zeros(1), np.array([stated]))
     path = stated
-    if path.suffix.lower() in (".mot", ".sto"):
-        table = read_table(path)
-        if _COLUMN not in table.labels:
-            found = ", ".join(table.labels)
-            raise FileError(path, f"has no column {_COLUMN} with the speed of the belt in m/s; found {found}")
-        time, speed = table.time, table.columns([_COLUMN])[:, 0]
-    else:
-        rows = read_csv(path, COLUMNS, "a row per time: " + ",".join(COLUMNS))
-        time, speed = np.array([[row.number(name) for name in COLUMNS] for row in rows]).T
+    time, speed = _from_table(path) if path.suffix.lower() in (".mot", ".sto") else _from_csv(path)
     if not (np.isfinite(speed).all() and (np.diff(time) > 0).all()):
         raise FileError(path, "expected times that grow and a speed at each of them")
     if speed.min() < 0 or speed.max() > _FASTEST_M_S:
@@ -47,3 +40,25 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
             path, f"speeds from {speed.min():g} to {speed.max():g}; expected 0 to {_FASTEST_M_S:g} m/s of a treadmill"
         )
     return Belt(time, speed)
+
+
+def _from_table(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Times, and one speed or those under right and left foot."""
+    table = read_table(path)
+    names = next((names for names in (_ONE, _TWO) if set(names) <= set(table.labels)), None)
+    if names is None:
+        found = ", ".join(table.labels)
+        expected = f"no column {_ONE[0]} with the speed of the belt in m/s, nor {' and '.join(_TWO)} for two belts"
+        raise FileError(path, f"has {expected}; found {found}")
+    return table.time, _one_or_two(table.columns(list(names)))
+
+
+def _from_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    names = ("time_s", *(_TWO_CSV if has_columns(path, _TWO_CSV) else _ONE_CSV))
+    expected = f"a row per time: {','.join(('time_s', *_ONE_CSV))}, of two belts {','.join(('time_s', *_TWO_CSV))}"
+    rows = np.array([[row.number(name) for name in names] for row in read_csv(path, names, expected)])
+    return rows[:, 0], _one_or_two(rows[:, 1:])
+
+
+def _one_or_two(speeds: np.ndarray) -> np.ndarray:
+    return speeds[:, 0] if speeds.shape[1] == 1 else speeds

@@ -67,12 +67,25 @@ def read_rows(
     kept = [(number, line.rstrip()) for number, line in enumerate(lines[first_line - 1 :], start=first_line)]
     kept = [(number, line) for number, line in kept if line]
     numbers = [number for number, _ in kept]
-    rows = [_row(path, number, line, columns, may_be_short) for number, line in kept]
-    values = np.array(rows, dtype=float).reshape(len(rows), columns)
+    values = _complete([line for _, line in kept], columns)
+    if values is None:
+        rows = [_row(path, number, line, columns, may_be_short) for number, line in kept]
+        values = np.array(rows, dtype=float).reshape(len(rows), columns)
     if np.isinf(values).any():
         row_index, column_index = np.argwhere(np.isinf(values))[0]
         raise FileError(path, f"infinite value in column {column_index + 1}; expected a number", numbers[row_index])
     return values, numbers
+
+
+def _complete(lines: list[str], columns: int) -> FloatArray | None:
+    """The numbers of rows that have all their cells and nothing else in them; None if there is a row that has not."""
+    if not lines:
+        return None
+    try:
+        values = np.loadtxt(lines, comments=None, delimiter="\t" if "\t" in lines[0] else None, ndmin=2)
+    except ValueError:
+        return None
+    return values if values.shape[1] == columns else None
 
 
 def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -> list[float]:

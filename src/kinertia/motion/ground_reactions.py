@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.ndimage import gaussian_filter1d
 
+from kinertia.model.splines import BSpline, natural
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.moving_mean import gaussian_mean
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
@@ -52,6 +52,8 @@ class GroundReactions:
         impact: (k, 2, 6) what motion cannot follow, whether it was taken off or not: joint moments are that uncertain
             for lack of the acceleration that goes with it.
         cutoff_hz: low pass of the forces; None: as the plates gave them.
+        noise_n: deviation of the plates' noise that is left in the forces.
+        without_impact: whether the impact was taken off `wrench`.
     """
 
     time: np.ndarray
@@ -59,6 +61,15 @@ class GroundReactions:
     carrier: np.ndarray
     impact: np.ndarray
     cutoff_hz: float | None
+    noise_n: float = 0.0
+    without_impact: bool = False
+
+    @property
+    def whole(self) -> GroundReactions:
+        """The same with the impact: what pushes against the foot, whether the motion can follow it or not."""
+        if not self.without_impact:
+            return self
+        return replace(self, wrench=self.wrench + self.impact, without_impact=False)
 
     @property
     def impact_n(self) -> float:
@@ -79,7 +90,7 @@ class GroundReactions:
         """(n, 2, 6) loads at these times: natural cubic splines of force, point and torque, as OpenSim's tools lay them
         through the columns of the file that is written of them.
         """
-        return np.concatenate([self._at(time[some]) for some in pieces(len(time))])
+        return np.concatenate([np.empty((0, 2, 6)), *(self._at(time[some]) for some in pieces(len(time)))])
 
     def rate(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) derivative of `at` by time, N/s and N m/s."""
@@ -101,7 +112,7 @@ class GroundReactions:
         first, last = np.searchsorted(self.time, (time.min(), time.max()))
         near = slice(max(int(first) - _FORGOTTEN, 0), int(last) + _FORGOTTEN)
         columns = np.stack([self.wrench[near, :, :3], self.point[near], self._torque(near)], axis=2)
-        return make_interp_spline(self.time[near], columns, k=3, bc_type="natural")
+        return natural(self.time[near], columns, 3)
 
     def _torque(self, samples: slice) -> np.ndarray:
         wrench = self.wrench[samples]
@@ -120,10 +131,15 @@ def measured_reactions(kinematics: Kinematics) -> GroundReactions:
     rate_hz = (len(time) - 1) / (time[-1] - time[0])
     cutoff_hz = None
     if loads.noise_n > NOISE_LEFT_N:
-        # white noise of deviation s, cut off at f, keeps s sqrt(2 f / rate)
         cutoff_hz = float(max(rate_hz / 2.0 * (NOISE_LEFT_N / loads.noise_n) ** 2, kinematics.cutoff_hz))
         wrench = _low_passed(time, wrench, cutoff_hz)
-    return GroundReactions(time, wrench, loads.carrier[near], np.zeros(wrench.shape), cutoff_hz)
+    noise_n = _noise_left(loads.noise_n, rate_hz, cutoff_hz)
+    return GroundReactions(time, wrench, loads.carrier[near], np.zeros(wrench.shape), cutoff_hz, noise_n)
+
+
+def _noise_left(noise_n: float, rate_hz: float, cutoff_hz: float | None) -> float:
+    """White noise of deviation s, cut off at f, keeps s sqrt(2 f / rate)."""
+    return noise_n if cutoff_hz is None else noise_n * float(np.sqrt(min(2.0 * cutoff_hz / rate_hz, 1.0)))
 
 
 def ground_reactions(kinematics: Kinematics, motion_hz: float, wanted: ForceCutoff = "auto") -> GroundReactions:
@@ -137,9 +153,13 @@ def ground_reactions(kinematics: Kinematics, motion_hz: float, wanted: ForceCuto
     measured = measured_reactions(kinematics)
     if not isinstance(wanted, str):
         loads, near = kinematics.trial.loads, kinematics.near_window
-        return replace(measured, wrench=_low_passed(measured.time, loads.wrench[near], wanted), cutoff_hz=wanted)
+        wrench, time = _low_passed(measured.time, loads.wrench[near], wanted), measured.time
+        noise_n = _noise_left(loads.noise_n, (len(time) - 1) / (time[-1] - time[0]), wanted)
+        return replace(measured, wrench=wrench, cutoff_hz=wanted, noise_n=noise_n)
     impact = _impact(measured, motion_hz, kinematics.inside(measured.time))
-    return replace(measured, wrench=measured.wrench - (impact if wanted == "auto" else 0.0), impact=impact)
+    if wanted == "none":
+        return replace(measured, impact=impact)
+    return replace(measured, wrench=measured.wrench - impact, impact=impact, without_impact=True)
 
 
 def _low_passed(time: np.ndarray, wrench: np.ndarray, cutoff_hz: float) -> np.ndarray:
@@ -173,5 +193,4 @@ def _points(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
     """Mean over about half a period of the motion's cutoff."""
-    result: np.ndarray = gaussian_filter1d(values, 0.25 / motion_hz / step_s, axis=0, mode="nearest")
-    return result
+    return gaussian_mean(values, 0.25 / motion_hz / step_s)

@@ -41,11 +41,12 @@ def _better(accuracy: ClassAccuracy) -> str:
     return text if np.isnan(accuracy.attainable) else f"{text} ({100 * accuracy.attainable:.0f} %)"
 
 
-JOINT_HEADINGS = ("", "N m", "usual", "ratio", "sd (coverage)", "deg", "IK", "varying", "IK")
+JOINT_HEADINGS = ("", "N m", "usual", "ratio", "sd (coverage)", "W", "deg", "IK", "sd (coverage)", "varying", "IK")
 JOINT_CAPTION = (
     "RMS errors of joint moments (N m) and joint angles (degrees) of the estimate. usual: inverse kinematics, "
     "literature BSPs, forces as measured, the best of 6, 10 and 12 Hz per joint; sd (coverage): sd reported, and how "
-    "often the truth lies in the 95 % interval; varying: without each angle's constant error."
+    "often the truth lies in the 95 % interval; W: the same of joint powers; varying: without each angle's constant "
+    "error."
 )
 """What stands under a table of `joint_rows`."""
 
@@ -61,7 +62,9 @@ def joint_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
             f"{accuracy.moment_nm / accuracy.usual_nm:.2f}",
         ]
         deviation = f"{accuracy.moment_sd_nm:.2f} ({100 * accuracy.coverage:.0f} %)"
-        rows.append([joint, *moments, deviation, *(f"{np.degrees(angle):.2f}" for angle in angles)])
+        shown = [f"{np.degrees(angle):.2f}" for angle in angles]
+        shown.insert(2, f"{np.degrees(accuracy.angle_sd_rad):.2f} ({100 * accuracy.angle_coverage:.0f} %)")
+        rows.append([joint, *moments, deviation, f"{100 * accuracy.power_coverage:.0f} %", *shown])
     return rows
 
 

@@ -58,9 +58,9 @@ class Difference:
         return self.other - self.first
 
     @property
-    def changed(self) -> bool:
-        """Whether they differ beyond the error bars."""
-        return bool(self.sd > 0 and abs(self.change) > CHANGED_SD * self.sd)
+    def changed(self) -> bool | None:
+        """Whether they differ beyond the error bars; None without them."""
+        return None if np.isnan(self.sd) else bool(self.sd > 0 and abs(self.change) > CHANGED_SD * self.sd)
 
 
 def differences(first: Fit, other: Fit) -> list[Difference]:
@@ -80,7 +80,7 @@ def differences(first: Fit, other: Fit) -> list[Difference]:
 
 def judged(compared: Sequence[Difference]) -> bool:
     """Whether there are error bars to tell a change by."""
-    return any(np.isfinite(one.sd) for one in compared)
+    return any(one.changed is not None for one in compared)
 
 
 def _sd(fit: Fit) -> np.ndarray:
@@ -101,7 +101,8 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
             said.append(f"{name} and {other_name} are of different models: their joint axes and segments differ")
     without = [one for one, fit in fits.items() if fit.posterior is None]
     if without:
-        said.append(f"no error bars, so nothing is marked as changed: {', '.join(without)} (two-level)")
+        whom = f"{name}, which all are compared with" if name in without else ", ".join(without)
+        said.append(f"the two-level method gives no error bars, so nothing tells a change from chance: {whom}")
     return said
 
 
@@ -126,9 +127,7 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
         "first": first_name,
         "remarks": remarks(fits),
         "against_first": {
-            name: [
-                {**asdict(one), "change": one.change, "changed": bool(one.changed)} for one in differences(first, other)
-            ]
+            name: [{**asdict(one), "change": one.change, "changed": one.changed} for one in differences(first, other)]
             for name, other in others
         },
     }
@@ -145,11 +144,12 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
         first=name,
         results=[_head(one, fit) for one, fit in fits.items()],
         remarks=remarks(fits),
+        judged=any(judged(compared) for _, compared in pairs),
         pairs=[
             {
                 "name": other,
                 "count": len(compared),
-                "changed": sum(one.changed for one in compared),
+                "changed": sum(bool(one.changed) for one in compared),
                 "judged": judged(compared),
                 "rows": [_row(one) for one in compared],
             }

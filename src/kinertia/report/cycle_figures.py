@@ -158,7 +158,7 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
     mean, spread = mean_curve(curves), _spread(curves)
     if spread is not None:
         yield {**_band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
-    sds = [one.sd for one in curves if one.sd is not None]
+    sds = [one.sd for one in curves if np.isfinite(one.sd).any()]
     if sds:
         half = INTERVAL_SD * _over_strides(np.nanmean, np.array(sds))
         name = f"{word}, 95 % of the estimate"

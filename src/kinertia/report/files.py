@@ -9,7 +9,6 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +36,7 @@ from kinertia.trial.rms import rms, rms_length
 
 _PARTS = (slice(0, 3), slice(3, 6))
 """Force and moment of a residual."""
+_ALL_DIGITS, _SIX_DIGITS = "%r", "%.6g"
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
 
@@ -67,28 +67,34 @@ def _write_cycles(fit: Fit, folder: Path) -> None:
     """The tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
     if not any(trial.strides for trial in fit.trials):
         return
-    write_columns(folder / "spatiotemporal.csv", _rounded(spatiotemporal_columns(fit.trials)))
+    write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials), _SIX_DIGITS)
     names: dict[Stage, str] = {"estimate": "cycles.csv", "literature": "cycles_literature.csv"}
     for stage, name in names.items():
-        write_columns(folder / name, _rounded(cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES)))
+        columns = cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES)
+        write_columns(folder / name, columns, _SIX_DIGITS)
 
 
-def _rounded(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> dict[str, list[Any]]:
-    """Numbers with six significant digits."""
-    cells = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in columns.items()}
-    return {
-        name: [float(f"{cell:.6g}") if isinstance(cell, float) else cell for cell in each]
-        for name, each in cells.items()
-    }
+def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray], digits: str = _ALL_DIGITS) -> None:
+    """A table as pandas would write it: a cell without a number is empty.
 
-
-def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
-    """A table as pandas would write it: a cell without a number is empty."""
-    cells = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
+    Args:
+        path: the file.
+        columns: by name.
+        digits: how numbers that are not whole are written.
+    """
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([None if cell != cell else inert(cell) for cell in row] for row in zip(*cells, strict=True))
+        writer.writerows(zip(*(_cells(values, digits) for values in columns.values()), strict=True))
+
+
+def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
+    """What a column has in a file."""
+    cells = values.tolist() if isinstance(values, np.ndarray) else list(values)
+    if all(isinstance(cell, float) for cell in cells):
+        texts = (" ".join([digits] * len(cells)) % tuple(cells)).split()
+        return [None if text == "nan" else text for text in texts]
+    return [None if cell != cell else inert(cell) for cell in cells]
 
 
 def _write_model(fit: Fit, folder: Path) -> None:
@@ -110,6 +116,10 @@ def _write_model(fit: Fit, folder: Path) -> None:
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     names, rotational = fit.skeleton.coordinates, fit.skeleton.rotational
     motion = f"Motion: {trial.motion_hz:.3g} Hz"
+    if trial.deviations is not None:
+        sd = trial.deviations.coordinates
+        table = TimeTable(trial.time, tuple(names), np.where(rotational, np.degrees(sd), sd), in_degrees=True)
+        write_table(folder / "kinematics_sd.sto", table, "kinematics_sd", motion)
     forces = f"Ground reactions: {forces_used(trial.reactions, fit.settings, trial.motion_hz).which}. {motion}"
     write_table(folder / "kinematics.mot", _coordinates(fit, trial), "kinematics", motion)
     window_s, feet = trial.kinematics.window_s, fit.skeleton.feet
@@ -120,11 +130,11 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     files = {
         "inverse_dynamics": (trial.joint_loads["estimate"], forces),
         "inverse_dynamics_literature": (trial.joint_loads["literature"], before),
-        "inverse_dynamics_sd": (trial.joint_load_sd, forces),
     }
+    if trial.deviations is not None:
+        files["inverse_dynamics_sd"] = (trial.deviations.moments, forces)
     for file, (values, remark) in files.items():
-        if values is not None:
-            write_table(folder / f"{file}.sto", _table(trial, loads, values), file, remark)
+        write_table(folder / f"{file}.sto", _table(trial, loads, values), file, remark)
     stages = {**trial.residuals, "estimate_full": trial.full_residuals["estimate"]}
     columns = [f"{stage}_{name}" for stage in stages for name in _RESIDUALS]
     residuals = _table(trial, columns, np.hstack(list(stages.values())))
@@ -174,7 +184,7 @@ def summary(fit: Fit) -> dict[str, Any]:
 def _posterior_summary(fit: Fit) -> dict[str, Any]:
     if fit.posterior is None:
         return {}
-    noise = {trial.name: asdict(noise) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
+    noise = {trial.name: dict(vars(noise)) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
     return {
         "iterations": fit.posterior.iterations,
         "calibration": {name: dict(entry) for name, entry in fit.posterior.calibration.items()},
@@ -195,7 +205,7 @@ def _identifiability(bsp: Mapping[str, Sequence[Any]], base: BaseParameters) -> 
             "count": base.count,
             "shown": base.shown,
             "condition": base.condition if math.isfinite(base.condition) else None,
-            "best_shown": [asdict(combination) for combination in base.best],
+            "best_shown": [dict(vars(combination)) for combination in base.best],
             "never_shown": list(base.never),
         },
     }

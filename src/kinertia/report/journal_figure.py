@@ -8,22 +8,17 @@ from __future__ import annotations
 import html
 import re
 import textwrap
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.result import Fit, TrialFit
-from kinertia.report.bsp_figures import change_figure
-from kinertia.report.cycle_figures import cycle_figure
+from kinertia.estimation.result import Fit
 from kinertia.report.extras import expect_matplotlib
 from kinertia.report.figure import Figure
-from kinertia.report.panels import plain
-from kinertia.report.time_figures import coordinate_figure, moment_figure
-from kinertia.report.wording import start_of
+from kinertia.report.plots import FitFigures
 from kinertia.trial.data import runs
 
 if TYPE_CHECKING:
@@ -37,6 +32,8 @@ _POINTS_PER_PX = 0.5
 """Of lines and marks: those of the report are for screens, and a journal's panels are half as wide."""
 _TITLE_LETTERS = 36
 """In a line, beyond which it would leave the panel."""
+_MOST_BESIDE, _LEGEND_LETTERS, _HANDLE_LETTERS = 4, 145, 8
+"""In a row of the legend: entries, letters, and letters that the line before each takes the room of."""
 _DOTS_PER_INCH = 600
 _FORMATS = (".svg", ".pdf", ".eps", ".png", ".tif", ".tiff")
 _DASHES = {"dot": ":", "dash": "--"}
@@ -56,58 +53,44 @@ _STYLE: Any = {
 }
 
 
-def _moments(fit: Fit) -> Figure:
-    first = fit.trials[0]
-    return cycle_figure(fit, "moment") or _of_trial(
-        first, moment_figure(first, fit.skeleton, fit.mass_kg, start=start_of(fit))
-    )
+OF_TRIALS = ("moments", "angles", "coordinates", "residuals")
+"""Figures that can be of one trial, over time."""
+FOR_PAPERS = (*OF_TRIALS, "powers", "forces", "cycles", "bsp", "departures")
+"""Those of `fit.plot` that are small multiples; the others are to be pointed at, turned or played."""
 
 
-def _angles(fit: Fit) -> Figure:
-    first = fit.trials[0]
-    return cycle_figure(fit, "angle") or _of_trial(first, coordinate_figure(first, fit.skeleton))
-
-
-def _of_trial(trial: TrialFit, figure: Figure) -> Figure:
-    """The figure, which says above its legend which trial it is of."""
-    return replace(figure, layout={**figure.layout, "meta": {**figure.layout["meta"], "trial": plain(trial.name)}})
-
-
-FIGURES: Mapping[str, Callable[[Fit], Figure | None]] = {
-    "moments": _moments,
-    "angles": _angles,
-    "powers": lambda fit: cycle_figure(fit, "power"),
-    "forces": lambda fit: cycle_figure(fit, "force"),
-    "bsp": change_figure,
-}
-"""By the name that `fit.figure` takes."""
-
-
-def save_figure(fit: Fit, name: str, path: str | Path) -> Path:
+def save_figure(fit: Fit, name: str, path: str | Path, trial: str | None = None) -> Path:
     """Draw a figure into a file, whose ending says its format; returns the file.
 
     Raises:
-        KinertiaError: no such figure, the fit has no strides to draw it from, or matplotlib is not installed.
+        KinertiaError: no such figure or trial, nothing to draw it from, or matplotlib is not installed.
         FileError: a format that is not known, or the file cannot be written.
     """
     path = Path(path)
-    if name not in FIGURES:
-        raise KinertiaError(f"there is no figure '{name}'; expected one of {', '.join(FIGURES)}")
+    if name not in FOR_PAPERS:
+        raise KinertiaError(_no_figure(name))
+    if trial is not None and name not in OF_TRIALS:
+        raise KinertiaError(f"the figure '{name}' is of all trials; one trial has {', '.join(OF_TRIALS)}")
     if path.suffix.lower() not in _FORMATS:
         raise FileError(path, f"'{path.suffix}' is no format of figures; expected one of {', '.join(_FORMATS)}")
     expect_matplotlib()
-    figure = FIGURES[name](fit)
-    if figure is None:
-        raise KinertiaError(f"the figure '{name}' is over the gait cycle, and no trial of this fit has a stride")
     import matplotlib as mpl
 
     with mpl.rc_context(_STYLE):
-        drawn = drawing(figure)
+        draw = getattr(FitFigures(fit, drawing), name)
+        drawn = draw() if trial is None else draw(trial)
         try:
             drawn.savefig(path, dpi=_DOTS_PER_INCH)
         except OSError as error:
             raise FileError(path, f"cannot be written: {error.strerror or error}") from error
     return path
+
+
+def _no_figure(name: str) -> str:
+    papers = f"expected one of {', '.join(FOR_PAPERS)}"
+    if not name.startswith("_") and hasattr(FitFigures, name):
+        return f"the figure '{name}' is for the screen: fit.plot.{name}(); in files, {papers}"
+    return f"there is no figure '{name}'; {papers}"
 
 
 def drawing(figure: Figure) -> Drawing:
@@ -134,7 +117,9 @@ def drawing(figure: Figure) -> Drawing:
         _mark(panels[shape["xref"][1:]], shape)
     for suffix, panel in panels.items():
         _finish(panel, figure.layout[f"xaxis{suffix}"], figure.layout[f"yaxis{suffix}"])
-    legend = drawn.legend(*_legend(list(panels.values())), loc="outside upper left", ncols=4, frameon=False)
+    handles, labels = _legend(list(panels.values()))
+    beside = min(_MOST_BESIDE, _LEGEND_LETTERS // (_HANDLE_LETTERS + max(map(len, labels))))
+    legend = drawn.legend(handles, labels, loc="outside upper left", ncols=beside, frameon=False)
     if trial := figure.layout["meta"].get("trial"):
         legend.set_title(f"Trial {_text(trial)}", prop=FontProperties(weight="bold"))
         legend.set_alignment("left")

@@ -56,7 +56,7 @@ MOST_TRIALS = 6
 VIEW_FRAMES = 300
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
 
-_SUMMARY_LINES, _LINE_LETTERS = 8, 110
+_SUMMARY_LINES, _LINE_LETTERS = 8, 95
 """Of warnings in the printed summary, whose first page has no room for more, and letters in one of them."""
 
 
@@ -173,7 +173,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
                 None if truth is None else truth.joint_loads[trial.name],
             )
         ),
-        "bands": trial.joint_load_sd is not None,
+        "bands": trial.deviations is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
         "marker_rows": _marker_rows(

@@ -19,8 +19,8 @@ _BOTTOM_PX, _RIGHT_PX = 44, 14
 _LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
 _TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
 MOST_COLUMNS = 3
-_PAPER_PX = 1250
-"""Rows of panels on a sheet of paper, beside headings, at the scale of the page's print style."""
+_PAPER_PX = 800
+"""Rows of panels on a sheet of paper, below the table of strides, at the scale of the page's print style."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,15 @@ def base_layout(alt: str) -> dict[str, Any]:
         "hovermode": "closest",
         "meta": {"alt": alt},
     }
+
+
+def sentence_figure(text: str) -> Figure:
+    """Words in the place of a figure that has nothing to show."""
+    layout = base_layout(text)
+    hidden = {"visible": False}
+    place = {"xref": "paper", "yref": "paper", "x": 0, "y": 0.5, "xanchor": "left", "showarrow": False}
+    layout |= {"height": 90, "xaxis": hidden, "yaxis": hidden, "annotations": [{"text": plain(text), **place}]}
+    return Figure([], layout)
 
 
 def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:

@@ -1,12 +1,14 @@
-"""`fit.plot`: the report's figures one by one, as plotly objects for notebooks."""
+"""The figures of a fit, by the names that `fit.plot` and `fit.figure` share."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar, get_args
 
-from kinertia.estimation.cycles import Kind
+from kinertia.errors import KinertiaError
+from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.io.norms_file import read_norms
 from kinertia.report.body_figure import Shown, body_figure
@@ -15,12 +17,15 @@ from kinertia.report.cycle_figures import cycle_figure
 from kinertia.report.extras import expect_plotly
 from kinertia.report.figure import Figure
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
+from kinertia.report.panels import plain, sentence_figure
 from kinertia.report.skeleton_view import skeleton_figure
 from kinertia.report.time_figures import coordinate_figure, moment_figure, residual_figure
 from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
+
+T = TypeVar("T")
 
 
 def as_plotly(figure: Figure) -> go.Figure:
@@ -30,77 +35,118 @@ def as_plotly(figure: Figure) -> go.Figure:
         KinertiaError: plotly is not installed.
     """
     expect_plotly()
-    import plotly.graph_objects as go
+    from kinertia.report.notebook_figure import NotebookFigure
 
-    return go.Figure(figure.data, figure.layout, figure.frames)
-
-
-def _plotly_if_any(figure: Figure | None) -> go.Figure | None:
-    return None if figure is None else as_plotly(figure)
+    return NotebookFigure(figure.data, figure.layout, figure.frames)
 
 
 @dataclass(frozen=True, eq=False)
-class FitPlots:
-    """Plotly figures of a fit. Those of one trial take its name; left out, it is the first.
+class FitFigures(Generic[T]):
+    """One method for each figure of a fit.
 
-    Raises:
-        KeyError: there is no trial of this name; names those there are.
+    Those over time are of one trial; its name left out, of the first. What cannot be drawn is a KinertiaError that says
+    why, and which figure there is in its place.
+
+    Attributes:
+        fit: what they are of.
+        drawn: what makes of a figure what the methods return: an object of plotly's or of matplotlib's.
     """
 
     fit: Fit
+    drawn: Callable[[Figure], T]
 
-    def residuals(self, trial: str | None = None) -> go.Figure:
+    def moments(self, trial: str | None = None) -> T:
+        """Joint moments over the gait cycle; of a trial that is named, or without strides, over time."""
+        if trial is None and self._walked:
+            return self.cycles("moment")
+        fit, one = self.fit, self._trial(trial)
+        return self._of_trial(one, moment_figure(one, fit.skeleton, fit.mass_kg, start=start_of(fit)))
+
+    def angles(self, trial: str | None = None) -> T:
+        """Joint angles over the gait cycle; of a trial that is named, or without strides, over time."""
+        return self.cycles("angle") if trial is None and self._walked else self.coordinates(trial)
+
+    def powers(self) -> T:
+        """Joint powers over the gait cycle."""
+        return self.cycles("power")
+
+    def forces(self) -> T:
+        """Ground reactions over the gait cycle."""
+        return self.cycles("force")
+
+    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> T:
+        """Angles, moments, powers or ground reactions ("force") over the gait cycle, in front of `norms`."""
+        if kind not in UNITS:
+            raise KinertiaError(f"there are no curves '{kind}' over the gait cycle; expected one of {', '.join(UNITS)}")
+        figure = cycle_figure(self.fit, kind, {} if norms is None else read_norms(norms))
+        if figure is None:
+            raise KinertiaError(
+                f"no trial of this fit has a stride, so nothing can be drawn over the gait cycle ({kind}); "
+                "'moments', 'angles' and 'residuals' are drawn over time"
+            )
+        return self.drawn(figure)
+
+    def coordinates(self, trial: str | None = None) -> T:
+        """Every coordinate over time, by inverse kinematics and as estimated."""
+        one = self._trial(trial)
+        return self._of_trial(one, coordinate_figure(one, self.fit.skeleton))
+
+    def residuals(self, trial: str | None = None) -> T:
         """Root residual force and moment over time, stage by stage."""
-        return as_plotly(residual_figure(self._trial(trial), start=start_of(self.fit)))
+        one = self._trial(trial)
+        return self._of_trial(one, residual_figure(one, start=start_of(self.fit)))
 
-    def coordinates(self, trial: str | None = None) -> go.Figure:
-        """Every coordinate by inverse kinematics and as estimated."""
-        return as_plotly(coordinate_figure(self._trial(trial), self.fit.skeleton))
+    def bsp(self) -> T:
+        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
+        return self.drawn(change_figure(self.fit))
 
-    def moments(self, trial: str | None = None) -> go.Figure:
-        """Joint moments per body mass, before against estimate."""
-        mass_kg, start = self.fit.mass_kg, start_of(self.fit)
-        return as_plotly(moment_figure(self._trial(trial), self.fit.skeleton, mass_kg, start=start))
+    def departures(self) -> T:
+        """The same in prior SDs."""
+        return self._with_error_bars(departure_figure(self.fit), "'bsp' has the changes in kg, mm and kg m2")
 
-    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> go.Figure | None:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle; None without strides.
+    def information(self) -> T:
+        """What the data say about each parameter."""
+        return self._with_error_bars(information_figure(self.fit), "'bsp' has the changes in kg, mm and kg m2")
 
-        `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
-        """
-        return _plotly_if_any(cycle_figure(self.fit, kind, {} if norms is None else read_norms(norms)))
+    def body(self, shown: Shown = "mass") -> T:
+        """The body, coloured by change of mass, or by what the data say of it ("information")."""
+        if shown not in get_args(Shown):
+            raise KinertiaError(f"a body is not coloured by '{shown}'; expected one of {', '.join(get_args(Shown))}")
+        return self._with_error_bars(body_figure(self.fit, shown), "body('mass') is coloured by change of mass")
 
-    def markers(self, trial: str | None = None) -> go.Figure:
+    def markers(self, trial: str | None = None) -> T:
         """Distance between every measured and modelled marker."""
         one = self._trial(trial)
         noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(one)]
-        return as_plotly(marker_figure(one, () if noise is None else noise.wandering))
+        return self._of_trial(one, marker_figure(one, () if noise is None else noise.wandering))
 
-    def gaps(self, trial: str | None = None) -> go.Figure | None:
-        """When markers were not seen; None where all always were."""
-        return _plotly_if_any(fit_gap_figure(self._trial(trial)))
+    def gaps(self, trial: str | None = None) -> T:
+        """When markers were not seen; a sentence where all always were."""
+        one = self._trial(trial)
+        nothing = sentence_figure(f"Every marker of {one.name} was seen in every frame: there are no gaps.")
+        return self._of_trial(one, fit_gap_figure(one) or nothing)
 
-    def skeleton(self, trial: str | None = None) -> go.Figure:
+    def skeleton(self, trial: str | None = None) -> T:
         """The skeleton in motion, with markers, centres of mass and ground reactions."""
-        return as_plotly(skeleton_figure(self.fit, self._trial(trial)))
+        one = self._trial(trial)
+        return self._of_trial(one, skeleton_figure(self.fit, one))
 
-    def body(self, shown: Shown = "mass") -> go.Figure | None:
-        """The body, coloured by change of mass or by what the data say of it ("information"; None after two-level)."""
-        return _plotly_if_any(body_figure(self.fit, shown))
-
-    def bsp(self) -> go.Figure:
-        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
-        return as_plotly(change_figure(self.fit))
-
-    def departures(self) -> go.Figure | None:
-        """The same in prior SDs; None after two-level."""
-        return _plotly_if_any(departure_figure(self.fit))
-
-    def information(self) -> go.Figure | None:
-        """What the data say about each parameter; None after two-level."""
-        return _plotly_if_any(information_figure(self.fit))
+    @property
+    def _walked(self) -> bool:
+        return any(trial.strides for trial in self.fit.trials)
 
     def _trial(self, name: str | None) -> TrialFit:
         trials = {trial.name: trial for trial in self.fit.trials}
         if name is not None and name not in trials:
-            raise KeyError(f"no trial '{name}' in this fit; there are: {', '.join(trials)}")
+            raise KinertiaError(f"no trial '{name}' in this fit; there are: {', '.join(trials)}")
         return self.fit.trials[0] if name is None else trials[name]
+
+    def _of_trial(self, trial: TrialFit, figure: Figure) -> T:
+        """The figure, whose `meta` says which trial it is of."""
+        meta = {**figure.layout["meta"], "trial": plain(trial.name)}
+        return self.drawn(replace(figure, layout={**figure.layout, "meta": meta}))
+
+    def _with_error_bars(self, figure: Figure | None, instead: str) -> T:
+        if figure is None:
+            raise KinertiaError(f"the two-level method gives no error bars, which this figure is drawn from; {instead}")
+        return self.drawn(figure)

@@ -6,7 +6,7 @@ from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.files import save_fit
 from kinertia.report.journal_figure import save_figure
 from kinertia.report.notebook import fit_html, recording_html, trial_fit_html, trial_html
-from kinertia.report.plots import FitPlots
+from kinertia.report.plots import FitFigures, as_plotly
 from kinertia.trial import display
 from kinertia.trial.data import Recording, Trial
 
@@ -14,6 +14,6 @@ display.html.register(Recording, recording_html)
 display.html.register(Trial, trial_html)
 display.html.register(TrialFit, trial_fit_html)
 display.html.register(Fit, fit_html)
-display.pictures.register(Fit, FitPlots)
+display.pictures.register(Fit, lambda fit: FitFigures(fit, as_plotly))
 display.save.register(Fit, save_fit)
 display.figure.register(Fit, save_figure)

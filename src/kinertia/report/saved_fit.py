@@ -9,6 +9,7 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
@@ -19,6 +20,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_range import Range
 from kinertia.model.imported import Coupling, OsimCoordinate, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
+from kinertia.model.splines import BSpline
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.inverse_kinematics import InverseKinematics
@@ -50,11 +52,11 @@ class SavedFit:
 
 
 _KINDS = (
-    SavedFit, Provenance, Truth, Fit, TrialFit, Subject, Settings,
+    SavedFit, Provenance, Truth, Fit, TrialFit, CurveDeviations, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
-    Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
+    Kinematics, InverseKinematics, SmoothedSpline, BSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
 

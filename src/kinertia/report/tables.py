@@ -48,8 +48,10 @@ def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
         "moments" if stage == "estimate" else f"moments_{stage}": over_time(loads)
         for stage, loads in trial.joint_loads.items()
     }
-    if trial.joint_load_sd is not None:
-        tables["moments_sd"] = over_time(trial.joint_load_sd)
+    if trial.deviations is not None:
+        of_coordinates = trial.deviations.coordinates
+        tables["coordinates_sd"] = over_time(np.where(turns, np.degrees(of_coordinates), of_coordinates))
+        tables["moments_sd"] = over_time(trial.deviations.moments)
     axes = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
     residual = trial.residuals["estimate"]
     tables["residuals"] = {"time_s": trial.time, **dict(zip(axes, residual.T, strict=True))}

@@ -81,19 +81,22 @@ def _hz(trial: TrialFit, stage: str) -> float:
 
 
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
-    """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated."""
+    """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated with its 95 % band."""
     ik, axis = trial.kinematics.ik, _time_axis(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
     stages = (
         ("inverse kinematics", ik.time[shown], ik.q[shown], {"dash": "dot", "width": 1.6}),
         ("estimate", trial.time, trial.motion.q, {"width": 2}),
     )
+    sd = None if trial.deviations is None else trial.deviations.coordinates
     panels = []
     for one in panels_of(skeleton):
-        traces = []
+        scale = np.degrees(1.0) if one.rotational else 1.0
+        thin = _thin(len(trial.time), most_frames)
+        traces = [] if sd is None else _bands(one, trial.time, scale * trial.motion.q, scale * sd, thin)
         for name, time, values, line in stages:
             thin = _thin(len(time), most_frames)
-            traces += _sides(one, name, time, np.degrees(values) if one.rotational else values, thin, line)
+            traces += _sides(one, name, time, scale * values, thin, line)
         unit = "degrees" if one.rotational else "m"
         panels.append(Panel(f"{one.title} ({unit})", traces, _background(trial.kinematics, axis, one)))
     change = np.degrees(motion_change(trial)[:, skeleton.rotational])
@@ -123,12 +126,13 @@ def moment_figure(
     `truth` (w, c) N m: of a synthetic person, dashed.
     """
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
-    sd = trial.joint_load_sd
+    sd = None if trial.deviations is None else trial.deviations.moments / mass_kg
+    middle = trial.joint_loads["estimate"] / mass_kg
     panels = []
     for one in panels_of(skeleton):
         if min(one.columns.values()) < 6:
             continue
-        traces = [] if sd is None else _bands(one, trial, sd / mass_kg, mass_kg, thin)
+        traces = [] if sd is None else _bands(one, trial.time, middle, sd, thin)
         for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
             name = stage_name(stage, start)
             traces += _sides(one, name, trial.time, trial.joint_loads[stage] / mass_kg, thin, line)
@@ -144,16 +148,16 @@ def moment_figure(
     return small_multiples(panels, alt, axis)
 
 
-def _bands(one: Coordinate, trial: TrialFit, sd: np.ndarray, mass_kg: float, thin: slice) -> list[dict[str, Any]]:
-    """A 95 % band around the estimate for each side: an unseen lower edge, and an upper one filled down to it."""
+def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
+    """A 95 % band around values (w, c) for each side: an unseen lower edge, and an upper one filled down to it."""
     traces = []
     for side, column in one.columns.items():
         word, colour = style.SIDES[side]
-        middle, half = trial.joint_loads["estimate"][:, column] / mass_kg, INTERVAL_SD * sd[:, column]
+        middle, half = values[:, column], INTERVAL_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
         fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
-        traces.append({**_curve(trial.time, middle - half, thin), **edge, "showlegend": False})
-        traces.append({**_curve(trial.time, middle + half, thin), **edge, **fill})
+        traces.append({**_curve(time, middle - half, thin), **edge, "showlegend": False})
+        traces.append({**_curve(time, middle + half, thin), **edge, **fill})
     return traces
 
 

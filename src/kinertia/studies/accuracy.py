@@ -216,7 +216,7 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         np.linalg.norm(bound, axis=1).reshape(-1, 10),
         attainable(prior, bound, of_noise),
-        joint_errors(trial, Before(skeleton, prior.mean, kinematics), after, result.moment_sd[0]),
+        joint_errors(trial, Before(skeleton, prior.mean, kinematics), after, result.curve_deviations[0]),
         result.converged,
     )
 

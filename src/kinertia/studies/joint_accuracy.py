@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.joint_names import JOINTS
 from kinertia.model.skeleton import Skeleton
@@ -31,15 +32,20 @@ class JointErrors:
         moment_variance: what the estimate says of it.
         moment_coverage: share of frames within the 95 % intervals.
         usual: error of the usual pipeline's joint moments, by USUAL_HZ.
+        power_coverage: the same of joint powers.
         angle, angle_ik: errors of the joint angles, rad^2, by the estimate and by inverse kinematics.
+        angle_variance, angle_coverage: what the estimate says of them, and the share of frames within its intervals.
         change, change_ik: the same after taking off each angle's mean error: what varies in time.
     """
 
     moment: float
     moment_variance: float
     moment_coverage: float
+    power_coverage: float
     usual: tuple[float, ...]
     angle: float
+    angle_variance: float
+    angle_coverage: float
     angle_ik: float
     change: float
     change_ik: float
@@ -51,17 +57,21 @@ class JointAccuracy:
 
     Attributes:
         moment_nm, moment_sd_nm: of the joint moments, and their posterior deviation.
-        coverage: of the joint moments by 95 % intervals.
+        coverage, power_coverage: of the joint moments and powers by 95 % intervals.
         usual_nm: of the usual pipeline's joint moments, at the best of USUAL_HZ.
         angle_rad, angle_ik_rad: of joint angles by the estimate and by inverse kinematics.
+        angle_sd_rad, angle_coverage: posterior deviation of the estimate's, and coverage by 95 % intervals.
         change_rad, change_ik_rad: the same without each angle's mean error.
     """
 
     moment_nm: float
     moment_sd_nm: float
     coverage: float
+    power_coverage: float
     usual_nm: float
     angle_rad: float
+    angle_sd_rad: float
+    angle_coverage: float
     angle_ik_rad: float
     change_rad: float
     change_ik_rad: float
@@ -93,20 +103,21 @@ class Before:
 
 
 def joint_errors(
-    truth: SyntheticTrial, before: Before, after: Outcome, moment_sd: np.ndarray
+    truth: SyntheticTrial, before: Before, after: Outcome, deviations: CurveDeviations
 ) -> dict[str, JointErrors]:
     """Errors of the estimate and of the usual pipeline against the truth.
 
     Args:
         truth: what the person did.
         before, after: what the estimate started from, and its outcome.
-        moment_sd: (w, c) N m, posterior deviations of its joint moments.
+        deviations: of its curves.
     """
     kinematics, time = before.kinematics, before.kinematics.time
     at = np.searchsorted(truth.time, time - 1e-9)
     true = truth.motion.cut(at)
     expected = inverse_dynamics(truth.skeleton, truth.bsp, true, truth.foot_loads[at])
-    wrong = after.moments(time) - expected
+    found = after.moments(time)
+    wrong, power_wrong = found - expected, found * after.motion.qd - expected * true.qd
     ik, measured = kinematics.ik, measured_reactions(kinematics)
     usual = []
     for hz in USUAL_HZ:
@@ -120,15 +131,22 @@ def joint_errors(
         own = [name.startswith(begins) for name in truth.skeleton.coordinates]
         result[joint] = JointErrors(
             moment=_square(wrong[:, own]),
-            moment_variance=_square(moment_sd[:, own]),
-            moment_coverage=float(np.mean(np.abs(wrong[:, own]) < WITHIN * moment_sd[:, own])),
+            moment_variance=_square(deviations.moments[:, own]),
+            moment_coverage=_covered(wrong[:, own], deviations.moments[:, own]),
+            power_coverage=_covered(power_wrong[:, own], deviations.powers[:, own]),
             usual=tuple(_square(each[:, own]) for each in usual),
             angle=_square(off[0][:, own]),
+            angle_variance=_square(deviations.coordinates[:, own]),
+            angle_coverage=_covered(off[0][:, own], deviations.coordinates[:, own]),
             angle_ik=_square(off[1][:, own]),
             change=_square(changes[0][:, own]),
             change_ik=_square(changes[1][:, own]),
         )
     return result
+
+
+def _covered(wrong: np.ndarray, sd: np.ndarray) -> float:
+    return float(np.mean(np.abs(wrong) < WITHIN * sd))
 
 
 def _square(values: np.ndarray) -> float:
@@ -138,15 +156,21 @@ def _square(values: np.ndarray) -> float:
 def joint_accuracy(people: Sequence[JointErrors]) -> JointAccuracy:
     """One joint of all people together."""
 
+    def mean(name: str) -> float:
+        return float(np.mean([getattr(one, name) for one in people]))
+
     def rms(name: str) -> float:
-        return float(np.sqrt(np.mean([getattr(one, name) for one in people])))
+        return float(np.sqrt(mean(name)))
 
     return JointAccuracy(
         moment_nm=rms("moment"),
         moment_sd_nm=rms("moment_variance"),
-        coverage=float(np.mean([one.moment_coverage for one in people])),
+        coverage=mean("moment_coverage"),
+        power_coverage=mean("power_coverage"),
         usual_nm=float(np.sqrt(np.mean([one.usual for one in people], axis=0).min())),
         angle_rad=rms("angle"),
+        angle_sd_rad=rms("angle_variance"),
+        angle_coverage=mean("angle_coverage"),
         angle_ik_rad=rms("angle_ik"),
         change_rad=rms("change"),
         change_ik_rad=rms("change_ik"),

@@ -45,10 +45,10 @@ def save(thing: object, folder: str | Path) -> Path:
 
 
 @singledispatch
-def figure(thing: object, name: str, path: str | Path) -> Path:
-    """Draw one figure of `thing` into a file, and return the file."""
+def figure(thing: object, name: str, path: str | Path, trial: str | None = None) -> Path:
+    """Draw one figure of `thing`, or of one of its trials, into a file, and return the file."""
     _load(figure, thing)
-    return figure(thing, name, path)
+    return figure(thing, name, path, trial)
 
 
 def _load(function: Any, thing: object) -> None:

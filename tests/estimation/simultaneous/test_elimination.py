@@ -1,13 +1,13 @@
 """A trial cut into stretches says what it says in one."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 import kinertia.estimation.simultaneous.stretches as limits
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.elimination import reduced
-from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
@@ -91,12 +91,13 @@ def test_elimination_and_step_are_those_of_the_whole(whole, cut, here, damping):
     close(actual.motion_step(step), expected.motion_step(step))
 
 
-def test_deviations_of_moments_are_those_of_the_whole(whole, cut, here):
+def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here):
     expected, actual = (reduced(each.trial_normal(0, *here), 0.0) for each in (whole, cut))
     information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
     root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
-    sd = [joint_moment_sd(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, actual))]
-    close(sd[1], sd[0])
+    sd = [curve_deviations(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, actual))]
+    for one in fields(CurveDeviations):
+        close(getattr(sd[1], one.name), getattr(sd[0], one.name))
 
 
 @pytest.mark.slow
@@ -117,7 +118,7 @@ def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
     close(actual.bsp_covariance, expected.bsp_covariance)
     for k in range(2):
         close(actual.motions[k].qdd, expected.motions[k].qdd)
-        close(actual.moment_sd[k], expected.moment_sd[k])
+        close(actual.curve_deviations[k].moments, expected.curve_deviations[k].moments)
 
 
 @pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])

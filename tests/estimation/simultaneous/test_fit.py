@@ -149,7 +149,7 @@ def test_the_motion_is_known_in_every_frame_of_the_window_though_the_pelvis_is_n
     at = np.searchsorted(trial.time, kinematics.time - 1e-9)
     np.testing.assert_allclose(outcome.motions[0].q, trial.motion.q[at], atol=0.06)
     assert outcome.foot_loads[0].shape == (len(at), 2, 6)
-    assert outcome.result.moment_sd[0].shape == trial.motion.q[at].shape
+    assert outcome.result.curve_deviations[0].moments.shape == trial.motion.q[at].shape
 
 
 def test_a_displaced_plate_is_named(trial):

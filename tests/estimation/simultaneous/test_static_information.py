@@ -30,6 +30,13 @@ def test_first_unknowns_alone_are_those_of_all_together(singular_first):
     np.testing.assert_allclose(np.linalg.inv(information.first), covariance, rtol=1e-8, atol=1e-14)
 
 
+@pytest.mark.parametrize("n", [3, 6])
+def test_solution_of_all_unknowns(singular_first, n):
+    solution = np.arange(9.0) - 4.0
+    found = StaticInformation.of(singular_first, n).solution(singular_first @ solution)
+    np.testing.assert_allclose(found, solution, rtol=1e-6, atol=1e-9)
+
+
 def test_singular_information_has_a_covariance():
     """At the edge of what is possible the information on a logarithm rounds to zero, or below."""
     rng = np.random.default_rng(0)

@@ -12,14 +12,15 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 
-_UNSEEN = 3.0
+_UNSEEN = 1.5
 """Skin that moves as a block moves the segment and leaves nothing to see: the power of all errors over that of those
-which are seen. Set here; with it, bars hold in a laboratory whose skin moves as blocks."""
+which are seen. Set on synthetic people, so that bars are neither too wide where skin goes with the joints nor too short
+where it moves as blocks."""
 _LEAST_FREE = 0.1
 _ENDS = 3
 """Knot intervals beside gaps and ends, where a fitted spline swings more than elsewhere."""
@@ -47,8 +48,9 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
         left = _left(problem, k, coefficients, static, frames)
         n, m, _ = left.shape
         own = MotionBasis(trial.time[frames], spacing_s)
-        around = 1 + 2 * int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
-        inside = minimum_filter1d(np.isfinite(left).all(axis=-1), around, axis=0, mode="constant", cval=0)
+        around = int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
+        seen_here = np.pad(np.isfinite(left).all(axis=-1), ((around, around), (0, 0)))
+        inside = sliding_window_view(seen_here, 1 + 2 * around, axis=0).all(axis=-1)
         rows = inside & trial.dynamic[frames][:, None]
         for square, part in zip(squares, own.evaluate(own.fit(left.reshape(n, -1))), strict=True):
             square += np.where(rows, np.square(part).reshape(n, m, 3).sum(axis=-1), 0.0).sum(axis=0)

@@ -25,6 +25,7 @@ from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, FootPlates, pl
 from kinertia.estimation.simultaneous.range_terms import add_ranges
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.start_terms import add_start
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
@@ -38,9 +39,6 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, residual_terms, root_regressor
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
-
-COEFFICIENT_SD = 1.0
-"""Weak pull of every spline coefficient to its start (rad, m): the outermost splines hardly touch the data."""
 
 
 @dataclass(frozen=True)
@@ -321,7 +319,7 @@ class MapProblem:
         """Normal equations of a stretch of trial k, or of all of it."""
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
         stretch = stretch or Stretch.whole(basis)
-        near, own, start = stretch.with_neighbours, stretch.splines, stretch.splines.start
+        near, start = stretch.with_neighbours, stretch.splines.start
         skeleton = self.placed(static)
         normal = NormalEquations.zero(stretch.size, len(self.moving), layout.size)
         noise, skin = trial.marker_process, (self.skin[k].cut(near), static[layout.skin])
@@ -345,10 +343,7 @@ class MapProblem:
         for piece in pieces(len(dynamic)):
             terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])
             add_root(normal, layout.in_root, basis, start, terms)
-        moved = (coefficients - self.start[k])[own]
-        normal.band[: len(moved), 0] += np.eye(len(self.moving)) / COEFFICIENT_SD**2
-        normal.right[: len(moved)] -= moved / COEFFICIENT_SD**2
-        normal.cost += 0.5 * float(np.square(moved).sum()) / COEFFICIENT_SD**2
+        add_start(normal, stretch, coefficients - self.start[k])
         return normal
 
     def _root_terms(

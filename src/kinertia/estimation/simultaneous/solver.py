@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.elimination import Reduced, reduced
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
-from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd
 from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
 from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -49,7 +49,7 @@ class SimultaneousResult:
         reactions: per trial the loads for the joint moments, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
         displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
-        moment_sd: per trial (d, c) posterior deviations of the joint moments at its dynamic frames, N m and N.
+        curve_deviations: per trial the posterior deviations of its curves at its dynamic frames.
         instruments: what these trials say of plates and clock, to be added to what others say.
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
@@ -66,7 +66,7 @@ class SimultaneousResult:
     reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
     displacements_m: tuple[np.ndarray, ...]
-    moment_sd: tuple[np.ndarray, ...]
+    curve_deviations: tuple[CurveDeviations, ...]
     instruments: InstrumentInformation
     converged: bool
     iterations: int
@@ -103,8 +103,8 @@ def estimate_simultaneous(
     """
     problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem, progress)
-    covariance, moment_sd = _deviations(problem, ended.under)
-    return _result(problem, ended, covariance, moment_sd)
+    covariance, of_curves = _deviations(problem, ended.under)
+    return _result(problem, ended, covariance, of_curves)
 
 
 class _Ended(NamedTuple):
@@ -171,13 +171,13 @@ def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instr
     return instruments.updated(problem.instruments, mean, covariance[places, places])
 
 
-def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """Posterior covariance (S, S) of the static unknowns, and deviations of the joint moments of every trial."""
+def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
+    """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
     parts, displaced = _eliminated(problem, here, 0.0)
     by_trial = [each.information for each in displaced]
     first = problem.layout.in_root.stop
     root = StaticInformation.of(here.information + sum(by_trial), first).root_of_covariance()
-    moment_sd = []
+    of_curves = []
     for k, (motion, part) in enumerate(zip(here.point.coefficients, parts, strict=True)):
         in_trial, sd = root, problem.displacement_sd_m[k]
         if sd.any():
@@ -185,8 +185,8 @@ def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tupl
             elsewhere = as_displaced(elsewhere, problem.layout.locals, sd)
             in_trial = StaticInformation.of(part.information + elsewhere, first).root_of_covariance()
         static = problem.in_trial(k, here.point)
-        moment_sd.append(joint_moment_sd(problem, k, motion, static, part, in_trial))
-    return root @ root.T, tuple(moment_sd)
+        of_curves.append(curve_deviations(problem, k, motion, static, part, in_trial))
+    return root @ root.T, tuple(of_curves)
 
 
 class Eliminated(NamedTuple):
@@ -219,7 +219,7 @@ def _step(
     information = here.information + sum(each.information for each in displaced)
     right = here.right + sum(each.right for each in displaced)
     information[np.diag_indices_from(information)] += held
-    step = np.linalg.solve(information, right)
+    step = StaticInformation.of(information, problem.layout.in_root.stop).solution(right)
     moved_sd = float(np.sqrt(step @ information @ step))
     coefficients, moved = [], []
     promised = 0.5 * float(here.right @ step)
@@ -236,7 +236,7 @@ def _step(
 
 
 def _result(
-    problem: MapProblem, ended: _Ended, covariance: np.ndarray, moment_sd: tuple[np.ndarray, ...]
+    problem: MapProblem, ended: _Ended, covariance: np.ndarray, of_curves: tuple[CurveDeviations, ...]
 ) -> SimultaneousResult:
     point, layout = ended.under.point, problem.layout
     values = point.static
@@ -262,7 +262,7 @@ def _result(
         tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
         tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
-        moment_sd,
+        of_curves,
         _shown(
             problem, ended.instruments, values[layout.instruments], covariance[layout.instruments, layout.instruments]
         ),

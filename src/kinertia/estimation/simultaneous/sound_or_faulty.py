@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import comb
 
 import numpy as np
@@ -99,36 +99,82 @@ class GaussianPrior:
         """
         information = np.linalg.inv(covariance)
         data, right = information - self.precision, information @ mean - self.pull
-        variances, chances = _components(tuple(priors))
-        spread = np.linalg.inv(data + np.eye(len(priors)) / variances[:, None, :])
+        ways = _Ways.of(tuple(priors))
+        spread, log_size = ways.posteriors(data)
         centres = spread @ right
-        weight = np.log(chances) + 0.5 * (
-            centres @ right + np.linalg.slogdet(spread)[1] - np.log(variances).sum(axis=1)
-        )
+        weight = ways.log_chance + 0.5 * (centres @ right + log_size - ways.log_variance)
         weight = np.exp(weight - weight.max())
         weight /= weight.sum()
         middle = weight @ centres
         apart = centres - middle
-        whole = np.einsum("s,sij->ij", weight, spread) + np.einsum("s,si,sj->ij", weight, apart, apart)
+        whole = np.tensordot(weight, spread, 1) + (weight * apart.T) @ apart
         information = np.linalg.inv(whole)
         return GaussianPrior(information - data, information @ middle - right)
 
 
-@cache
-def _components(priors: tuple[SoundOrFaulty, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (n, k) and chances (n,) of the likeliest ways to be sound or faulty: all, or those of few faults."""
-    uncertain = [i for i, prior in enumerate(priors) if prior.faulty_share > 0.0]
-    off: list[np.ndarray] = []
-    for faults in range(len(uncertain) + 1):
-        count = comb(len(uncertain), faults)
-        if sum(map(len, off)) + count > _MOST_COMPONENTS:
-            break
-        chosen = np.array(list(combinations(uncertain, faults)), dtype=int).reshape(count, faults)
-        some = np.zeros((count, len(priors)), dtype=bool)
-        np.put_along_axis(some, chosen, True, axis=1)
-        off.append(some)
-    every = np.concatenate(off)
-    sound, faulty, share = (
-        np.array([getattr(prior, name) for prior in priors]) for name in ("sound_sd", "faulty_sd", "faulty_share")
-    )
-    return np.square(np.where(every, faulty, sound)), np.where(every, share, 1.0 - share).prod(axis=1)
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """The likeliest n ways for k instruments to be sound or faulty: all, or those of few faults.
+
+    Attributes:
+        sound, faulty: (k,) variances of either component.
+        before, fault: (n,) the way with the same faults but one, and the instrument of that one; all sound comes first.
+        begins: where the ways with one fault, with two, ... begin, and where the last end.
+        log_chance, log_variance: (n,) logarithms of the chance, and of the product of the variances.
+    """
+
+    sound: np.ndarray
+    faulty: np.ndarray
+    before: np.ndarray
+    fault: np.ndarray
+    begins: tuple[int, ...]
+    log_chance: np.ndarray
+    log_variance: np.ndarray
+
+    @classmethod
+    @cache
+    def of(cls, priors: tuple[SoundOrFaulty, ...]) -> _Ways:
+        """Of these priors."""
+        uncertain = [i for i, prior in enumerate(priors) if prior.faulty_share > 0.0]
+        places: dict[tuple[int, ...], int] = {(): 0}
+        begins = [1]
+        for faults in range(1, len(uncertain) + 1):
+            if len(places) + comb(len(uncertain), faults) > _MOST_COMPONENTS:
+                break
+            for own in combinations(uncertain, faults):
+                places[own] = len(places)
+            begins.append(len(places))
+        off = np.zeros((len(places), len(priors)), dtype=bool)
+        for own, row in places.items():
+            off[row, list(own)] = True
+        sound, faulty, share = (
+            np.array([getattr(prior, name) for prior in priors]) for name in ("sound_sd", "faulty_sd", "faulty_share")
+        )
+        sound, faulty = np.square(sound), np.square(faulty)
+        return cls(
+            sound,
+            faulty,
+            np.array([places[own[:-1]] for own in places]),
+            np.array([own[-1] if own else -1 for own in places]),
+            tuple(begins),
+            np.log(np.where(off, share, 1.0 - share).prod(axis=1)),
+            np.log(np.where(off, faulty, sound)).sum(axis=1),
+        )
+
+    def posteriors(self, data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, k, k) covariance of every way after data with this information (k, k), and the logarithms of their
+        determinants; one fault more is a change of rank one (Sherman and Morrison).
+        """
+        n, k = len(self.before), len(data)
+        spread, log_size = np.empty((n, k, k)), np.empty(n)
+        information = data + np.diag(1.0 / self.sound)
+        spread[0], log_size[0] = np.linalg.inv(information), -np.linalg.slogdet(information)[1]
+        change = 1.0 / self.faulty - 1.0 / self.sound
+        for own in (slice(*ends) for ends in pairwise(self.begins)):
+            before, fault = self.before[own], self.fault[own]
+            column = spread[before, :, fault]
+            left = 1.0 + change[fault] * column[np.arange(len(column)), fault]
+            across = column[:, :, None] * column[:, None, :]
+            spread[own] = spread[before] - (change[fault] / left)[:, None, None] * across
+            log_size[own] = log_size[before] - np.log(left)
+        return spread, log_size

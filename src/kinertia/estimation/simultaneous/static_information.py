@@ -28,6 +28,8 @@ class StaticInformation:
     >>> found = StaticInformation.of(np.array([[3.0, 1.0], [1.0, 2.0]]), 1)
     >>> found.first
     array([[2.5]])
+    >>> np.round(found.solution(np.array([5.0, 5.0])), 3)
+    array([1., 2.])
     >>> root = found.root_of_covariance()
     >>> np.round(root @ root.T, 3)
     array([[ 0.4, -0.2],
@@ -54,6 +56,13 @@ class StaticInformation:
         n = len(self.first)
         result: np.ndarray = right[:n] - self.across.T @ solve_triangular(self.factor, right[n:], lower=True)
         return result
+
+    def solution(self, right: np.ndarray) -> np.ndarray:
+        """(S,) the unknowns for a right-hand side (S,) of normal equations."""
+        n = len(self.first)
+        first = np.linalg.solve(self.first, self.first_of(right))
+        last = solve_triangular(self.factor, right[n:], lower=True) - self.across @ first
+        return np.concatenate([first, solve_triangular(self.factor, last, lower=True, trans="T")])
 
     def root_of_covariance(self) -> np.ndarray:
         """(S, S) R with covariance R R^T of all unknowns; finite also where some information rounds to below zero."""

@@ -7,16 +7,15 @@ stay as axes that do not move. OpenSim 4.0 and later open it. There are no muscl
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.rotations import three_angles
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, inverse, placed, placed_by
 
 _FORMAT = 40000
@@ -36,7 +35,7 @@ def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters
         [
             '<?xml version="1.0" encoding="UTF-8" ?>',
             f'<OpenSimDocument Version="{_FORMAT}">',
-            f"<Model name={quoteattr(skeleton.name)}>",
+            f"<Model name={_quoted(skeleton.name)}>",
             f"<gravity>0 {-skeleton.gravity_m_s2!r} 0</gravity>",
             "<length_units>meters</length_units>",
             "<force_units>N</force_units>",
@@ -52,7 +51,7 @@ def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters
 
 
 def _set(tag: str, objects: Sequence[str]) -> list[str]:
-    return [f"<{tag} name={quoteattr(tag.lower())}>", "<objects>", *objects, "</objects>", "<groups />", f"</{tag}>"]
+    return [f"<{tag} name={_quoted(tag.lower())}>", "<objects>", *objects, "</objects>", "<groups />", f"</{tag}>"]
 
 
 def _numbers(values: Sequence[float] | np.ndarray) -> str:
@@ -62,14 +61,14 @@ def _numbers(values: Sequence[float] | np.ndarray) -> str:
 def body_text(name: str, row: np.ndarray) -> str:
     """A body of the current formats; `row` is one of `BodySegmentParameters.table`."""
     return (
-        f"<Body name={quoteattr(name)}><mass>{_numbers(row[:1])}</mass><mass_center>{_numbers(row[1:4])}</mass_center>"
+        f"<Body name={_quoted(name)}><mass>{_numbers(row[:1])}</mass><mass_center>{_numbers(row[1:4])}</mass_center>"
         f"<inertia>{_numbers(row[4:])}</inertia></Body>"
     )
 
 
 def _marker(marker: Marker) -> str:
     return (
-        f"<Marker name={quoteattr(marker.label)}><socket_parent_frame>/bodyset/{escape(marker.segment)}"
+        f"<Marker name={_quoted(marker.label)}><socket_parent_frame>/bodyset/{escape(marker.segment)}"
         f"</socket_parent_frame><location>{_numbers(marker.position)}</location><fixed>false</fixed></Marker>"
     )
 
@@ -78,7 +77,7 @@ def weld_text(parent: str, child: str) -> str:
     """A joint of the current formats that holds one body fast in the frame of another."""
     near, far = (_frame(f"{name}_offset", f"/bodyset/{name}", np.eye(3), np.zeros(3)) for name in (parent, child))
     return (
-        f"<WeldJoint name={quoteattr('to_' + child)}><socket_parent_frame>{parent}_offset</socket_parent_frame>"
+        f"<WeldJoint name={_quoted('to_' + child)}><socket_parent_frame>{parent}_offset</socket_parent_frame>"
         f"<socket_child_frame>{child}_offset</socket_child_frame><frames>{near}{far}</frames></WeldJoint>"
     )
 
@@ -96,7 +95,7 @@ def _joint(joint: Joint, skeleton: Skeleton) -> str:
     free = [axis for axis in (*turns, *slides) if axis.coordinate not in skeleton.locked]
     kind = "CustomJoint" if joint.axes else "WeldJoint"
     inside = [
-        f"<{kind} name={quoteattr(name)}>",
+        f"<{kind} name={_quoted(name)}>",
         f"<socket_parent_frame>{joint.parent}_offset</socket_parent_frame>",
         f"<socket_child_frame>{joint.child}_offset</socket_child_frame>",
         f"<coordinates>{''.join(_coordinate(axis) for axis in free)}</coordinates>",
@@ -126,18 +125,22 @@ def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
 
 
 def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:
-    with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
-        angles = Rotation.from_matrix(np.asarray(rotation)).as_euler("XYZ")
+    angles = three_angles(np.asarray(rotation), np.eye(3))
     return (
-        f"<PhysicalOffsetFrame name={quoteattr(name)}><socket_parent>{parent}</socket_parent>"
+        f"<PhysicalOffsetFrame name={_quoted(name)}><socket_parent>{parent}</socket_parent>"
         f"<translation>{_numbers(translation)}</translation><orientation>{_numbers(angles)}</orientation>"
         f"</PhysicalOffsetFrame>"
     )
 
 
+def _quoted(text: str) -> str:
+    """An attribute's value."""
+    return f'"{escape(text)}"'
+
+
 def _coordinate(axis: Axis) -> str:
     limits = _ANGLE_RANGE if axis.kind == "rotation" else _LENGTH_RANGE
-    return f"<Coordinate name={quoteattr(axis.coordinate)}><range>{limits}</range></Coordinate>"
+    return f"<Coordinate name={_quoted(axis.coordinate)}><range>{limits}</range></Coordinate>"
 
 
 def _filled(kind: str, axes: Sequence[Axis], skeleton: Skeleton) -> list[str]:

@@ -1,7 +1,7 @@
 "use strict";
 // Draws every figure of the page, one after the other so that reading is not held up, and again for another width.
 (() => {
-  const PRINT_PX = 960; // report.css scales it to the paper
+  const WHOLE_PX = 960; // on paper, of a figure that has its width; report.css scales it to the sheet
   const config = { displayModeBar: false }; // its icons would lie on the legends
   let printing = false;
   const columns = (px) => (px < 560 ? 1 : px < 860 ? 2 : 3);
@@ -9,7 +9,7 @@
   // relayout's flat form: {"xaxis2.domain": [0, 1], height: 300, ...}
   function arrangement(layout, width) {
     const ways = layout.meta && layout.meta.arrangements;
-    return { width, ...(ways ? ways[printing ? "print" : columns(width)] : {}) };
+    return { width, ...(ways ? ways[printing && width === WHOLE_PX ? "print" : columns(width)] : {}) };
   }
 
   function applied(layout, flat) {
@@ -42,6 +42,7 @@
 
   const closed = (plot) => plot.element.closest("details:not([open])");
   const room = (plot) => Math.floor(plot.element.getBoundingClientRect().width);
+  const onPaper = (plot) => Number(getComputedStyle(plot.element).getPropertyValue("--paper-px"));
   const soon = window.requestIdleCallback || ((work) => setTimeout(work, 1));
   let next = 0;
   function drawNext() {
@@ -66,7 +67,7 @@
   window.addEventListener("beforeprint", () => {
     printing = true;
     document.querySelectorAll("details").forEach((part) => (part.open = true));
-    plots.forEach((plot) => draw(plot, PRINT_PX));
+    plots.forEach((plot) => draw(plot, onPaper(plot)));
   });
   window.addEventListener("afterprint", () => {
     printing = false;

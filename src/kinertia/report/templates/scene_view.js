@@ -7,6 +7,7 @@
   const FLOOR_MM = 5000;
   const LEAST_ZOOM = 0.3;
   const MOST_ZOOM = 12;
+  const AROUND = 1.06; // room around the body
   const DIRECTIONS = { front: [Math.PI / 2, 0], right: [0, 0], above: [0, Math.PI / 2], start: [-0.45, 0.16] };
 
   function unpacked(base64) {
@@ -40,7 +41,8 @@
       this.data = Object.fromEntries(Object.entries(this.scene.data).map(([name, text]) => [name, unpacked(text)]));
       this.frame = 0;
       this.clock = this.scene.time[0];
-      this.top = this.height();
+      this.top = this.highest();
+      this.aside = this.farthest();
       this.slider.max = this.scene.time.length - 1;
       this.slider.value = 0;
     }
@@ -49,17 +51,46 @@
       return this.scene.count[name] ?? 0;
     }
 
-    // height of what is to be seen, mm: the highest point of any frame
-    height() {
-      let top = 500;
-      for (const name of ["points", "measured"]) {
-        const part = this.data[name] ?? [];
-        for (let k = 1; k < part.length; k += 3) top = Math.max(top, part[k]);
-      }
-      return top;
+    // mm, of any frame: the highest point, or what an ellipsoid has above it; one far off the body is none of a body
+    highest() {
+      const points = this.most(["points", "measured"], (part, at) => part[at + 1], 500);
+      return this.most(["com"], (part, at, frame, k) => part[at + 1] + this.half(frame, k, [1]), points, 1.25 * points);
     }
 
+    // mm, of any frame: how far from the vertical through the centre the body reaches
+    farthest() {
+      const { centre } = this.data;
+      const away = (part, at, frame) => Math.hypot(part[at] - centre[3 * frame], part[at + 2] - centre[3 * frame + 2]);
+      const points = this.most(["points", "modelled", "measured"], away, 0.25 * this.top, 0.75 * this.top);
+      return this.most(["com"], (part, at, frame, k) => away(part, at, frame) + this.half(frame, k, [0, 2]), points, 0.75 * this.top);
+    }
+
+    // the largest of what is measured of the points of some parts, from `least` on and not beyond `limit`
+    most(names, measured, least, limit = Infinity) {
+      let most = least;
+      for (const name of names) {
+        const [part, count] = [this.data[name] ?? [], this.count(name)];
+        for (let at = 0; at < part.length; at += 3) {
+          if (part[at] === HIDDEN) continue;
+          const number = at / 3;
+          const value = measured(part, at, Math.floor(number / count), number % count);
+          if (value > most && value <= limit) most = value;
+        }
+      }
+      return most;
+    }
+
+    // half of what ellipsoid k measures in a frame along these axes
+    half(frame, k, axes) {
+      const part = this.data.ellipsoids;
+      const first = 9 * (frame * this.count("com") + k);
+      if (part[first] === HIDDEN) return 0;
+      return Math.hypot(...[0, 3, 6].flatMap((row) => axes.map((axis) => part[first + row + axis])));
+    }
+
+    // as near as shows the whole body from this height in every frame
     home() {
+      this.from = this.pitch;
       this.zoom = 1;
       this.shift = [0, 0];
     }
@@ -234,7 +265,9 @@
       if (!this.pen || !this.width) return;
       const root = 3 * this.frame;
       this.centre = [this.data.centre[root], this.data.centre[root + 2]];
-      this.scale = this.zoom * Math.min(this.tall / (1.08 * this.top), this.width / (0.8 * this.top));
+      const deep = this.aside * Math.abs(Math.sin(this.from)); // feet reach as far, the head does not
+      const high = Math.max(this.top * Math.cos(this.from) + deep, 2 * deep);
+      this.scale = (this.zoom * Math.min(this.tall / high, this.width / (2 * this.aside))) / AROUND;
       this.pen.clearRect(0, 0, this.width, this.tall);
       this.pen.lineCap = "round";
       this.floor();

@@ -3,10 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous import joint_moment_sd as module
+from kinertia.estimation.simultaneous import curve_deviations as module
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
+from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.elimination import reduced
-from kinertia.estimation.simultaneous.joint_moment_sd import joint_moment_sd, moment_derivatives
+from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
 from kinertia.estimation.simultaneous.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.solver import _deviations, _eliminated, _step
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -62,44 +63,74 @@ def noise(request, monkeypatch) -> np.ndarray:
     return np.array(request.param)
 
 
-def dense_derivative(problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0)) -> np.ndarray:
-    """(d, c, unknowns) derivative of the joint moments by all coefficients and static unknowns; with these shares of
-    what places, rates and accelerations do.
+def curves(problem, coefficients: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
+    """(d, ...) all that has a deviation, by the functions that results are made with."""
+    dynamic = np.flatnonzero(problem.trials[0].dynamic)
+    q, qd, _ = (part[dynamic] for part in problem.bases[0].evaluate(coefficients))
+    moment = moments(problem, coefficients, static)
+    ground = problem.reactions(0, static).at(problem.trials[0].time[dynamic])[..., :3]
+    return {
+        "coordinates": q,
+        "moments": moment,
+        "powers": qd * moment,
+        "ground_forces": ground.reshape(len(q), 6),
+    }
+
+
+def dense_derivatives(
+    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0)
+) -> dict[str, np.ndarray]:
+    """(d, ..., unknowns) derivatives of `curves` by all coefficients and static unknowns; with these shares of what
+    places, rates and accelerations do.
     """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
     motion = [part[frames] for part in problem.full(basis.evaluate(coefficients), static)]
     by = moment_derivatives(problem, 0, motion, static, problem.reactions(0, static), frames)
-    size, c = coefficients.shape
-    through = np.zeros((len(frames), c, size, c))
-    for row, t in enumerate(frames):
-        for a, spline in enumerate(basis.active[t]):
-            parts = zip(basis.values[:, t, a] * shares, (by.q, by.qd, by.qdd), strict=True)
-            through[row, :, spline] = sum(value * part[row] for value, part in parts)
-    rest = np.zeros((len(frames), c, problem.layout.size - by.static.shape[2]))
-    return np.concatenate([through.reshape(len(frames), c, -1), by.static, rest], axis=2)
+    d, (size, c) = len(frames), coefficients.shape
+    nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
+    still, zero = by.static, np.zeros_like(by.static)
+    speed, value = motion[1][:, problem.moving][..., None], by.value[..., None]
+    orders = {
+        "coordinates": (same, nothing, nothing, zero),
+        "moments": (by.q, by.qd, by.qdd, still),
+        "powers": (speed * by.q, speed * by.qd + value * same, speed * by.qdd, speed * still),
+        "ground_forces": (*(np.zeros((d, 6, c)),) * 3, by.ground),
+    }
+    result = {}
+    for name, (*moved, own) in orders.items():
+        wide = own.shape[1]
+        through = np.zeros((d, wide, size, c))
+        for row, t in enumerate(frames):
+            for a, spline in enumerate(basis.active[t]):
+                parts = zip(basis.values[:, t, a] * shares, moved, strict=True)
+                through[row, :, spline] = sum(each * part[row] for each, part in parts)
+        rest = np.zeros((d, wide, problem.layout.size - own.shape[2]))
+        result[name] = np.concatenate([through.reshape(d, wide, -1), own, rest], axis=2)
+    return result
 
 
 def test_derivatives_agree_with_finite_differences(estimate):
-    """In random directions of one kind of unknown each, by `inverse_dynamics`."""
+    """In random directions of one kind of unknown each."""
     problem, coefficients, static = estimate
     n, layout = coefficients.size, problem.layout
-    derivative = dense_derivative(problem, coefficients, static)
+    derivatives = dense_derivatives(problem, coefficients, static)
     rng = np.random.default_rng(0)
     parts = [slice(0, n), *(slice(n + p.start, n + p.stop) for p in (layout.theta, layout.plates, layout.coordinates))]
     parts.append(slice(n + layout.clock, n + layout.clock + 1))
+    # a step under load, which there is none of, makes the splines through the loads swing for some samples
+    away = np.abs(problem.trials[0].time[problem.trials[0].dynamic] - SWITCH_S) > 0.05
     for part in parts:
         for _ in range(3):
             h = np.zeros(n + layout.size)
             h[part] = rng.normal(0.0, 1e-5, part.stop - part.start)
             ahead, behind = (
-                moments(problem, coefficients + s * h[:n].reshape(coefficients.shape), static + s * h[n:])
+                curves(problem, coefficients + s * h[:n].reshape(coefficients.shape), static + s * h[n:])
                 for s in (1.0, -1.0)
             )
-            change = derivative @ h
-            # a step under load, which there is none of, makes the splines through the loads swing for some samples
-            away = np.abs(problem.trials[0].time[problem.trials[0].dynamic] - SWITCH_S) > 0.05
-            expected = (ahead - behind) / 2.0
-            np.testing.assert_allclose(change[away], expected[away], atol=1e-6 * np.abs(change).max())
+            for name, derivative in derivatives.items():
+                change, expected = derivative @ h, (ahead[name] - behind[name]) / 2.0
+                size = max(np.abs(change).max(), 1e-9 * np.abs(ahead[name]).max())
+                np.testing.assert_allclose(change[away], expected[away], atol=1e-6 * size, err_msg=name)
 
 
 def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
@@ -108,19 +139,32 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     root = StaticInformation.of(information, len(information)).root_of_covariance()
     full = root @ root.T
     n = coefficients.size
-    by = dense_derivative(problem, coefficients, static)
-    expected = np.einsum("dri,ij,drj->dr", by, full, by, optimize=True) + of_impacts(problem, coefficients, static)
     # of it, what would be left if all that does not move were known
     alone = inverse(dense(problem, coefficients, static)[:n, :n])
-    for sign, shares in ((1.0, np.sqrt(noise)), (-1.0, np.ones(3))):
-        shaken = dense_derivative(problem, coefficients, static, shares)[..., :n]
-        expected += sign * np.einsum("dri,ij,drj->dr", shaken, alone, shaken, optimize=True)
     part = reduced(problem.trial_normal(0, coefficients, static), 0.0)
     information = prior_information(problem, static) + part.information
     root = StaticInformation.of(information, problem.layout.in_root.stop).root_of_covariance()
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
-    moment_sd = joint_moment_sd(problem, 0, coefficients, static, part, root)
-    np.testing.assert_allclose(moment_sd, np.sqrt(expected), rtol=1e-3)
+    sd = curve_deviations(problem, 0, coefficients, static, part, root)
+    impacts, speed = of_impacts(problem, coefficients, static), speeds(problem, coefficients)
+    noise_n = problem.reactions(0, static).noise_n * (curves(problem, coefficients, static)["ground_forces"] != 0.0)
+    more = {
+        "moments": impacts,
+        "powers": impacts * speed**2,
+        "ground_forces": noise_n**2,
+    }
+    by, by_noise = (dense_derivatives(problem, coefficients, static, each) for each in (np.ones(3), np.sqrt(noise)))
+    for name, derivative in by.items():
+        expected = np.einsum("dri,ij,drj->dr", derivative, full, derivative, optimize=True) + more.get(name, 0.0)
+        for sign, shaken in ((1.0, by_noise[name][..., :n]), (-1.0, derivative[..., :n])):
+            expected += sign * np.einsum("dri,ij,drj->dr", shaken, alone, shaken, optimize=True)
+        found = getattr(sd, name).reshape(expected.shape)
+        np.testing.assert_allclose(found, np.sqrt(expected), rtol=1e-3, err_msg=name)
+
+
+def speeds(problem, coefficients: np.ndarray) -> np.ndarray:
+    """(d, c) of the coordinates that move."""
+    return problem.bases[0].evaluate(coefficients)[1][problem.trials[0].dynamic]
 
 
 def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise):
@@ -135,7 +179,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     here = here.under(GaussianPrior.of(pair.instruments), pair.layout.instruments)
     chains, information, right = dense_pair(pair, here)
     covariance = inverse(information)
-    static_covariance, moment_sd = _deviations(pair, here)
+    static_covariance, sds = _deviations(pair, here)
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(
@@ -145,17 +189,17 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     assert promised == pytest.approx(0.5 * right @ covariance @ right, rel=1e-6)
 
     in_trial = pair.in_trial(0, here.point)
-    by = dense_derivative(problem, coefficients, in_trial)
+    by = dense_derivatives(problem, coefficients, in_trial)["moments"]
     n = coefficients.size
     motion = inverse(dense_band(here.normals[0].last.band))
     carried = -motion @ here.normals[0].last.border.reshape(n, s)
     through = by[..., n:] + by[..., :n] @ carried
-    shaken = dense_derivative(problem, coefficients, in_trial, np.sqrt(noise))[..., :n]
+    shaken = dense_derivatives(problem, coefficients, in_trial, np.sqrt(noise))["moments"][..., :n]
     expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
     expected = np.sqrt(expected + of_impacts(problem, coefficients, in_trial))
-    np.testing.assert_allclose(moment_sd[0], expected, rtol=1e-3)
+    np.testing.assert_allclose(sds[0].moments, expected, rtol=1e-3)
 
 
 def inverse(matrix: np.ndarray) -> np.ndarray:

@@ -1,0 +1,40 @@
+"""Terms that tie the motion to its start, in a trial's normal equations: what no marker and no force shows stays there.
+
+The outermost splines hardly touch the data, and markers may be missing for a while. A spline coefficient that nothing
+else asks about goes where its neighbours go: the move from the start may change from one coefficient to the next, by
+CHANGE_SD. The move itself is all but free, AWAY_SD. Were it not, each of the thousands of coefficients of a long trial
+would hold a joint angle's constant offset, which markers in wrong places have put into the start, and take it for
+known.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.normal_equations import NormalEquations
+from kinertia.estimation.simultaneous.stretches import Stretch
+
+CHANGE_SD, AWAY_SD = 1.0, 30.0
+"""Rad or m: of the change from one coefficient to the next, and of each by itself."""
+
+
+def add_start(normal: NormalEquations, stretch: Stretch, moved: np.ndarray) -> None:
+    """Add the terms of a stretch's own splines.
+
+    Args:
+        normal: zero, or with other terms.
+        stretch: of the trial.
+        moved: (splines, c) how far all coefficients of the trial are from their start.
+    """
+    own, following = moved[stretch.splines], moved[stretch.splines.start + 1 : stretch.splines.stop + 1]
+    count, pairs = len(own), min(len(following), stretch.size - 1)
+    change = following[:pairs] - own[:pairs]
+    each = np.arange(moved.shape[1])
+    normal.band[:count, 0, each, each] += 1.0 / AWAY_SD**2
+    normal.right[:count] -= own / AWAY_SD**2
+    normal.band[:pairs, 0, each, each] += 1.0 / CHANGE_SD**2
+    normal.band[1 : pairs + 1, 0, each, each] += 1.0 / CHANGE_SD**2
+    normal.band[:pairs, 1, each, each] -= 1.0 / CHANGE_SD**2
+    normal.right[:pairs] += change / CHANGE_SD**2
+    normal.right[1 : pairs + 1] -= change / CHANGE_SD**2
+    normal.cost += 0.5 * float(np.square(own / AWAY_SD).sum() + np.square(change / CHANGE_SD).sum())
