@@ -21,12 +21,24 @@ class Tab:
         self.errors, self.hosts = [], set()
         self.page.on("console", lambda message: message.type in ("error", "warning") and self.heard(message.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("requestfailed", self.failed)
+        self.page.on("response", self.answered)
         self.page.on("request", lambda request: self.hosts.add(urlsplit(request.url).netloc))
 
     def heard(self, text):
         """What Chromium itself says of an answer to wrong input is no error of the page's."""
         if "422 (Unprocessable Entity)" not in text:
             self.errors.append(text)
+
+    def answered(self, response):
+        """Whatever is asked for is there; wrong input alone is answered with an error."""
+        if response.status >= 400 and response.status != 422:
+            self.errors.append(f"{response.status}: {response.url}")
+
+    def failed(self, request):
+        """What is asked for is answered, but for what is given up by going to another page, and files to save."""
+        if request.failure != "net::ERR_ABORTED":
+            self.errors.append(f"{request.failure}: {request.url}")
 
     def home(self):
         self.page.goto(self.app.address)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import webbrowser
 from contextlib import suppress
 from pathlib import Path
@@ -14,8 +13,6 @@ from kinertia.cli.measured_demo import FILES
 from kinertia.cli.terminal import out, print_json
 from kinertia.errors import KinertiaError
 
-_WARM_UP = (sys.executable, "-m", "kinertia", "warm-up", "--quiet")
-"""`kinertia warm-up` in a process of its own."""
 _HOW = 'pip install "kinertia[app]"'
 
 
@@ -52,7 +49,7 @@ def app(
         raise KinertiaError(problem) from None
     library = Library(Path.home() / "Kinertia" if folder is None else folder)
     with library.opened():
-        server = Server(library, port, FILES, _WARM_UP)
+        server = Server(library, port, FILES, prepare=True)
         if as_json:
             print_json({"address": server.address, "library": str(library.folder)})
         else:

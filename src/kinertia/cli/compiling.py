@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -10,8 +11,8 @@ from contextlib import contextmanager
 from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
-_MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.4, 0.5, 0.75
-"""Of the time, after which the synthetic walk, inverse kinematics and the rest before the estimate are done."""
+_POSE_SHARE, _MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.15, 0.4, 0.5, 0.8
+"""Of the time, after which a pose, the synthetic walk, inverse kinematics and the rest before the estimate are done."""
 
 
 def compile_once(progress: Callable[[str, float], None]) -> None:
@@ -19,7 +20,9 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
     if is_compiled():
         return
     progress(_STAGE, 0.0)
-    with _markers_beside():
+    with _without_looking_for_garbage(), _markers_beside():
+        import numpy as np
+
         from kinertia.estimation.prior import literature_prior
         from kinertia.estimation.simultaneous.fit import fit_simultaneous
         from kinertia.motion.dynamics import axis_motion, residual_terms, root_regressor
@@ -29,6 +32,8 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
         from kinertia.trial.data import FootLoads, Trial
 
         subject = walking_subject()
+        subject.skeleton.pose(np.zeros((1, len(subject.skeleton.coordinates))))
+        progress(_STAGE, _POSE_SHARE)
         short = walk(subject, 0.8)
         progress(_STAGE, _MOTION_SHARE)
         feet = FootLoads(short.time, short.foot_loads[..., :3], short.foot_loads[..., 3:])
@@ -42,9 +47,20 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
             skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *axis_motion(skeleton, motion)
         )
         progress(_STAGE, _DYNAMICS_SHARE)
-    fit_simultaneous(short.skeleton, literature_prior(subject.literature), [kinematics])
+    with _without_looking_for_garbage():
+        fit_simultaneous(short.skeleton, literature_prior(subject.literature), [kinematics])
     progress(_STAGE, 1.0)
     set_compiled()
+
+
+@contextmanager
+def _without_looking_for_garbage() -> Iterator[None]:
+    """Compiling makes millions of objects that stay: looking through them, again and again, takes a tenth of it."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 @contextmanager
@@ -78,6 +94,7 @@ def compile_markers() -> None:
     from kinertia.estimation.simultaneous.stretches import Stretch
     from kinertia.synthetic.walk import walking_subject
 
+    gc.disable()
     skeleton = walking_subject().skeleton
     coordinates, markers = len(skeleton.coordinates), len(skeleton.markers)
     basis = MotionBasis(0.01 * np.arange(20), 0.05)

@@ -39,19 +39,27 @@ SOURCES = (
 
 def compiled(function: F) -> F:
     """The function as machine code; division by zero gives inf or nan, as NumPy has it."""
-    return _compiled(function, forceinline=False)
+    return _compiled(function)
+
+
+def part(function: F) -> F:
+    """As `compiled`, for functions that only compiled ones call: to let Python call them takes longer to compile than
+    many of them do.
+    """
+    return _compiled(function, no_cpython_wrapper=True)
 
 
 def inlined(function: F) -> F:
-    """As `compiled`, for small functions in inner loops: their code stands where they are called."""
-    return _compiled(function, forceinline=True)
+    """As `part`, for small functions in inner loops: their code stands where they are called."""
+    return _compiled(function, no_cpython_wrapper=True, forceinline=True)
 
 
-def _compiled(function: F, forceinline: bool) -> F:
+def _compiled(function: F, **options: bool) -> F:
     import numba  # so that commands which compute nothing do not load it
 
     with _kept_in(cache_folder()):
-        result: F = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=forceinline)(function)
+        compile_it = numba.njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)
+        result: F = compile_it(function)
     return result
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.compiled import compiled, inlined
+from kinertia.model.compiled import compiled, inlined, part
 
 
 class KinematicTree(NamedTuple):
@@ -36,7 +36,7 @@ class KinematicTree(NamedTuple):
     segment_translation: np.ndarray
 
 
-@compiled
+@part
 def place_axes(
     tree: KinematicTree, at: np.ndarray, rotation: np.ndarray, translation: np.ndarray, axes: np.ndarray
 ) -> None:
@@ -100,7 +100,7 @@ def hand_down(parent: np.ndarray, sums: np.ndarray) -> None:
                 sums[before, k] += sums[j, k]
 
 
-@compiled
+@part
 def place_segments(
     tree: KinematicTree,
     axis_rotation: np.ndarray,

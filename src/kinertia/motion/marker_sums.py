@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.compiled import compiled, inlined
+from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import inner
 
@@ -43,22 +43,22 @@ def add_marker(weight: float, x: np.ndarray, y: np.ndarray, sums: np.ndarray) ->
 
 @inlined
 def met_force(sums: np.ndarray, i: int, s: np.ndarray, j: int, out: np.ndarray) -> None:
-    """out[0] = force that the motion s[j] in the second frame meets in the first, with sums[i]."""
+    """out[i] = force that the motion s[j] in the second frame meets in the first, with sums[i]."""
     w = sums[i, 0]
     lx, ly, lz, wx, wy, wz = s[j, 0], s[j, 1], s[j, 2], s[j, 3], s[j, 4], s[j, 5]
     square = sums[i, 7] + sums[i, 11] + sums[i, 15]
-    out[0, 0] = w * lx + wy * sums[i, 6] - wz * sums[i, 5]
-    out[0, 1] = w * ly + wz * sums[i, 4] - wx * sums[i, 6]
-    out[0, 2] = w * lz + wx * sums[i, 5] - wy * sums[i, 4]
+    out[i, 0] = w * lx + wy * sums[i, 6] - wz * sums[i, 5]
+    out[i, 1] = w * ly + wz * sums[i, 4] - wx * sums[i, 6]
+    out[i, 2] = w * lz + wx * sums[i, 5] - wy * sums[i, 4]
     along_x = sums[i, 7] * wx + sums[i, 8] * wy + sums[i, 9] * wz
     along_y = sums[i, 10] * wx + sums[i, 11] * wy + sums[i, 12] * wz
     along_z = sums[i, 13] * wx + sums[i, 14] * wy + sums[i, 15] * wz
-    out[0, 3] = sums[i, 2] * lz - sums[i, 3] * ly + square * wx - along_x
-    out[0, 4] = sums[i, 3] * lx - sums[i, 1] * lz + square * wy - along_y
-    out[0, 5] = sums[i, 1] * ly - sums[i, 2] * lx + square * wz - along_z
+    out[i, 3] = sums[i, 2] * lz - sums[i, 3] * ly + square * wx - along_x
+    out[i, 4] = sums[i, 3] * lx - sums[i, 1] * lz + square * wy - along_y
+    out[i, 5] = sums[i, 1] * ly - sums[i, 2] * lx + square * wz - along_z
 
 
-@compiled
+@part
 def swapped(sums: np.ndarray) -> np.ndarray:
     """(a, 16) the sums with the two frames exchanged."""
     result = sums.copy()
@@ -104,7 +104,7 @@ def normal_equations(
     n, a = at.shape
     normal, gradient, cost = np.zeros((n, count, count)), np.zeros((n, count)), np.zeros(n)
     rotation, translation, axes = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty((a, 6))
-    sums, forces, x, r, met = np.empty((a, 16)), np.empty((a, 6)), np.empty(3), np.empty(3), np.empty((1, 6))
+    sums, forces, x, r, met = np.empty((a, 16)), np.empty((a, 6)), np.empty(3), np.empty(3), np.empty((a, 6))
     for k in range(n):
         place_axes(tree, at[k], rotation, translation, axes)
         sums[:] = 0.0
@@ -126,10 +126,10 @@ def normal_equations(
             met_force(sums, j, axes, j, met)
             here, own = slopes[k, j], owner[j]
             gradient[k, own] += here * inner(axes, j, forces, j)
-            normal[k, own, own] += here * here * inner(axes, j, met, 0)
+            normal[k, own, own] += here * here * inner(axes, j, met, j)
             i = tree.parent[j]
             while i >= 0:
-                value = here * slopes[k, i] * inner(axes, i, met, 0)
+                value = here * slopes[k, i] * inner(axes, i, met, j)
                 normal[k, own, owner[i]] += value
                 normal[k, owner[i], own] += value
                 i = tree.parent[i]

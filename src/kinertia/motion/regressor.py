@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, place_segments
 from kinertia.motion.rigid_body import empty_frame, move
 
@@ -38,7 +38,7 @@ def regressor(
     return result
 
 
-@compiled
+@part
 def _in_segment(
     velocity: np.ndarray,
     acceleration: np.ndarray,
@@ -67,7 +67,7 @@ def _in_segment(
             b[r] += rotation[c, r] * origin[c]
 
 
-@compiled
+@part
 def _own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
     """out = (6, 10) in the segment's axes, about its origin."""
     out[:] = 0.0
@@ -94,7 +94,7 @@ def _own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray)
     out[5, 4], out[5, 5], out[5, 6], out[5, 7], out[5, 8], out[5, 9] = -xy, xx - yy, xy, e[0] - yz, e[1] + xz, e[2]
 
 
-@compiled
+@part
 def _to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
     """out = (6, 10) the same in ground axes and about another point, for a segment whose origin is at `at`."""
     x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.compiled import compiled, inlined
+from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import force_cross, inner, motion_cross
 
@@ -40,10 +40,12 @@ class Frame(NamedTuple):
         rotation, translation, axes: as `place_axes` has them.
         velocity, acceleration: (a + 1, 6) of what the axis moves; the last row, -1, is the ground's.
         swept, turned: (a, 6) P and Q above.
+        momentum: (a, 6) I V above, of what the axis itself bears.
         inertia: (a, 13) m, H and J above, J row by row, of all that the axis carries.
         bias: (a, 12) p and K above, K row by row, of the same.
         force: (a, 6) f above, of the same.
         column: (3, a, 6) derivatives of the force by the axis' place, rate and acceleration.
+        spare: (3, a, 6) room for what is needed on the way.
     """
 
     rotation: np.ndarray
@@ -53,24 +55,27 @@ class Frame(NamedTuple):
     acceleration: np.ndarray
     swept: np.ndarray
     turned: np.ndarray
+    momentum: np.ndarray
     inertia: np.ndarray
     bias: np.ndarray
     force: np.ndarray
     column: np.ndarray
+    spare: np.ndarray
 
 
-@compiled
+@part
 def empty_frame(a: int, gravity_m_s2: float) -> Frame:
     """Room for one frame of this many axes."""
     six, more = (a, 6), (a + 1, 6)
     velocity, acceleration = np.zeros(more), np.zeros(more)
     acceleration[a, 1] = gravity_m_s2
     places = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty(six)
-    moved = velocity, acceleration, np.empty(six), np.empty(six)
-    return Frame(*places, *moved, np.empty((a, 13)), np.empty((a, 12)), np.empty(six), np.empty((3, a, 6)))
+    moved = velocity, acceleration, np.empty(six), np.empty(six), np.empty(six)
+    sums = np.empty((a, 13)), np.empty((a, 12)), np.empty(six)
+    return Frame(*places, *moved, *sums, np.empty((3, a, 6)), np.empty((3, a, 6)))
 
 
-@compiled
+@part
 def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
     """Places, velocities and accelerations in one frame, from places, rates and accelerations of the axes (a,)."""
     axes, velocity, acceleration, swept, turned = (
@@ -161,9 +166,9 @@ def _times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray
     out[k, 5] = bias[j, 5] * wx + bias[j, 8] * wy + bias[j, 11] * wz - (lx * y - ly * x)
 
 
-@compiled
+@part
 def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.ndarray, bias: np.ndarray) -> None:
-    """B of one body, whose momentum (1, 6) is I V."""
+    """B of what axis j itself bears."""
     x, y, z = velocity[j, 3], velocity[j, 4], velocity[j, 5]
     turn = np.empty((3, 3))
     turn[0, 0], turn[0, 1], turn[0, 2] = 0.0, -z, y
@@ -174,78 +179,78 @@ def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.
     for r in range(3):
         twice += 2.0 * velocity[j, r] * inertia[j, 1 + r]
     for r in range(3):
-        bias[j, r] = momentum[0, r]
+        bias[j, r] = momentum[j, r]
         for c in range(3):
             value = -inertia[j, 1 + r] * velocity[j, c] - velocity[j, r] * inertia[j, 1 + c]
             for k in range(3):
                 value += turn[r, k] * inertia[j, 4 + 3 * k + c] - inertia[j, 4 + 3 * r + k] * turn[k, c]
             bias[j, 3 + 3 * r + c] = value + twice if r == c else value
-    bias[j, 4] += momentum[0, 5]
-    bias[j, 5] -= momentum[0, 4]
-    bias[j, 6] -= momentum[0, 5]
-    bias[j, 8] += momentum[0, 3]
-    bias[j, 9] += momentum[0, 4]
-    bias[j, 10] -= momentum[0, 3]
+    bias[j, 4] += momentum[j, 5]
+    bias[j, 5] -= momentum[j, 4]
+    bias[j, 6] -= momentum[j, 5]
+    bias[j, 8] += momentum[j, 3]
+    bias[j, 9] += momentum[j, 4]
+    bias[j, 10] -= momentum[j, 3]
 
 
-@compiled
+@part
 def _columns(frame: Frame) -> None:
     """The derivatives `column`, from all else in the frame."""
     axes, swept, inertia, bias = frame.axes, frame.swept, frame.inertia, frame.bias
     place, rate, acceleration = frame.column[0], frame.column[1], frame.column[2]
-    part = np.empty((3, 6))
+    by_swept, by_turned, twice = frame.spare[0], frame.spare[1], frame.spare[2]
     for j in range(len(axes)):
         force_cross(axes, j, frame.force, j, place, j)
-        _bias_times(bias, j, swept, j, part, 0)
-        _inertia_times(inertia, j, frame.turned, j, part, 1)
+        _bias_times(bias, j, swept, j, by_swept, j)
+        _inertia_times(inertia, j, frame.turned, j, by_turned, j)
         _bias_times(bias, j, axes, j, rate, j)
-        _inertia_times(inertia, j, swept, j, part, 2)
+        _inertia_times(inertia, j, swept, j, twice, j)
         _inertia_times(inertia, j, axes, j, acceleration, j)
         for k in range(6):
-            place[j, k] += part[0, k] + part[1, k]
-            rate[j, k] += 2.0 * part[2, k]
+            place[j, k] += by_swept[j, k] + by_turned[j, k]
+            rate[j, k] += 2.0 * twice[j, k]
 
 
-@compiled
-def _fill(
-    tree: KinematicTree,
-    bodies: np.ndarray,
-    x: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    frame: Frame,
-    derivatives: bool,
-) -> None:
-    """All of one frame, from bodies (a, 10) and places, rates and accelerations (a,) as `root_load` has them.
+@inlined
+def _bears(bodies: np.ndarray, j: int) -> bool:
+    """Whether axis j itself bears anything."""
+    borne = False
+    for k in range(10):
+        borne = borne or bodies[j, k] != 0.0
+    return borne
 
-    Without `derivatives` inertia, bias and column are of no use afterwards.
+
+@part
+def _fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
+    """Motion and forces of one frame, from bodies (a, 10) and places, rates and accelerations (a,) as `root_load` has
+    them; the inertia is of what each axis itself bears.
     """
     move(tree, x, v, a, frame)
-    inertia, bias, force = frame.inertia, frame.bias, frame.force
-    momentum, second = np.empty((1, 6)), np.empty((1, 6))
+    inertia, momentum, force = frame.inertia, frame.momentum, frame.force
+    second = np.empty((1, 6))
     force[:] = 0.0
-    if derivatives:
-        inertia[:] = 0.0
-        bias[:] = 0.0
+    inertia[:] = 0.0
     for j in range(len(bodies)):
-        borne = False
-        for k in range(10):
-            borne = borne or bodies[j, k] != 0.0
-        if not borne:
-            continue
-        _place_inertia(j, bodies, frame)
-        _inertia_times(inertia, j, frame.velocity, j, momentum, 0)
-        _inertia_times(inertia, j, frame.acceleration, j, force, j)
-        force_cross(frame.velocity, j, momentum, 0, second, 0)
-        for k in range(6):
-            force[j, k] += second[0, k]
-        if derivatives:
-            _place_bias(j, frame.velocity, inertia, momentum, bias)
+        if _bears(bodies, j):
+            _place_inertia(j, bodies, frame)
+            _inertia_times(inertia, j, frame.velocity, j, momentum, j)
+            _inertia_times(inertia, j, frame.acceleration, j, force, j)
+            force_cross(frame.velocity, j, momentum, j, second, 0)
+            for k in range(6):
+                force[j, k] += second[0, k]
     hand_down(tree.parent, force)
-    if derivatives:
-        hand_down(tree.parent, inertia)
-        hand_down(tree.parent, bias)
-        _columns(frame)
+
+
+@part
+def _differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
+    """Inertia and bias of all that the axes carry, and the derivatives `column`, after `_fill`."""
+    frame.bias[:] = 0.0
+    for j in range(len(bodies)):
+        if _bears(bodies, j):
+            _place_bias(j, frame.velocity, frame.inertia, frame.momentum, frame.bias)
+    hand_down(tree.parent, frame.inertia)
+    hand_down(tree.parent, frame.bias)
+    _columns(frame)
 
 
 @compiled
@@ -276,7 +281,8 @@ def root_load(
     frame = empty_frame(count, gravity_m_s2)
     column = frame.column
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame, True)
+        _fill(tree, bodies, x[k], v[k], a[k], frame)
+        _differentiate(tree, bodies, frame)
         for j in range(count):
             for order in range(3):
                 _taken_about(column[order, j], about[k], by[order, k, :, j])
@@ -298,14 +304,13 @@ def root_balance(
     n, count = x.shape
     load, by = np.zeros((n, 6)), np.empty((n, 6, 6))
     frame = empty_frame(count, gravity_m_s2)
-    inertia, column = frame.inertia, np.empty((1, 6))
+    inertia, column = frame.inertia, frame.spare[0]
     for k in range(n):
-        inertia[:] = 0.0
-        _fill(tree, bodies, x[k], v[k], a[k], frame, False)
+        _fill(tree, bodies, x[k], v[k], a[k], frame)
         hand_down(tree.parent, inertia)
         for j in range(6):
-            _inertia_times(inertia, j, frame.axes, j, column, 0)
-            _taken_about(column[0], about[k], by[k, :, j])
+            _inertia_times(inertia, j, frame.axes, j, column, j)
+            _taken_about(column[j], about[k], by[k, :, j])
         _whole(tree.parent, frame.force, load, k)
     return load, by
 
@@ -318,7 +323,7 @@ def _taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
     out[3], out[4], out[5] = force[3] - (y * fz - z * fy), force[4] - (z * fx - x * fz), force[5] - (x * fy - y * fx)
 
 
-@compiled
+@part
 def _whole(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -> None:
     """out[k] = (6,) sum over the axes that stand on the ground."""
     for j in range(len(parent)):
@@ -336,7 +341,7 @@ def axis_forces(
     tau, load = np.empty((n, count)), np.zeros((n, 6))
     frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame, False)
+        _fill(tree, bodies, x[k], v[k], a[k], frame)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
         _whole(tree.parent, frame.force, load, k)
@@ -352,21 +357,22 @@ def axis_force_derivatives(
     tau, by = np.empty((n, count)), np.zeros((3, n, count, count))
     frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame, True)
+        _fill(tree, bodies, x[k], v[k], a[k], frame)
+        _differentiate(tree, bodies, frame)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
         _through_axes(tree.parent, frame, by[0, k], by[1, k], by[2, k])
     return tau, by
 
 
-@compiled
+@part
 def _through_axes(
     parent: np.ndarray, frame: Frame, place: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
 ) -> None:
     """Derivatives (a, a) of the forces of axes, from those of what they carry."""
     axes, swept, turned, inertia, bias = frame.axes, frame.swept, frame.turned, frame.inertia, frame.bias
     column = frame.column
-    borne = np.empty((2, 6))
+    biased, borne = frame.spare[0], frame.spare[1]
     for j in range(len(parent)):
         i = j
         while i >= 0:
@@ -374,11 +380,11 @@ def _through_axes(
             rate[i, j] = inner(axes, i, column[1], j)
             acceleration[i, j] = inner(axes, i, column[2], j)
             i = parent[i]
-        _times_bias(bias, j, axes, j, borne, 0)
-        _inertia_times(inertia, j, axes, j, borne, 1)
+        _times_bias(bias, j, axes, j, biased, j)
+        _inertia_times(inertia, j, axes, j, borne, j)
         i = parent[j]
         while i >= 0:
-            place[j, i] = inner(borne, 0, swept, i) + inner(borne, 1, turned, i)
-            rate[j, i] = inner(borne, 0, axes, i) + 2.0 * inner(borne, 1, swept, i)
-            acceleration[j, i] = inner(borne, 1, axes, i)
+            place[j, i] = inner(biased, j, swept, i) + inner(borne, j, turned, i)
+            rate[j, i] = inner(biased, j, axes, i) + 2.0 * inner(borne, j, swept, i)
+            acceleration[j, i] = inner(borne, j, axes, i)
             i = parent[i]

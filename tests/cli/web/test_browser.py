@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import sys
 import zipfile
 from pathlib import Path
 from urllib.parse import quote
@@ -15,7 +16,8 @@ from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import DESKTOP, PHONE, picture, playwright
 from kinertia.cli.measured_demo import FILES
-from kinertia.cli.web import jobs
+from kinertia.cli.web import work
+from kinertia.cli.web.entries import recognise
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_file import read_subject
@@ -23,6 +25,18 @@ from kinertia.report.saved_fit import load_fit
 
 UNKNOWN = np.array([0xD5, 0x5E, 0x00]) / 255
 """Colour of markers without a place."""
+WRITTEN = """
+const write = CanvasRenderingContext2D.prototype.fillText, begin = CanvasRenderingContext2D.prototype.setTransform;
+CanvasRenderingContext2D.prototype.setTransform = function (...all) {
+  window.written = [];
+  return begin.apply(this, all);
+};
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  window.written.push({ text, x, y, wide: this.measureText(text).width });
+  return write.call(this, text, x, y);
+};
+"""
+"""Keeps what was last written on a canvas, and where."""
 pytestmark = pytest.mark.slow
 
 
@@ -38,8 +52,9 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
     tab.arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
     playwright.expect(tab.page.locator(".message.caution")).to_contain_text("lacks 'sex'")
-    tab.fill(sex="male", mass="41,5", height="1.61").check().checked().estimate()
-    verdict = tab.verdict()
+    tab.fill(sex="male", mass="41,5", height="1.61").check().checked()
+    playwright.expect(tab.page.locator("section[aria-labelledby=check] .headline")).to_be_in_viewport()
+    verdict = tab.estimate().verdict()
     ours, theirs = load_fit(tab.person().results), measured_demo.fit
     assert (ours.estimate.table() == theirs.estimate.table()).all()
     assert "Do not use" in verdict or "Usable" in verdict or "passed" in verdict
@@ -191,7 +206,7 @@ def press(page, name, key="Enter", most=60):
 
 
 def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", "pass"))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
     person = app.library.add("Keyboard")
     with_everything(person)
     tab = Tab(browser, app).home()
@@ -215,7 +230,7 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
 
 
 def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monkeypatch):
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", "pass"))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
     person = app.library.add("Rows by keyboard")
     for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
@@ -268,6 +283,44 @@ def test_an_unknown_marker_is_assigned_by_a_click(tab, app):
     saved = read_marker_set(person.folder / "markers.toml")
     assert label in saved.segments[f"forearm_{label[0].lower()}"]
     assert read_subject(person.subject).model.markers == (person.folder / "markers.toml").resolve()
+    tab.quiet()
+
+
+def test_labels_of_markers_do_not_overprint_one_another(browser, app, shared_data):
+    files = ("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml", "scaled.osim")
+    person = app.library.add("Labels")
+    for name in files:
+        shutil.copyfile(shared_data / "rajagopal_walk" / name, person.folder / name)
+    recognise(person)
+    for viewport in (DESKTOP, PHONE):
+        tab = Tab(browser, app, viewport)
+        tab.page.add_init_script(WRITTEN)
+        tab.page.goto(f"{app.address}people/Labels/markers")
+        playwright.expect(tab.page.locator("canvas[data-chosen]")).to_have_count(1)
+        for _ in range(8):
+            tab.page.get_by_role("button", name="Turn left").click()
+            shown = tab.page.evaluate("window.written")
+            assert len(shown) >= 20
+            boxes = np.array([[box["x"], box["y"], box["x"] + box["wide"], box["y"] + 9] for box in shown])
+            near = (boxes[:, None, :2] < boxes[None, :, 2:]).all(axis=2)
+            assert (near & near.T).sum() == len(shown), "labels cover one another"
+        tab.quiet()
+
+
+def test_a_marker_tells_its_label_when_it_is_pointed_at(tab, app):
+    person = app.library.add("Pointed at")
+    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+        shutil.copyfile(path, person.folder / path.name)
+    tab.page.add_init_script(WRITTEN)
+    tab.page.goto(f"{app.address}people/{quote(person.name)}/markers")
+    canvas = tab.page.locator("canvas")
+    tab.page.get_by_label("labels", exact=True).uncheck()
+    assert {one["text"] for one in tab.page.evaluate("window.written")} == {"LFIN", "RFIN"}
+    dark = np.argwhere(picture(canvas).max(axis=2) < 0.15)
+    chosen = dark[np.abs(dark - dark[0]).max(axis=1) < 6]
+    y, x = chosen.mean(axis=0)
+    canvas.hover(position={"x": float(x), "y": float(y)})
+    assert len(tab.page.evaluate("window.written")) == 3
     tab.quiet()
 
 

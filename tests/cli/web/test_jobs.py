@@ -9,7 +9,8 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
-from kinertia.cli.web import jobs as module
+from kinertia.cli.web import jobs as jobs_module
+from kinertia.cli.web import work as module
 from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.person_page import progress
@@ -28,7 +29,7 @@ def worker(monkeypatch):
 
     def replace(program):
         lead = (
-            "import json, pathlib, sys, time, os\nfolder = pathlib.Path(sys.argv[2])\n"
+            "import json, pathlib, sys, time, os\nfolder = pathlib.Path(sys.argv[-1])\n"
             "def say(**told): print(json.dumps(told), flush=True)\n"
         )
         monkeypatch.setattr(module, "WORKER", (sys.executable, "-c", lead + program))
@@ -95,6 +96,28 @@ def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
     assert ben.notes()["fit"] == {}
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not tell who ended a process")
+def test_a_fit_that_was_killed_is_no_failure_of_ours(library, worker):
+    worker("import signal\nos.kill(os.getpid(), signal.SIGKILL)")
+    with fitting(library, "Anna") as (jobs, person):
+        until(lambda: not jobs.busy(person))
+    assert "ended from outside" in person.notes()["fit"]["message"]
+    assert "memory" in person.notes()["fit"]["message"]
+    assert not (person.folder / jobs_module.LOG).exists()
+
+
+def test_the_log_of_a_failure_is_none_of_the_files_and_goes_with_the_next_success(library, worker):
+    worker("if not (folder / 'sound').exists(): os.abort()")
+    with fitting(library, "Anna") as (jobs, person):
+        until(lambda: not jobs.busy(person))
+        assert (person.folder / jobs_module.LOG).is_file()
+        assert person.files() == []
+        (person.folder / "sound").touch()
+        jobs.add(person, "fit")
+        until(lambda: not jobs.busy(person))
+    assert not (person.folder / jobs_module.LOG).exists()
+
+
 def test_who_waits_and_who_is_at_work_are_cancelled(library, worker):
     worker("say(stage='estimate', share=0.1); time.sleep(60)")
     with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
@@ -126,16 +149,50 @@ def test_a_check_does_not_wait_for_fits(library, worker):
 
 
 def test_fits_wait_for_what_is_compiled_once_and_its_end_ends_it(library, worker, monkeypatch):
-    monkeypatch.setattr(module, "is_compiled", lambda: False)
-    worker("pass")
+    monkeypatch.setattr(jobs_module, "is_compiled", lambda: False)
+    worker("say(stage='compiling, once', share=0.5)\nif sys.argv[1] == 'prepare': time.sleep(60)")
     person = library.add("Anna")
-    jobs = Jobs((sys.executable, "-c", "import time; time.sleep(60)"))
+    jobs = Jobs(prepare=True)
     with jobs.at_work():
         jobs.add(person, "fit")
-        until(lambda: jobs.compiling)
-        assert progress(person, jobs)["fit"]["stage"].startswith("compiling, once on a computer")
-    assert not jobs.compiling
+        until(lambda: jobs.preparing.share == 0.5)
+        told = progress(person, jobs)["fit"]
+        assert (told["stage"], told["share"]) == ("preparing this computer for its first estimate", 0.5)
+        assert told["left"].startswith("about ")
+    assert jobs.preparing is None
     assert person.notes()["fit"] == {"how": "interrupted"}
+
+
+def test_a_fit_that_was_asked_for_meanwhile_begins_when_all_is_compiled(library, worker, monkeypatch):
+    monkeypatch.setattr(jobs_module, "is_compiled", lambda: False)
+    order = str(library.folder / "order")
+    worker(f"open({order!r}, 'a').write(sys.argv[1] + ' ')")
+    person, jobs = library.add("Anna"), Jobs(prepare=True)
+    jobs.add(person, "fit")
+    with jobs.at_work():
+        until(lambda: not jobs.busy(person))
+    assert (library.folder / "order").read_text().split() == ["prepare", "fit"]
+    assert person.notes()["fit"] == {}
+
+
+def test_the_time_left_falls_until_the_next_share_is_told(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    work = module.Work()
+    work._moved("compiling, once", 0.0)
+    assert work.seconds_left() is None
+    now[0] = 8.0
+    work._moved("compiling, once", 0.4)
+    assert work.seconds_left() == pytest.approx(12.0)
+    now[0] = 13.0
+    assert work.seconds_left() == pytest.approx(7.0)
+    now[0] = 60.0
+    assert work.seconds_left() == 1.0
+
+
+def test_nothing_is_prepared_where_all_is_compiled(monkeypatch):
+    monkeypatch.setattr(jobs_module, "is_compiled", lambda: True)
+    assert Jobs(prepare=True).preparing is None
 
 
 def test_lines_of_others_are_passed_over():

@@ -59,6 +59,43 @@ def test_nobody_is_overwritten(library):
     assert names == ["Anna", "anna 2", "Anna 3"]
 
 
+def test_a_renamed_person_keeps_everything(library):
+    person, ben = library.add("Person"), library.add("Ben")
+    (person.folder / "walk.c3d").write_bytes(b"content")
+    person.note(saved=True)
+    renamed = library.rename(person, "Anna Maria")
+    assert (renamed.name, renamed.notes()) == ("Anna Maria", {"saved": True})
+    assert (renamed.folder / "walk.c3d").read_bytes() == b"content"
+    assert set(library.people()) == {renamed, ben}
+
+
+@pytest.mark.parametrize(("wanted", "name"), [("../../etc", "etc"), ("ben", "ben 2"), ("PERSON", "PERSON")])
+def test_a_new_name_is_made_one_of_a_folder_and_nobody_elses(library, wanted, name):
+    person, ben = library.add("Person"), library.add("Ben")
+    renamed = library.rename(person, wanted)
+    assert renamed.name == name
+    assert renamed.folder.parent == library.folder
+    assert set(library.people()) == {renamed, ben}
+
+
+@pytest.mark.parametrize("wanted", ["Person", " Person ", "", "...", "nul"])
+def test_who_is_given_no_other_name_keeps_the_old_one(library, wanted):
+    person = library.add("Person")
+    assert library.rename(person, wanted) == person
+    assert library.people() == [person]
+
+
+def test_a_person_whose_file_is_open_elsewhere_keeps_the_name(library, monkeypatch):
+    def refused(*_):
+        raise OSError(13, "Permission denied")
+
+    person = library.add("Person")
+    monkeypatch.setattr("os.rename", refused)
+    with pytest.raises(FileError, match="cannot be renamed"):
+        library.rename(person, "Anna")
+    assert library.people() == [person]
+
+
 def test_folders_of_others_are_not_people(library):
     (library.folder / "Photos").mkdir()
     library.add("Anna")

@@ -1,6 +1,8 @@
 """The life of the page in a browser: several tabs, reloads, cancelled and crashed fits, the library, the end."""
 
+import json
 import shutil
+import sys
 from urllib.parse import quote
 
 import pytest
@@ -11,7 +13,7 @@ from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import playwright
 from kinertia.cli.measured_demo import FILES
-from kinertia.cli.web import jobs
+from kinertia.cli.web import work
 
 WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share': 0.3}), flush=True)\ntime.sleep(90)"
 """A fit that is not done before it is cancelled."""
@@ -30,7 +32,7 @@ def ready(library, name):
 @pytest.fixture
 def waiting(monkeypatch, app):
     """A person whose fit does not end by itself."""
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", WAITING))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", WAITING))
     return ready(app.library, "Waiting")
 
 
@@ -39,6 +41,7 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
     address = f"{app.address}people/{waiting.name}"
     first.page.goto(address)
     first.estimate()
+    playwright.expect(first.page.locator("progress")).to_be_in_viewport()
     stage = first.page.locator("[data-stage]")
     playwright.expect(stage).to_have_text("estimate", timeout=PATIENCE_MS)
     playwright.expect(first.page.locator("[data-left]")).to_contain_text("left")
@@ -60,7 +63,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
     """A tab that shows the answer to a form shows the person's page when the fit is done."""
     go = tmp_path / "go"
     code = f"import os, time\nwhile not os.path.exists({str(go)!r}): time.sleep(0.05)"
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", code))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", code))
     person = ready(app.library, "Copied")
     person.results.mkdir()
     (person.results / "fit.json").write_text('{"kinertia": "x"}')
@@ -73,7 +76,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
     page.get_by_label("Folder on this computer").fill(str(tmp_path / "mine"))
     page.get_by_role("button", name="Write the results there").click()
     playwright.expect(page.locator(".message.pass")).to_contain_text("The results are in")
-    assert page.url == f"{app.address}people/{person.name}"
+    playwright.expect(page).to_have_url(f"{app.address}people/{person.name}")
     go.touch()
     playwright.expect(page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
     playwright.expect(page).to_have_url(f"{app.address}people/{person.name}#results")
@@ -84,7 +87,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
 
 def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch):
     crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
-    monkeypatch.setattr(jobs, "WORKER", (jobs.sys.executable, "-c", crash))
+    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", crash))
     tab = Tab(browser, app)
     for name, said in (("Crashing", "Kinertia failed"), ("Next", "")):
         tab.page.goto(f"{app.address}people/{ready(app.library, name).name}")
@@ -124,6 +127,22 @@ def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run,
         playwright.expect(page.locator(".people a")).to_have_text(["Spring"])
         assert [path.name for path in library.iterdir() if not path.name.startswith(".")] == ["Spring"]
         tab.quiet()
+
+
+def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app):
+    person = ready(app.library, "Person to rename")
+    with_everything(person)
+    outcome = json.loads((person.results / "outcome.json").read_text())
+    (person.results / "outcome.json").write_text(json.dumps({**outcome, "inputs": person.inputs}))
+    tab.page.goto(f"{app.address}people/{quote(person.name)}")
+    tab.page.get_by_text("Rename", exact=True).click()
+    tab.page.get_by_label("Name in the library").fill("Eva (spring)")
+    tab.page.get_by_label("Name in the library").press("Enter")
+    playwright.expect(tab.page.get_by_role("heading", level=1)).to_have_text("Eva (spring)")
+    results = tab.page.locator("section[aria-labelledby=results]")
+    playwright.expect(results.locator(".headline")).to_have_text("Usable with care.")
+    playwright.expect(results.get_by_text("before your last change")).to_have_count(0)
+    tab.quiet()
 
 
 def test_a_report_reaches_nothing(browser, app):

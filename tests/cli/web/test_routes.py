@@ -15,6 +15,7 @@ from app_server import running
 from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
 from kinertia.io.measures_file import measures_sheet
+from kinertia.io.subject_file import read_subject
 from kinertia.report.measures_picture import measures_picture
 
 
@@ -76,7 +77,7 @@ def test_while_a_person_is_busy_nothing_is_changed(app, monkeypatch):
     answer = app.post("/people/Anna/files?name=walk.trc", b"content", Accept="application/json")
     assert answer.status == 409
     assert "wait for the check or fit" in json.loads(answer.text)["problem"]
-    for action in ("entries", "text", "remove", "recognise", "markers"):
+    for action in ("entries", "text", "remove", "recognise", "markers", "rename"):
         assert app.post(f"/people/Anna/{action}", "text=x").status == 409
     assert person.files() == []
 
@@ -103,6 +104,31 @@ def test_a_disk_without_space_is_said(app, monkeypatch):
     assert "No space left on device; check the path, its permissions" in json.loads(answer.text)["problem"]
 
 
+def test_a_renamed_person_has_another_address(app):
+    app.library.add("Person")
+    answer = app.post("/people/Person/rename", f"name={quote('Änne <b>')}")
+    assert (answer.status, answer.headers["location"]) == (303, f"{app.root}/people/{quote('Änne b')}")
+    assert app.ask("/people/Person").status == 404
+    assert [person.name for person in app.library.people()] == ["Änne b"]
+
+
+def test_estimate_takes_what_is_in_the_form(app, measured_walk, monkeypatch):
+    added = []
+    monkeypatch.setattr(Jobs, "add", lambda self, person, kind: added.append(kind))
+    person = app.library.add("Anna")
+    for path in measured_walk.iterdir():
+        shutil.copyfile(path, person.folder / path.name)
+    before = person.subject.read_text()
+    assert app.post("/people/Anna/fit", "mass_kg=41.5").status == 303
+    assert person.subject.read_text() == before, "nothing was changed, so comments stay"
+    assert app.post("/people/Anna/fit", "mass_kg=44").status == 303
+    assert read_subject(person.subject).subject.mass_kg == 44.0
+    refused = app.post("/people/Anna/fit", "mass_kg=heavy")
+    assert refused.status == 422
+    assert "is not a number; write it like 72.6" in refused.text
+    assert added == ["fit", "fit"]
+
+
 def test_what_cannot_be_fitted_does_not_wait(app):
     person = app.library.add("Anna")
     assert app.post("/people/Anna/fit").status == 303
@@ -110,7 +136,7 @@ def test_what_cannot_be_fitted_does_not_wait(app):
     assert person.notes() == {}
 
 
-@pytest.mark.parametrize("form", ["copy", "entries", "text", "fit", "delete"])
+@pytest.mark.parametrize("form", ["copy", "entries", "text", "fit", "delete", "rename"])
 def test_the_address_of_a_form_leads_to_the_person(app, form):
     person = app.library.add("Anna B")
     answer = app.ask(f"/people/Anna%20B/{form}")

@@ -47,6 +47,11 @@ USE = "use:"
 """What the fields of the form are called that say what a file is used as; the file's name follows."""
 
 
+def label_of(key: str) -> str:
+    """What an entry of `[subject]` is called in the form."""
+    return _LABELS.get(key, key.replace("_", " "))
+
+
 def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Field]:
     """The entries of `[subject]`, all that the subject file knows; what was typed goes before what is written."""
     written = content.get("subject")
@@ -55,7 +60,7 @@ def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Fie
     for key, about in Subject.model_fields.items():
         value = str((typed or {}).get(key, known.get(key, "")))
         choices = choices_of(about.annotation)
-        label = _LABELS.get(key, key.replace("_", " "))
+        label = label_of(key)
         optional = key == "name" or key.endswith("_mm")
         shown.append(
             Field(key, label, about.description or "", str(sex_of(value)) if choices else value, choices, optional)
@@ -159,12 +164,13 @@ def _write_uses(person: Person, before: Content, changed: Content, uses: Mapping
     """Write the entries with these uses; a trial that is used again has the forces and the rest that it had."""
     aside = person.notes().get("aside", [])
     after = with_uses(*taken_up(changed, uses, aside))
-    write(person, after)
+    if after != before:
+        write(person, after)
     person.note(aside=put_aside(before, after, aside))
 
 
 def _number(key: str, text: str) -> float:
-    label = _LABELS.get(key, key)
+    label = label_of(key)
     try:
         number = number_of(text)
     except ValueError as error:

@@ -2,124 +2,64 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import threading
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
-from kinertia.cli.web.library import Person, started
+from kinertia.cli.web.library import LOG, Person, started
+from kinertia.cli.web.work import Work
 from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit")
-LOG = "failure.log"
-WORKER = (sys.executable, "-m", "kinertia.cli.web.worker")
-_PATIENCE_S, _PAUSE_S = 5.0, 0.1
-_NO_WINDOW: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-"""Windows opens a console for every process otherwise."""
+_PATIENCE_S = 5.0
+_ENDED_FROM_OUTSIDE = (-9, -15)
+"""SIGKILL and SIGTERM, as Python tells them."""
+_OUTSIDE = "It was ended from outside, as the system does where memory runs out: close other programs, start it again."
 
 
-class Job:
+class Job(Work):
     """A check or a fit that waits or is at work.
 
     Attributes:
         person: of whom.
         kind: "check" or "fit".
-        stage: what it is doing; empty while it waits.
-        share: of the stage that is done, 0 to 1.
     """
 
     def __init__(self, person: Person, kind: str) -> None:
+        super().__init__()
         self.person = person
         self.kind = kind
-        self.stage = ""
-        self.share = 0.0
-        self._since = time.monotonic()
-        self._process: subprocess.Popen[str] | None = None
-        self._lock = threading.Lock()
-        self.cancelled = False
-
-    def seconds_left(self) -> float | None:
-        """Of this stage, by how long its share took; None as long as nobody knows."""
-        if not 0.0 < self.share < 1.0:
-            return None
-        return (time.monotonic() - self._since) * (1.0 - self.share) / self.share
-
-    def cancel(self) -> None:
-        """Give it up, wherever it is; may be called from any thread."""
-        with self._lock:
-            self.cancelled = True
-            if self._process is not None:
-                self._process.terminate()
 
     def run(self) -> dict[str, Any]:
         """Do it; how it ended, for the person's notes."""
-        self._moved("starting", 0.0)
-        status, error, log = self._done([*WORKER, self.kind, str(self.person.folder)])
+        ended = self.done(self.kind, str(self.person.folder))
         if self.cancelled:
             return {"how": "cancelled"}
-        if status == 0:
-            return {}
-        if error:
-            return {"how": "failed", "message": error}
         path = self.person.folder / LOG
-        path.write_text(log, encoding="utf-8")
-        told = log.strip().rpartition("\n")[2] or f"its process ended with status {status}"
+        path.unlink(missing_ok=True)
+        if ended.status == 0:
+            return {}
+        if ended.error:
+            return {"how": "failed", "message": ended.error}
+        if ended.status in _ENDED_FROM_OUTSIDE:
+            return {"how": "failed", "message": _OUTSIDE}
+        path.write_text(ended.log, encoding="utf-8")
+        told = ended.log.strip().rpartition("\n")[2] or f"its process ended with status {ended.status}"
         sentence = f"Kinertia failed, which it should not on any input ({told}); please send {path} to its developers"
         return {"how": "failed", "message": sentence}
-
-    def _moved(self, stage: str, share: float) -> None:
-        if stage != self.stage:
-            self._since = time.monotonic()
-        self.stage, self.share = stage, share
-
-    def _done(self, command: Sequence[str]) -> tuple[int, str, str]:
-        """Exit status, the error that it named, and what else it said."""
-        with self._lock:
-            if self.cancelled:
-                return 1, "", ""
-            self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                encoding="utf-8",
-                errors="replace",
-                cwd=Path.home(),  # results replace their folder, which must be nobody's current one
-                creationflags=_NO_WINDOW,
-            )
-        process = self._process
-        assert process.stdout is not None
-        assert process.stderr is not None
-        said: list[str] = []
-        listener = threading.Thread(target=lambda: said.append(process.stderr.read()))  # type: ignore[union-attr]
-        listener.start()
-        error = ""
-        for line in process.stdout:
-            told = _line(line)
-            error = told.get("error", error)
-            if "stage" in told:
-                self._moved(told["stage"], told["share"])
-        status = process.wait()
-        listener.join()
-        return status, error, "".join(said)
 
 
 class Jobs:
     """Two lines of people: one for checks, which take seconds, and one for fits.
 
     Attributes:
-        compiling: whether fits wait for what is compiled once on a machine.
+        preparing: what is compiled once on a machine, as long as that is not done; fits wait for it.
     """
 
-    def __init__(self, warm_up: Sequence[str] = ()) -> None:
-        """Nobody waits yet; `warm_up` is the command that compiles, where that is to be done before the first fit."""
-        self._warm_up = warm_up
-        self.compiling = False
+    def __init__(self, prepare: bool = False) -> None:
+        """Nobody waits yet; `prepare` for compiling beforehand, where that is not done, what the first fit needs."""
+        self.preparing = Work() if prepare and not is_compiled() else None
         self._lines: dict[str, list[Job]] = {kind: [] for kind in KINDS}
         self._changed = threading.Condition()
         self._closed = False
@@ -169,9 +109,10 @@ class Jobs:
             with self._changed:
                 self._closed = True
                 unfinished = [job for line in self._lines.values() for job in line]
+                preparing = self.preparing
                 self._changed.notify_all()
-            for job in unfinished:
-                job.cancel()
+            for work in [*unfinished, *([preparing] if preparing else [])]:
+                work.cancel()
             for thread in threads:
                 thread.join(_PATIENCE_S)
             for job in unfinished:
@@ -181,22 +122,11 @@ class Jobs:
                 ):
                     job.person.note(**{job.kind: {"how": "interrupted"}})
 
-    def _compile(self) -> None:
-        """Compile what has not been compiled on this machine, while people still look for their files."""
-        if not self._warm_up or is_compiled():
-            return
-        self.compiling = True
-        quiet = subprocess.DEVNULL
-        process = subprocess.Popen(self._warm_up, stdin=quiet, stdout=quiet, stderr=quiet, creationflags=_NO_WINDOW)
-        while process.poll() is None and not self._closed:
-            time.sleep(_PAUSE_S)
-        if process.poll() is None:
-            process.terminate()
-        self.compiling = False
-
     def _work(self, kind: str) -> None:
-        if kind == "fit":
-            self._compile()
+        if kind == "fit" and self.preparing is not None:
+            with suppress(OSError):  # then the first fit compiles it
+                self.preparing.done("prepare")
+            self.preparing = None
         line = self._lines[kind]
         while True:
             with self._changed:
@@ -214,12 +144,3 @@ class Jobs:
                 if job.person.folder.is_dir():
                     job.person.note(**{kind: ended})
                 self._changed.notify_all()
-
-
-def _line(text: str) -> dict[str, Any]:
-    """What a line of a worker says; nothing where it is not one of ours."""
-    try:
-        told = json.loads(text)
-    except ValueError:
-        return {}
-    return told if isinstance(told, dict) else {}

@@ -32,6 +32,8 @@ from kinertia.io.working_folder import sweep
 from kinertia.studies.cohort_record import inputs_of
 
 SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
+LOG = "failure.log"
+"""What a crash left for the developers."""
 _RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
 _STARTED, _INTERRUPTED = "started", "interrupted"
 _LONGEST_NAME = 80
@@ -71,11 +73,11 @@ class Person:
         return (self.results / SUMMARY).is_file()
 
     def files(self) -> list[Path]:
-        """What was dropped: everything but the subject file."""
+        """What was dropped: everything but the subject file and what a crash left."""
         return sorted(
             path
             for path in self.folder.iterdir()
-            if path.is_file() and path.name != SUBJECT and not path.name.startswith(".")
+            if path.is_file() and path.name not in (SUBJECT, LOG) and not path.name.startswith(".")
         )
 
     def changed(self) -> float:
@@ -150,17 +152,33 @@ class Library:
 
     def add(self, wanted: str) -> Person:
         """A new person of this name, or of one like it that is free."""
-        cleaned = "".join(letter if letter.isalnum() or letter in " -_.,()" else " " for letter in wanted)
-        cleaned = " ".join(cleaned.split())[:_LONGEST_NAME].strip(" .")
-        base = cleaned if fits_everywhere(cleaned) else "Person"
-        taken, name, number = [path.name for path in self.folder.iterdir()], base, 1
-        while any(same_folder(name, other) for other in taken):
-            number += 1
-            name = f"{base} {number}"
-        person = Person(self.folder / name)
+        person = Person(self.folder / self._free(_folder_name(wanted) or "Person"))
         person.folder.mkdir()
         person.note()
         return person
+
+    def rename(self, person: Person, wanted: str) -> Person:
+        """The person under this name, or one like it that is free; as before if it is none.
+
+        Raises:
+            FileError: a file is open in another program.
+        """
+        name = self._free(_folder_name(wanted) or person.name, but=person.name)
+        try:
+            os.rename(person.folder, self.folder / name)
+        except OSError as error:
+            problem = f"cannot be renamed ({error.strerror}); close the program that has a file of it open"
+            raise FileError(person.folder, problem) from error
+        return Person(self.folder / name)
+
+    def _free(self, base: str, but: str = "") -> str:
+        """This name, with a number where it is taken by another folder than `but`."""
+        taken = [path.name for path in self.folder.iterdir() if path.name != but]
+        name, number = base, 1
+        while any(same_folder(name, other) for other in taken):
+            number += 1
+            name = f"{base} {number}"
+        return name
 
     def delete(self, person: Person) -> None:
         """Remove a person's files and results; whoever looks finds all of it or nothing.
@@ -175,6 +193,13 @@ class Library:
         except OSError as error:
             problem = f"cannot be deleted ({error.strerror}); close the program that has a file of it open"
             raise FileError(person.folder, problem) from error
+
+
+def _folder_name(wanted: str) -> str:
+    """A name that a folder can have on every system; empty if nothing is left of it."""
+    cleaned = "".join(letter if letter.isalnum() or letter in " -_.,()" else " " for letter in wanted)
+    cleaned = " ".join(cleaned.split())[:_LONGEST_NAME].strip(" .")
+    return cleaned if fits_everywhere(cleaned) else ""
 
 
 def started() -> Mapping[str, str]:

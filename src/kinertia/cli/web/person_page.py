@@ -14,7 +14,8 @@ from kinertia.cli.web.entries import USE, entries, fields, marker_set_field, tro
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import Person
-from kinertia.cli.web.responses import page
+from kinertia.cli.web.plain_words import told
+from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
 from kinertia.errors import KinertiaError
@@ -24,6 +25,7 @@ _ENDED = {
     "cancelled": "Cancelled.",
     "interrupted": "Interrupted: Kinertia was closed before it was done. Start it again.",
 }
+_PREPARING = "preparing this computer for its first estimate"
 
 
 @dataclass(frozen=True)
@@ -64,28 +66,23 @@ def standing(person: Person, jobs: Jobs) -> Standing:
 
 def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
     """How far the person's check and fit are; null for what neither waits nor is at work."""
-    told: dict[str, Any] = {}
+    far: dict[str, Any] = {}
+    preparing = jobs.preparing
     for kind in KINDS:
         job = jobs.of(person, kind)
-        told[kind] = None if job is None else {"stage": _stage(job, jobs), "share": job.share, "left": _left(job)}
-    return told
+        far[kind] = None if job is None else {"stage": _stage(job, jobs), "share": job.share, "left": time_left(job)}
+        if job is not None and kind == "fit" and preparing is not None:
+            far[kind] = {"stage": _PREPARING, "share": preparing.share, "left": time_left(preparing)}
+    return far
 
 
 def _stage(job: Job, jobs: Jobs) -> str:
-    if job.kind == "fit" and jobs.compiling:
-        return "compiling, once on a computer: about half a minute"
+    if job.kind == "fit" and jobs.preparing is not None:
+        return _PREPARING
     before = jobs.place(job)
     if job.stage or not before:
         return job.stage or "starting"
     return f"waiting for {before} other{'s' if before > 1 else ''}"
-
-
-def _left(job: Job) -> str:
-    """The time left of the stage, in words; empty as long as nobody knows."""
-    seconds = job.seconds_left()
-    if seconds is None:
-        return ""
-    return f"about {seconds:.0f} s left" if seconds < 90 else f"about {seconds / 60:.0f} min left"
 
 
 def person_page(
@@ -132,6 +129,7 @@ def person_page(
         broken=broken,
         problem=problem,
         trouble=found,
+        told=told(person, found),
         draft=notes.get("draft", "") if person.files() else "",
         said=said,
         saved=notes.get("saved", False),

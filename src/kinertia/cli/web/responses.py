@@ -18,6 +18,7 @@ from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Re
 
 from kinertia.cli.web.guard import RESULT_POLICY
 from kinertia.cli.web.library import Person
+from kinertia.cli.web.work import Work
 from kinertia.errors import FileError
 from kinertia.io.provenance import VERSION
 from kinertia.report.rendering import templates_of
@@ -36,14 +37,25 @@ def _environment() -> jinja2.Environment:
 
 def page(request: Request, template: str, status: int = 200, **content: Any) -> HTMLResponse:
     """A page; `root` in it is where the application's addresses begin."""
-    root = request.scope["root_path"]
-    text = _environment().get_template(template).render(root=root, version=VERSION, **content)
+    root, preparing = request.scope["root_path"], request.app.state.jobs.preparing
+    told = "" if preparing is None else time_left(preparing)
+    shared = {"root": root, "version": VERSION, "preparing": preparing is not None, "preparing_left": told}
+    text = _environment().get_template(template).render(**shared, **content)
     return HTMLResponse(text.encode("utf-8", errors="replace"), status)
 
 
-def to(request: Request, *parts: str) -> RedirectResponse:
-    """On to another page, as after a form."""
-    return RedirectResponse("/".join([request.scope["root_path"], *(quote(part, safe="") for part in parts)]), 303)
+def time_left(work: Work) -> str:
+    """The time left of the stage, in words; empty as long as nobody knows."""
+    seconds = work.seconds_left()
+    if seconds is None:
+        return ""
+    return f"about {seconds:.0f} s left" if seconds < 90 else f"about {seconds / 60:.0f} min left"
+
+
+def to(request: Request, *parts: str, section: str = "") -> RedirectResponse:
+    """On to another page, or to a section of it, as after a form."""
+    address = "/".join([request.scope["root_path"], *(quote(part, safe="") for part in parts)])
+    return RedirectResponse(f"{address}#{section}" if section else address, 303)
 
 
 async def form(request: Request) -> dict[str, str]:

@@ -22,7 +22,7 @@ from kinertia.cli.web.jobs import KINDS, Jobs
 from kinertia.cli.web.library import Library, Person
 from kinertia.cli.web.marker_routes import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
-from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, to
+from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.measures_file import measures_sheet
@@ -31,8 +31,10 @@ from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
-_FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", *KINDS)
+_FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", "rename", *KINDS)
 """Addresses below a person's that forms are sent to."""
+_SECTIONS = {"check": "check", "fit": "results"}
+"""Where on a person's page it is seen how far a check or a fit is."""
 
 
 def application(library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> Starlette:
@@ -46,6 +48,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/compare/page", actions.compared),
         Route("/measures.csv", actions.measures_sheet),
         Route("/measures.svg", actions.measures_picture),
+        Route("/preparing", actions.preparing),
         Route("/stop", actions.end, methods=["POST"]),
         Route("/people/{name}", actions.person),
         Route("/people/{name}/files", actions.upload, methods=["POST"]),
@@ -53,6 +56,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/people/{name}/remove", actions.remove, methods=["POST"]),
         Route("/people/{name}/entries", actions.entries, methods=["POST"]),
         Route("/people/{name}/text", actions.text, methods=["POST"]),
+        Route("/people/{name}/rename", actions.rename, methods=["POST"]),
         Route("/people/{name}/delete", actions.delete, methods=["POST"]),
         Route("/people/{name}/progress", actions.progress),
         Route("/people/{name}/subject.toml", actions.subject_file),
@@ -67,7 +71,9 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Mount("/static", StaticFiles(directory=_STATIC)),
     ]
     handlers = {HTTPException: _not_found, KinertiaError: _trouble, OSError: _no_file, Exception: _failed}
-    return Starlette(routes=routes, exception_handlers=handlers)
+    served = Starlette(routes=routes, exception_handlers=handlers)
+    served.state.jobs = jobs
+    return served
 
 
 class _Actions:
@@ -159,17 +165,23 @@ class _Actions:
         return self._checked(request, person)
 
     async def start(self, request: Request) -> Response:
-        """Let the person wait for a check or a fit."""
+        """Let the person wait for a check or a fit, of what is in the form if it was sent."""
         person, kind = self._person(request), self._kind(request)
+        given = await form(request)
+        if given and not self._jobs.busy(person):
+            try:
+                write_form(person, given)
+            except KinertiaError as error:
+                return await run_in_threadpool(person_page, request, person, self._jobs, str(error), given)
         if not trouble(person):
             self._jobs.add(person, kind)
-        return to(request, "people", person.name)
+        return to(request, "people", person.name, section=_SECTIONS[kind])
 
     async def cancel(self, request: Request) -> Response:
         """Give up a check or a fit."""
         person, kind = self._person(request), self._kind(request)
         await run_in_threadpool(self._jobs.cancel, person, kind)
-        return to(request, "people", person.name)
+        return to(request, "people", person.name, section=_SECTIONS[kind])
 
     async def back(self, request: Request) -> Response:
         """Who opens the address of a form, from the browser's history for one, gets the person's page."""
@@ -180,6 +192,17 @@ class _Actions:
     async def progress(self, request: Request) -> Response:
         """How far the person's check and fit are."""
         return JSONResponse(progress(self._person(request), self._jobs))
+
+    async def preparing(self, request: Request) -> Response:
+        """The time left until the first estimate can begin, in words; null once it can."""
+        work = self._jobs.preparing
+        return JSONResponse({"left": None if work is None else time_left(work)})
+
+    async def rename(self, request: Request) -> Response:
+        """Give the person another name in the library; nothing else changes."""
+        person = self._idle(request)
+        renamed = self._library.rename(person, (await form(request)).get("name", ""))
+        return to(request, "people", renamed.name)
 
     async def delete(self, request: Request) -> Response:
         """Remove the person with files and results; a fit at work is given up."""
@@ -275,9 +298,10 @@ class _Actions:
 
     def _checked(self, request: Request, person: Person) -> Response:
         person.note(saved=True)
-        if not trouble(person):
-            self._jobs.add(person, "check")
-        return to(request, "people", person.name)
+        if trouble(person):
+            return to(request, "people", person.name)
+        self._jobs.add(person, "check")
+        return to(request, "people", person.name, section=_SECTIONS["check"])
 
 
 def _recognised(person: Person) -> None:

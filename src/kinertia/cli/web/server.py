@@ -7,7 +7,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -30,16 +30,14 @@ class Server:
         address: what to open in the browser; nothing answers without its token.
     """
 
-    def __init__(
-        self, library: Library, port: int = 0, example: Path | None = None, warm_up: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, library: Library, port: int = 0, example: Path | None = None, prepare: bool = False) -> None:
         """Take the port, but answer nothing yet.
 
         Args:
             library: people and their results.
             port: of 127.0.0.1; 0 takes a free one.
             example: folder with a subject file to try it with.
-            warm_up: command that compiles what the first fit would compile.
+            prepare: compile beforehand, where that is not done, what the first fit would compile.
 
         Raises:
             SettingsError: the port is another program's.
@@ -48,7 +46,7 @@ class Server:
         port = self._socket.getsockname()[1]
         token = secrets.token_urlsafe(24)
         self.address = f"http://127.0.0.1:{port}/{token}/"
-        self._jobs = Jobs(warm_up)
+        self._jobs = Jobs(prepare)
         app = application(library, self._jobs, self.stop, example)
         config = uvicorn.Config(
             Guard(app, token, port),

@@ -1,5 +1,7 @@
 """A check or a fit of one person, in a process of its own: `python -m kinertia.cli.web.worker fit FOLDER`.
 
+With `prepare` alone it compiles what the first fit on a machine would compile.
+
 A crash does not take the page down, and whoever cancels ends the process. It says on standard output how far it is, a
 line of JSON each: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file or entry was at fault.
 """
@@ -13,6 +15,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
+from kinertia.cli.compiling import compile_once
 from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, Person
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import complete_folder
@@ -79,13 +82,18 @@ def _said(stream: TextIO, **values: object) -> None:
     stream.flush()
 
 
-def main(kind: str, folder: str) -> int:
+def main(kind: str, folder: str = "") -> int:
     """Do it; exit status 2 for an error in the person's files or entries."""
     page, sys.stdout = sys.stdout, sys.stderr  # for nobody else's words
+
+    def progress(stage: str, share: float) -> None:
+        _said(page, stage=stage, share=share)
+
     try:
-        {"check": check, "fit": fit}[kind](
-            Person(Path(folder)), lambda stage, share: _said(page, stage=stage, share=share)
-        )
+        if kind == "prepare":
+            compile_once(progress)
+        else:
+            {"check": check, "fit": fit}[kind](Person(Path(folder)), progress)
     except KinertiaError as error:
         _said(page, error=str(error))
         return 2

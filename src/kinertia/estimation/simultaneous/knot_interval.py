@@ -11,7 +11,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import part
 
 _TOGETHER = SPLINES_PER_BLOCK + 1
 
@@ -31,7 +31,7 @@ class Interval(NamedTuple):
     gradient: np.ndarray
 
 
-@compiled
+@part
 def longest_run(first: np.ndarray) -> int:
     """The most frames of an interval."""
     longest, run = 1, 1
@@ -41,7 +41,7 @@ def longest_run(first: np.ndarray) -> int:
     return longest
 
 
-@compiled
+@part
 def to_splines(
     first: np.ndarray,
     values: np.ndarray,
@@ -79,7 +79,7 @@ def to_splines(
                     border[at + i, j, s] += weight * interval.across[k, j, s]
 
 
-@compiled
+@part
 def _pair_weights(own: np.ndarray) -> np.ndarray:
     """(28, 5 f) weights of `Interval.squares` in each pair of splines, the second not before the first.
 
@@ -98,7 +98,7 @@ def _pair_weights(own: np.ndarray) -> np.ndarray:
     return weights
 
 
-@compiled
+@part
 def to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarray) -> None:
     """Weigh terms (c, s) of a frame with the six splines from `at` on."""
     for i in range(6):

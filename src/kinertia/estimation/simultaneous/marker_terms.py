@@ -18,7 +18,7 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.stretches import Stretch
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.spatial import inner
@@ -174,14 +174,16 @@ def _add(
                 _pair(markers, k, later, k - start, placed, interval, static)
         to_splines(first, values, start, end, interval, band, border, right)
         for row in range(LATER):
-            interval.across[row] = interval.across[end - start + row]
+            for j in range(c):
+                for i in range(s):
+                    interval.across[row, j, i] = interval.across[end - start + row, j, i]
         start = end
     for row in range(min(LATER, n - stop)):
         # of the frames after them, only what these have in common with the last
         to_border(first[stop + row], values[stop + row], interval.across[row], border)
 
 
-@compiled
+@part
 def _place(markers: _Markers, k: int, placed: _Placed) -> None:
     """Axes and markers of frame k."""
     a, here = len(markers.column), k % 5
@@ -199,17 +201,19 @@ def _place(markers: _Markers, k: int, placed: _Placed) -> None:
                     turned[m, r, i] += rotation[j, r, h] * markers.turned[m, h, i]
 
 
-@compiled
+@part
 def _frame(
     markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
 ) -> None:
     """J^T W J of frame k with itself; J^T W S of places and skin and J^T W r, W r being of five frames."""
     a, m, here = len(markers.column), len(markers.carrier), k % 5
-    most = 1 + int(np.max(markers.last - markers.first))
+    most = 1
+    for i in range(m):
+        most = max(most, 1 + markers.last[i] - markers.first[i])
     pull, directions = np.zeros((m, 3)), np.zeros((m, 3, 3 * most))
     for offset in range(-LATER, LATER + 1):
         _informed(markers, k, offset, placed, pull, directions)
-    sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty((1, 6))
+    sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty((a, 6))
     for i in range(m):
         at = placed.places[here, i]
         add_marker(markers.own[k, i], at, at, sums[markers.carrier[i]])
@@ -229,14 +233,14 @@ def _frame(
         met_force(sums, j, axes, j, met)
         i = j
         while i >= 0:
-            value = slopes[k, j] * slopes[k, i] * inner(axes, i, met, 0)
+            value = slopes[k, j] * slopes[k, i] * inner(axes, i, met, j)
             product[i, j] = value
             product[j, i] = value
             i = parent[i]
     _sort(column, product, interval.squares[row], interval.across[row], static.square)
 
 
-@compiled
+@part
 def _informed(
     markers: _Markers, k: int, offset: int, placed: _Placed, pull: np.ndarray, directions: np.ndarray
 ) -> None:
@@ -263,7 +267,7 @@ def _informed(
                     directions[m, r, 3 + 3 * g + i] += value * patterns[markers.first[m] + g]
 
 
-@compiled
+@part
 def _by_place(
     markers: _Markers,
     k: int,
@@ -322,13 +326,13 @@ def _by_place(
             j = parent[j]
 
 
-@compiled
+@part
 def _pair(
     markers: _Markers, k: int, later: int, row: int, placed: _Placed, interval: Interval, static: _Static
 ) -> None:
     """J^T W J of frame k with the one so many frames later."""
     a, here, there = len(markers.column), k % 5, (k + later) % 5
-    sums, met = np.zeros((a, 16)), np.empty((1, 6))
+    sums, met = np.zeros((a, 16)), np.empty((a, 6))
     weights = markers.next[k] if later == 1 else markers.second[k]
     for m in range(len(markers.carrier)):
         add_marker(weights[m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
@@ -342,19 +346,19 @@ def _pair(
         met_force(sums, j, after, j, met)
         i = j
         while i >= 0:
-            product[i, j] = slopes[k + later, j] * slopes[k, i] * inner(axes, i, met, 0)
+            product[i, j] = slopes[k + later, j] * slopes[k, i] * inner(axes, i, met, j)
             i = parent[i]
         met_force(back, j, axes, j, met)
         i = parent[j]
         while i >= 0:
-            product[j, i] = slopes[k, j] * slopes[k + later, i] * inner(after, i, met, 0)
+            product[j, i] = slopes[k, j] * slopes[k + later, i] * inner(after, i, met, j)
             i = parent[i]
     squares, across, most = interval.squares, interval.across, len(interval.gradient)
     _sort(column, product, squares[(2 * later - 1) * most + row], across[row], static.square)
     _sort(column, product.T, squares[2 * later * most + row], across[row + later], static.square)
 
 
-@compiled
+@part
 def _sort(column: np.ndarray, product: np.ndarray, squares: np.ndarray, across: np.ndarray, square: np.ndarray) -> None:
     """Add products (a, a) of axes to where their coordinates belong: the first in a frame, the second in any.
 

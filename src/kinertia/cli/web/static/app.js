@@ -160,7 +160,7 @@
 
     // to another address, since loading the same one again could repeat a form
     again() {
-      const place = this.root.dataset.kind === "fit" ? "#results" : location.hash;
+      const place = this.root.dataset.kind === "fit" ? "#results" : "#check";
       location.replace(`${address}?again${place}`);
     }
 
@@ -174,6 +174,19 @@
     }
   }
 
+  // tells when the first estimate can begin, and goes once it can
+  async function prepared(line) {
+    try {
+      const { left } = await (await fetch(line.dataset.preparing)).json();
+      if (left === null) return line.remove();
+      if (left) line.querySelector("span").textContent = left;
+    } catch {
+      return line.remove();
+    }
+    return setTimeout(() => prepared(line), PAUSE_MS);
+  }
+
+  document.querySelectorAll("[data-preparing]").forEach(prepared);
   document.querySelectorAll("[data-drop]").forEach((root) => new Drop(root));
   document.querySelectorAll("[data-progress]").forEach((root) => new Working(root));
   // a file that misses the place for it must not take the page away

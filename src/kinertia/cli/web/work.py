@@ -1,0 +1,114 @@
+"""Work in a process of its own: how far it is, when it will be done, and how it ended."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+WORKER = (sys.executable, "-m", "kinertia.cli.web.worker")
+_NO_WINDOW: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+"""Windows opens a console for every process otherwise."""
+
+
+@dataclass(frozen=True)
+class End:
+    """How a process ended.
+
+    Attributes:
+        status: of its exit; 1 where it was given up before it began.
+        error: the error of a file or an entry that it named; empty if it named none.
+        log: what else it said.
+    """
+
+    status: int
+    error: str
+    log: str
+
+
+class Work:
+    """What a worker does: it says its stage and the share of it that is done, line by line.
+
+    Attributes:
+        stage: what it is doing; empty while it waits.
+        share: of the stage that is done, 0 to 1.
+        cancelled: whether it was given up.
+    """
+
+    def __init__(self) -> None:
+        self.stage = ""
+        self.share = 0.0
+        self.cancelled = False
+        self._since = self._told = time.monotonic()
+        self._process: subprocess.Popen[str] | None = None
+        self._lock = threading.Lock()
+
+    def seconds_left(self) -> float | None:
+        """Of this stage, by how long its share took; None as long as nobody knows."""
+        if not 0.0 < self.share < 1.0:
+            return None
+        left_when_told = (self._told - self._since) * (1.0 - self.share) / self.share
+        return max(left_when_told - (time.monotonic() - self._told), 1.0)
+
+    def cancel(self) -> None:
+        """Give it up, wherever it is; may be called from any thread."""
+        with self._lock:
+            self.cancelled = True
+            if self._process is not None:
+                self._process.terminate()
+
+    def done(self, *arguments: str) -> End:
+        """Do it, with these arguments of the worker; how it ended."""
+        self._moved("starting", 0.0)
+        with self._lock:
+            if self.cancelled:
+                return End(1, "", "")
+            process = self._process = _started([*WORKER, *arguments])
+        assert process.stdout is not None
+        assert process.stderr is not None
+        said: list[str] = []
+        listener = threading.Thread(target=lambda: said.append(process.stderr.read()))  # type: ignore[union-attr]
+        listener.start()
+        error = ""
+        for line in process.stdout:
+            told = _line(line)
+            error = told.get("error", error)
+            if "stage" in told:
+                self._moved(told["stage"], told["share"])
+        status = process.wait()
+        listener.join()
+        return End(status, error, "".join(said))
+
+    def _moved(self, stage: str, share: float) -> None:
+        self._told = time.monotonic()
+        if stage != self.stage:
+            self._since = self._told
+        self.stage, self.share = stage, share
+
+
+def _started(command: Sequence[str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        cwd=Path.home(),  # results replace their folder, which must be nobody's current one
+        creationflags=_NO_WINDOW,
+    )
+
+
+def _line(text: str) -> dict[str, Any]:
+    """What a line of a worker says; nothing where it is not one of ours."""
+    try:
+        told = json.loads(text)
+    except ValueError:
+        return {}
+    return told if isinstance(told, dict) else {}
