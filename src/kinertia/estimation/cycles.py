@@ -11,11 +11,11 @@ from functools import partial
 from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.model.sides import by_side
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
-from kinertia.model.splines import not_a_knot
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
@@ -147,8 +147,8 @@ class _Source:
         self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(trial.kinematics)
         own, parts = trial.kinematics.time, trial.kinematics.stretches
         self.motion = [interpolate(own[part], trial.motion.q[part]) for part in parts]
-        self.loads = self._by_stretch(partial(not_a_knot, k=3), trial.joint_loads[stage])
-        spread, linear = trial.deviations if stage == "estimate" else None, partial(not_a_knot, k=1)
+        self.loads = self._by_stretch(partial(make_interp_spline, k=3), trial.joint_loads[stage])
+        spread, linear = trial.deviations if stage == "estimate" else None, partial(make_interp_spline, k=1)
         self.spread = None if spread is None else [self._by_stretch(linear, each) for each in vars(spread).values()]
 
     def angle(self, time: np.ndarray) -> np.ndarray:

@@ -17,9 +17,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
 
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.model.bsp import BodySegmentParameters
@@ -32,9 +32,6 @@ from kinertia.motion.dynamics import (
     root_regressor,
 )
 from kinertia.motion.one_thread import one_blas_thread
-
-if TYPE_CHECKING:
-    from scipy.optimize import OptimizeResult
 
 MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""
@@ -199,8 +196,6 @@ def _minimise(
     free = _minimise_freely(problem, theta, scale, bounds, exact)
     if free is not None:
         return free
-    from scipy.optimize import least_squares  # slow to load, and no other estimate needs it
-
     bounded = least_squares(
         problem.residuals,
         np.clip(theta, *bounds),
@@ -231,8 +226,6 @@ def _minimise_freely(
     exact: float,
 ) -> OptimizeResult | None:
     """Levenberg-Marquardt without bounds; None unless it converges, or comes down to a cost of `exact`, inside them."""
-    from scipy.optimize import least_squares
-
     with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
         free = least_squares(
             problem.residuals,

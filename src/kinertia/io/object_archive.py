@@ -23,13 +23,13 @@ from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
+from scipy.interpolate import BSpline
 
 from kinertia.errors import FileError
 
 _STRUCTURE = "structure.json"
 _FORMAT = 1
-_GONE = {("BSpline", "extrapolate")}
-"""What classes had in files of before, and have no more."""
+_SPLINE = "BSpline"
 _QUICK = 1
 """Level of compression: the others take four times as long for a few percent."""
 
@@ -115,9 +115,13 @@ class _Writer:
         return {"kind": type(thing).__name__, "with": self._attributes(thing, place)}
 
     def _attributes(self, thing: Any, place: str) -> dict[str, Any]:
-        if type(thing) not in self.kinds:
+        if isinstance(thing, BSpline):
+            names: Sequence[str] = ("t", "c", "k", "extrapolate")
+        elif type(thing) not in self.kinds:
             raise TypeError(f"{place}: a {type(thing).__name__} cannot be written")
-        return {name: self.plain(getattr(thing, name), _below(place, name)) for name in _names(thing)}
+        else:
+            names = _names(thing)
+        return {name: self.plain(getattr(thing, name), _below(place, name)) for name in names}
 
     def _array(self, values: np.ndarray, place: str) -> dict[str, str]:
         buffer = io.BytesIO()
@@ -153,8 +157,10 @@ class _Reader:
         if isinstance(node, list):
             return [self.whole(item, _below(place, k)) for k, item in enumerate(node)]
         if "kind" in node:
-            rows = [(name, value) for name, value in node["with"].items() if (node["kind"], name) not in _GONE]
-            return self.kinds[node["kind"]](**{name: self.whole(value, _below(place, name)) for name, value in rows})
+            attributes = {name: self.whole(value, _below(place, name)) for name, value in node["with"].items()}
+            if node["kind"] == _SPLINE:
+                return BSpline(attributes["t"], attributes["c"], attributes["k"], attributes["extrapolate"])
+            return self.kinds[node["kind"]](**attributes)
         ((word, value),) = node.items()
         match word:
             case "same":

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import PPoly
 
 HIGHEST_DERIVATIVE = 3
 
@@ -36,20 +37,13 @@ class PiecewisePolynomial:
     coefficients: np.ndarray
 
     @cached_property
-    def _derivatives(self) -> tuple[np.ndarray, ...]:
-        """Coefficients of the function and of its derivatives."""
-        found = [self.coefficients]
-        for _ in range(HIGHEST_DERIVATIVE):
-            powers = np.arange(len(found[-1]) - 1, 0, -1)
-            found.append(found[-1][:-1] * powers[:, None])
-        return tuple(found)
+    def _derivatives(self) -> tuple[PPoly, ...]:
+        whole = PPoly(self.coefficients, self.knots)
+        return tuple(whole.derivative(order) if order else whole for order in range(HIGHEST_DERIVATIVE + 1))
 
     def __call__(self, q: np.ndarray, order: int = 0) -> np.ndarray:
         """Values of the derivative of this order at q (n,)."""
-        piece = np.clip(np.searchsorted(self.knots, q, side="right") - 1, 0, len(self.knots) - 2)
-        beyond, result = q - self.knots[piece], np.zeros(np.shape(q))
-        for coefficient in self._derivatives[order]:
-            result = result * beyond + coefficient[piece]
+        result: np.ndarray = self._derivatives[order](q)
         return result
 
     def scaled(self, factor: float) -> PiecewisePolynomial:

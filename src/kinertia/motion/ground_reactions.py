@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.ndimage import gaussian_filter1d
 
-from kinertia.model.splines import BSpline, natural
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.moving_mean import gaussian_mean
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
@@ -112,7 +112,7 @@ class GroundReactions:
         first, last = np.searchsorted(self.time, (time.min(), time.max()))
         near = slice(max(int(first) - _FORGOTTEN, 0), int(last) + _FORGOTTEN)
         columns = np.stack([self.wrench[near, :, :3], self.point[near], self._torque(near)], axis=2)
-        return natural(self.time[near], columns, 3)
+        return make_interp_spline(self.time[near], columns, k=3, bc_type="natural")
 
     def _torque(self, samples: slice) -> np.ndarray:
         wrench = self.wrench[samples]
@@ -193,4 +193,5 @@ def _points(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
     """Mean over about half a period of the motion's cutoff."""
-    return gaussian_mean(values, 0.25 / motion_hz / step_s)
+    result: np.ndarray = gaussian_filter1d(values, 0.25 / motion_hz / step_s, axis=0, mode="nearest")
+    return result

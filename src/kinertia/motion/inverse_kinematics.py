@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
-from kinertia.model.splines import monotone
 from kinertia.motion.equal_angles import EqualAngles
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.held_errors import HeldErrors
@@ -111,7 +111,7 @@ def solve_ik(
         poses = _best_fit(model, measured[coarse], q[coarse], choosing)
         _carry_on(model, measured[coarse], markers.time[coarse], poses, equal, choosing)
         if len(coarse) > 1:
-            q[fine] = monotone(coarse, equal.continuous(poses.q), fine)
+            q[fine] = PchipInterpolator(coarse, equal.continuous(poses.q))(fine)
     converged, informed = np.zeros(len(q), dtype=bool), np.zeros(q.shape, dtype=bool)
     for some in (fine[piece] for piece in pieces(len(fine))):
         if not consecutive:

@@ -47,16 +47,17 @@ Hoog FR (1985) Numer Math 47:99-106. de Hoog FR, Hutchinson MF (1987) Numer Math
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import factorial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 from scipy.linalg import lapack
+from scipy.optimize import minimize_scalar
 
 from kinertia.errors import KinertiaError
-from kinertia.model.splines import BSpline, basis, natural, not_a_knot
 from kinertia.motion.frames_at_once import pieces
 
 Array = NDArray[np.float64]
@@ -67,9 +68,6 @@ MIN_SAMPLES = 6
 _STEP = 1e-30  # of the complex-step derivative: its square vanishes beside 1
 _BAND = 4  # diagonals on either side of the main one
 _ROWS_AT_ONCE = 20000
-_TRIED, _ROUNDS = 101, 4
-"""Places between two ends at which a curve's least value is looked for, and how often, each time between those beside
-it."""
 
 
 class SmoothingError(KinertiaError):
@@ -131,7 +129,7 @@ class SmoothedSpline:
             raise ValueError(f"derivative must be 0 to 4, got {derivative}")
         scaled = (np.asarray(t, float) - self.time[0]) / self._spacing
         inside = np.clip(scaled, 0.0, (self.time[-1] - self.time[0]) / self._spacing)
-        result = self._spline(inside, derivative)
+        result = np.asarray(self._spline(inside, derivative), float)
         beyond = (scaled - inside).reshape(scaled.shape + (1,) * (result.ndim - scaled.ndim))
         if beyond.any():
             result = np.where((beyond != 0) & (derivative > 2), 0.0, result)
@@ -185,9 +183,9 @@ def smooth(
             left_over = visible.sum() - trace
             sigma[group[which]] = np.sqrt(rss / left_over) if left_over > 0 else np.nan
         cutoff[group] = chosen / spacing
-    spline = natural((time - time[0]) / spacing, fitted, 5)
+    spline = _natural((time - time[0]) / spacing, fitted)
     if not shape:
-        spline = replace(spline, c=spline.c[:, 0])
+        spline = BSpline.construct_fast(spline.t, spline.c[:, 0], 5)
     p = (2 * np.pi * cutoff) ** -6.0 / spacing
     return SmoothedSpline(time, p.reshape(shape), cutoff.reshape(shape), sigma.reshape(shape), spline, spacing)
 
@@ -196,8 +194,14 @@ def interpolate(time: Array, values: Array) -> SmoothedSpline:
     """Natural quintic splines through all samples (n, c), as OpenSim's tools lay them through the columns of a file."""
     spacing = float((time[-1] - time[0]) / (len(time) - 1))
     nothing, everything = np.zeros(values.shape[1]), np.full(values.shape[1], np.inf)
-    spline = natural((time - time[0]) / spacing, values, 5)
+    spline = _natural((time - time[0]) / spacing, values)
     return SmoothedSpline(time, nothing, everything, np.full(values.shape[1], np.nan), spline, spacing)
+
+
+def _natural(time: Array, values: Array) -> BSpline:
+    """Quintic splines through values (n, c) that go on as parabolas at either end."""
+    ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
+    return make_interp_spline(time, values, k=5, bc_type=(ends, ends))
 
 
 def _validated(
@@ -259,15 +263,12 @@ def _gcv_cutoffs(system: _System, y: Array, visible: NDArray[np.bool_], ends: Ar
     for column, least in enumerate(coarse[np.argmin(table[coarse], axis=0)]):
         near = np.arange(max(least - 4, 0), min(least + 5, len(lattice)))
         tabulate(near)
-        curve = not_a_knot(lattice[near].astype(float), table[near, column], 3)
+        curve = CubicSpline(lattice[near], table[near, column])
         tried = np.clip(lattice[near], low, high)
         best = tried[np.argmin(curve(tried))]
         bounds = np.clip((best - 1, best + 1), max(low, lattice[near[0]]), min(high, lattice[near[-1]]))
-        for _ in range(_ROUNDS):
-            tried = np.linspace(bounds[0], bounds[1], _TRIED)
-            least = int(np.argmin(curve(tried)))
-            bounds = tried[max(least - 1, 0)], tried[min(least + 1, _TRIED - 1)]
-        cutoffs[column] = 2.0 ** (tried[least] / 8)
+        polished = minimize_scalar(curve, bounds=bounds, method="bounded")
+        cutoffs[column] = 2.0 ** ((polished.x if polished.fun < curve(best) else best) / 8)
     return cutoffs
 
 
@@ -303,14 +304,14 @@ class _System:
         x = t[:-1, None] + np.diff(t)[:, None] * (nodes + 1) / 2
         weight = np.diff(t)[:, None] * weights / 2
         padded = np.concatenate([t[0] - [2, 1], t, t[-1] + [1, 2]])
-        # splines[i, g, k] is N_{i-2+k} at Gauss point g of interval i
-        splines = basis(padded, 2, x.ravel())[1].T.reshape(n - 1, 3, 3)
+        # basis[i, g, k] is N_{i-2+k} at Gauss point g of interval i
+        basis = BSpline.design_matrix(x.ravel(), padded, 2).data.reshape(n - 1, 3, 3)
         gram = np.zeros((3, n - 3))
         for a in range(3):
             size = n - 3 - a
             for k in range(a, 3):
                 piece = slice(k, k + size)
-                product = splines[piece, :, 2 - k] * splines[piece, :, 2 - k + a]
+                product = basis[piece, :, 2 - k] * basis[piece, :, 2 - k + a]
                 gram[a, :size] += (weight[piece] * product).sum(axis=1)
         return cls(differences, gram)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
@@ -166,21 +167,8 @@ def _outline(points: np.ndarray, radius: float, view: _View) -> np.ndarray:
     turn = np.linspace(0, 2 * np.pi, _CORNERS, endpoint=False)
     circle = radius * np.column_stack([np.cos(turn), np.sin(turn)])
     corners = (_flat(points, view)[:, None] + circle).reshape(-1, 2)
-    rows = sorted(corners.tolist())
-    return np.array(_lower_hull(rows)[:-1] + _lower_hull(rows[::-1]))
-
-
-def _lower_hull(points: list[list[float]]) -> list[list[float]]:
-    """The convex outline below points that are sorted along x; above them if sorted backwards (Andrew 1979)."""
-    hull: list[list[float]] = []
-    for x, y in points:
-        while len(hull) > 1:
-            (x0, y0), (x1, y1) = hull[-2:]
-            if (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0):
-                break
-            hull.pop()
-        hull.append([x, y])
-    return hull
+    around = ConvexHull(corners).vertices
+    return corners[[*around, around[0]]]
 
 
 def _segment(outline: np.ndarray, colour: str, text: str) -> dict[str, Any]:

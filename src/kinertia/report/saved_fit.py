@@ -20,7 +20,6 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_range import Range
 from kinertia.model.imported import Coupling, OsimCoordinate, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
-from kinertia.model.splines import BSpline
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.inverse_kinematics import InverseKinematics
@@ -56,7 +55,7 @@ _KINDS = (
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
-    Kinematics, InverseKinematics, SmoothedSpline, BSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
+    Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
 

@@ -4,9 +4,9 @@ them."""
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
-from kinertia.model.splines import BSpline
 from kinertia.motion.smoothing import columns_alike
 
 _DEGREE = 5
@@ -34,10 +34,11 @@ class MotionBasis:
         knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
         self.first = np.minimum(((time - time[0]) / step + _ROUNDING).astype(int), count - 1)
-        # on a uniform grid the six are alike in every interval
-        each = BSpline(np.arange(-_DEGREE, _ACTIVE + 1.0), np.eye(_ACTIVE), _DEGREE)
+        # on a uniform grid all splines are one, shifted
+        shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
         local = (time - time[0]) / step - self.first
-        self.values = np.stack([each(local, order) / step**order for order in range(3)])
+        at = local[:, None] + np.arange(_DEGREE, -1, -1)
+        self.values = np.stack([shape.derivative(d)(at) / step**d if d else shape(at) for d in range(3)])
         self.active = self.first[:, None] + np.arange(_ACTIVE)
         self.knots = knots
 

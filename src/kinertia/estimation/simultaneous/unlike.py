@@ -8,13 +8,12 @@ The total mass is left out as far as scale and plates may disagree, which has a 
 
 from __future__ import annotations
 
-import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.special import chdtrc
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.model.bsp import BodySegmentParameters
@@ -87,23 +86,11 @@ def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.
     moved = (estimate.table().ravel() - mean) / sd
     along = directions[:, shown].T @ moved / np.sqrt(1.0 - left[shown])
     distance2, count = float(along @ along), int(shown.sum())
-    chance = chance_beyond(distance2, count) if count else 1.0
+    chance = float(chdtrc(count, distance2)) if count else 1.0
     by_segment = moved.reshape(-1, 10)
     order = np.argsort(-np.abs(by_segment).max(axis=1))[:3]
     segments = tuple(estimate.segments[k] for k in order)
     return Unlikeness(distance2, count, chance, segments, _alike(estimate.segments, by_segment, int(order[0])))
-
-
-def chance_beyond(distance2: float, count: int) -> float:
-    """How often the sum of so many squared standard normal numbers is larger than this: the tail of chi-squared.
-
-    >>> round(chance_beyond(3.84, 1), 3), round(chance_beyond(5.99, 2), 3)
-    (0.05, 0.05)
-    """
-    half = max(0.5 * distance2, sys.float_info.min)
-    rest = math.erfc(math.sqrt(half)) if count % 2 else 0.0
-    powers = [k + 0.5 * (count % 2) for k in range(count // 2)]
-    return rest + sum(math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
 
 
 def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
