@@ -15,13 +15,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.elimination import Factored, Reduced
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.motion.moving_mean import moving_mean
 
 _FRAMES_AT_ONCE = 100
 """Larger arrays would leave the processor's cache."""
@@ -91,7 +91,7 @@ def curve_deviations(
             loaded = reactions.at(problem.trials[k].time[chosen])[..., :3] != 0.0
             variance.ground_forces[rows] += np.square(reactions.noise_n * loaded)
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    lost = moving_mean(np.square(impact), around)
+    lost = uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
     parts = (
         variance.coordinates,
         variance.moments + lost,

@@ -12,7 +12,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import minimum_filter1d
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
@@ -48,9 +48,8 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
         left = _left(problem, k, coefficients, static, frames)
         n, m, _ = left.shape
         own = MotionBasis(trial.time[frames], spacing_s)
-        around = int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
-        seen_here = np.pad(np.isfinite(left).all(axis=-1), ((around, around), (0, 0)))
-        inside = sliding_window_view(seen_here, 1 + 2 * around, axis=0).all(axis=-1)
+        around = 1 + 2 * int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
+        inside = minimum_filter1d(np.isfinite(left).all(axis=-1), around, axis=0, mode="constant", cval=0)
         rows = inside & trial.dynamic[frames][:, None]
         for square, part in zip(squares, own.evaluate(own.fit(left.reshape(n, -1))), strict=True):
             square += np.where(rows, np.square(part).reshape(n, m, 3).sum(axis=-1), 0.0).sum(axis=0)
