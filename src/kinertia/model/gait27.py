@@ -16,13 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from kinertia.errors import MarkerSetError
 from kinertia.model import joint_centres as jc
 from kinertia.model.anthropometry import BodyGeometry
 from kinertia.model.coordinate_range import Range
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.rotations import about, three_angles
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial.data import Recording
 
@@ -163,7 +163,8 @@ def _offsets(names: tuple[str, ...], side: str = "") -> tuple[Axis, ...]:
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
-    return about(axis, angle)
+    result: np.ndarray = Rotation.from_rotvec(np.asarray(axis) * angle).as_matrix()
+    return result
 
 
 def _pin(parent: str, child: str, at: np.ndarray, relative: np.ndarray, axis: Axis, angle: float) -> Joint:
@@ -265,7 +266,7 @@ def _arm(
     lengths[f"upper_arm_{side}"] = float(np.linalg.norm(shoulder - elbow_at))
     lengths[f"forearm_{side}"] = float(np.linalg.norm(elbow_at - wrist_at))
 
-    angles = three_angles(torso.T @ upper, np.eye(3)[:, [2, 0, 1]])
+    angles = Rotation.from_matrix(torso.T @ upper).as_euler("ZXY")
     locked[f"arm_rot_{side}"] = float(angles[2] if side == "r" else -angles[2])
     locked[f"pro_sup_{side}"] = 0.0
     in_upper = upper.T @ lower

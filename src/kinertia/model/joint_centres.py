@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.errors import MarkerSetError
 from kinertia.model.anthropometry import reference_lengths
 from kinertia.model.marker_set import MarkerSet, nearest_labels
-from kinertia.model.rotations import about, least_turn
 from kinertia.trial.data import Recording
 
 _MARKER_RADIUS_M = 0.007
@@ -232,8 +232,8 @@ def torso_frame(
     across = marks["acromion_r"] - marks["acromion_l"] if worn else marks["asis_r"] - marks["asis_l"]
     if "c7" in marks and "sternal_notch" in marks:
         depth = marks["sternal_notch"] - marks["c7"]
-        upward = about(across / np.linalg.norm(across), _CERVICAL_RAISED[sex])
-        top = marks["c7"] + _CERVICAL[sex] * upward @ depth
+        upward = Rotation.from_rotvec(_CERVICAL_RAISED[sex] * across / np.linalg.norm(across))
+        top = marks["c7"] + _CERVICAL[sex] * upward.apply(depth)
         length = float(np.linalg.norm(top - lumbar))
     elif worn:
         top = (marks["acromion_r"] + marks["acromion_l"]) / 2
@@ -290,5 +290,6 @@ def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, tors
     if np.linalg.norm(normal) > np.sin(np.radians(15.0)):
         axis: np.ndarray = normal / np.linalg.norm(normal)
     else:
-        axis = least_turn(-torso[:, 1], upper) @ torso[:, 2]
+        swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
+        axis = swing.apply(torso[:, 2])
     return axis

@@ -8,11 +8,11 @@ axes.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
-
-from kinertia.model.rotations import three_angles
+from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,5 +66,7 @@ class Root:
         """(n, 6) root coordinates that place the root segment at these rotations (n, 3, 3) and translations (n, 3)."""
         centre = translation + rotation @ self.child_translation
         turned = self.rotation.T @ rotation @ self.child_rotation
+        with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
+            angles = Rotation.from_matrix(turned).as_davenport(self.turns.T, "intrinsic")
         slides = np.linalg.solve(self._slides, (centre - self.translation).T).T
-        return np.hstack([slides, three_angles(turned, self.turns)])
+        return np.hstack([slides, angles])

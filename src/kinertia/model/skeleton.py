@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
@@ -26,7 +27,6 @@ from kinertia.model.coordinate_range import Bounds, Range
 from kinertia.model.kinematic_tree import KinematicTree, poses
 from kinertia.model.moved_parameters import moved_parameters
 from kinertia.model.root_joint import Root
-from kinertia.model.rotations import about
 
 GRAVITY_M_S2 = 9.80665
 """Standard gravity; OpenSim's default models use 9.80665 or 9.8066."""
@@ -324,4 +324,4 @@ def placed_by(axis: Axis, value: float) -> np.ndarray:
         value = float(axis.function(np.array([value]))[0])
     if axis.kind == "translation":
         return placed(np.eye(3), direction * value)
-    return placed(about(direction, value), np.zeros(3))
+    return placed(Rotation.from_rotvec(direction * value).as_matrix(), np.zeros(3))

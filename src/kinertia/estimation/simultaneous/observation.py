@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.marker_noise import (
@@ -25,7 +26,6 @@ from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.repetition import repeats
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
-from kinertia.model.rotations import about
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import ground_reactions
@@ -222,7 +222,7 @@ def _observed(
 
 def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cutoff: ForceCutoff) -> FootPlates:
     loads = kinematics.trial.loads
-    turn = about(np.array([0.0, 1.0, 0.0]), np.radians(kinematics.turned_deg))
+    turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
     reactions = ground_reactions(kinematics, cutoff_hz, force_cutoff)
     at_frames = loads.carrier[nearest_samples(loads.time, time)]
     used, places = np.unique(np.concatenate([at_frames, reactions.carrier]), return_inverse=True)

@@ -7,15 +7,16 @@ stay as axes that do not move. OpenSim 4.0 and later open it. There are no muscl
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.rotations import three_angles
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, inverse, placed, placed_by
 
 _FORMAT = 40000
@@ -125,7 +126,8 @@ def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
 
 
 def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:
-    angles = three_angles(np.asarray(rotation), np.eye(3))
+    with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
+        angles = Rotation.from_matrix(np.asarray(rotation)).as_euler("XYZ")
     return (
         f"<PhysicalOffsetFrame name={_quoted(name)}><socket_parent>{parent}</socket_parent>"
         f"<translation>{_numbers(translation)}</translation><orientation>{_numbers(angles)}</orientation>"

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.io.osim.properties import Values
 from kinertia.io.osim.xml import Element
 from kinertia.model.axis_functions import AxisFunction, Composed, constant, constant_value, unit_slope
 from kinertia.model.imported import OsimCoordinate
-from kinertia.model.rotations import about
 from kinertia.model.skeleton import Axis
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -116,8 +116,7 @@ class Frames:
 def frame_place(values: Values, element: Element, orientation: str, location: str) -> Place:
     """A frame's place by its body-fixed x-y-z angles and its location."""
     angles = values.numbers(element, orientation, 3, [0.0] * 3)
-    x, y, z = (about(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
-    return x @ y @ z, values.numbers(element, location, 3, [0.0] * 3)
+    return Rotation.from_euler("XYZ", angles).as_matrix(), values.numbers(element, location, 3, [0.0] * 3)
 
 
 def read_joint(values: Values, element: Element, frames: Frames) -> JointElement:
