@@ -28,6 +28,12 @@ class CausedVelocity:
     caused: FloatArray
     mass_kg: float
 
+    def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
+        """(n,) m/s that a force (k,) N over time (k,) s causes."""
+        force = np.interp(self.time, time, force)
+        impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(self.time))
+        return np.concatenate(([0.0], impulse)) / self.mass_kg
+
 
 def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:
     """Of every window in which the sum of the forces is known, if it is long enough."""

@@ -187,7 +187,7 @@ class _Unexplained:
         turned, zeroed, zero_n = [], [], []
         for own_force in np.moveaxis(force, 1, 0):
             own, one_newton = (
-                _middled([_impulse(time, each, part) for part in parts])
+                _middled([part.by(time, each) for part in parts])
                 for each in (own_force[:, k], (own_force[:, 1] > 0.0).astype(float))
             )
             zero_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
@@ -212,13 +212,6 @@ class _Unexplained:
             f"{self.plate_zeroed[zero]:.3f} m/s, and a foot that pushes to one side all the time does not tell which; "
             "see what the plate reads while nobody stands on it"
         )
-
-
-def _impulse(time: FloatArray, force: FloatArray, part: CausedVelocity) -> FloatArray:
-    """(n,) m/s that a force (k,) N over time (k,) s causes."""
-    force = np.interp(part.time, time, force)
-    impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(part.time))
-    return np.concatenate(([0.0], impulse)) / part.mass_kg
 
 
 def _middled(windows: Sequence[FloatArray]) -> FloatArray:
