@@ -13,12 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.motion.caused_velocity import CausedVelocity, caused_velocities
+from kinertia.motion.caused_velocity import (
+    LEAST_CHANGE_M_S,
+    CausedVelocity,
+    VelocityChanges,
+    caused_velocities,
+    without_trend,
+)
 from kinertia.trial.data import FloatArray, PlateLoads, Trial
 
 _OPPOSED = -0.4
-_LEAST_CHANGE_M_S = 0.02
-"""Velocities that change by less (standard deviation) say nothing about the sign of forces."""
 OFFSET_LIMIT_N, _OFFSET_WINDOW_S = 20.0, 1.0
 """Horizontal force that no acceleration of the body accounts for, mean over a window; over one that is shorter than
 this, pelvis and centre of mass part by as much velocity in less time."""
@@ -31,6 +35,8 @@ nine sound ones 0.9 (squats), 1.4 (runs) and more."""
 _TOLD_APART = 0.5
 """Across the walk a foot pushes to one side all the time: with the wrong sign it looks like another zero. On nine
 trials what is true leaves 0.1 to 0.66 of what the other would, in one walk 0.7 to 1.7."""
+_PLATE_OFFSET_N, _LEAST_PLATE_WINDOW_S, _LEAST_OFF_M_S, _ZEROED = 12.0, 0.75, 0.05, 0.75
+"""Of 31 sound trials zeros of one plate are up to 9 N; a drift of 40 N over a trial makes 13 to 24 N."""
 _HORIZONTAL = {"X": 0, "Z": 2}
 
 
@@ -61,7 +67,7 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     parts = caused_velocities(trial, owners)
     if not parts:
         return ""
-    changes = _Changes.of(parts)
+    changes = VelocityChanges.of(parts)
     if trouble := _time_scale_trouble(changes):
         return trouble
     angle, strength = _turn(changes)
@@ -97,14 +103,11 @@ def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], k: int) -> bool
     return bool(left.plate_zeroed.min() < _TOLD_APART * left.all_turned)
 
 
-def _time_scale_trouble(changes: _Changes) -> str:
+def _time_scale_trouble(changes: VelocityChanges) -> str:
     """A vertical velocity that is not what the forces cause by a factor: both are right, and the time is not."""
-    shown, caused = changes.pelvis[:, 1], changes.caused[:, 1]
-    if min(shown.std(), caused.std()) < _LEAST_CHANGE_M_S:
-        return ""
-    factor = float((shown * caused).sum() / (shown * shown).sum())
+    factor = changes.times_up(changes.pelvis)
     least, most = _VERTICAL_FACTOR
-    if np.corrcoef(shown, caused)[0, 1] < _CLEAR or least < factor < most:
+    if factor is None or least < factor < most:
         return ""
     rate = float(np.sqrt(factor / _USUAL_FACTOR))
     return (
@@ -114,7 +117,7 @@ def _time_scale_trouble(changes: _Changes) -> str:
     )
 
 
-def _turn(changes: _Changes) -> tuple[float, float]:
+def _turn(changes: VelocityChanges) -> tuple[float, float]:
     """The angle (deg) about the vertical by which the forces' velocities are turned from the markers', and how well
     both correlate once it is taken back: of the mean over pelvis and markers' centre.
     """
@@ -193,7 +196,7 @@ class _Unexplained:
             zero_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
             turned.append(np.std(off - 2.0 * own))
             zeroed.append(np.std(off - zero_n[-1] * one_newton))
-        trends = np.concatenate([_without_trend(part.time, part.caused[:, k] - part.centre[:, k]) for part in parts])
+        trends = np.concatenate([without_trend(part.time, part.caused[:, k] - part.centre[:, k]) for part in parts])
         return cls(
             float(np.std(off)),
             float(np.std(caused + body)),
@@ -232,6 +235,41 @@ def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     )
 
 
+def plate_offset_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str]) -> str:
+    """A horizontal force of one loaded plate that does not accelerate the body; empty where there is none, or where all
+    plates show it (`offset_trouble`).
+
+    Args:
+        plates: as read.
+        trial: what became of them, in the same axes.
+        owners: the segment that each marker is on.
+    """
+    parts = [part for part in caused_velocities(trial, owners) if np.ptp(part.time) >= _LEAST_PLATE_WINDOW_S]
+    if not parts:
+        return ""
+    longest_s = max(float(np.ptp(part.time)) for part in parts)
+    for axis, k in _HORIZONTAL.items():
+        left = _Unexplained.of(plates.time, plates.force, parts, k)
+        best = int(np.argmin(left.plate_zeroed))
+        zero_n, zeroed = float(left.zero_n[best]), float(left.plate_zeroed[best])
+        if left.as_read < _LEAST_OFF_M_S or zeroed > _ZEROED * left.as_read:
+            continue
+        if abs(zero_n) < _PLATE_OFFSET_N * max(1.0, _OFFSET_WINDOW_S / longest_s):
+            continue
+        names = [plates.names[p] for p in np.flatnonzero(left.plate_zeroed * _CLEARLY_BEST < zeroed)]
+        alone = len(names) == 1 and zeroed < _CLEARLY_BEST * left.without_trend
+        if not alone and offset_trouble(trial, owners):
+            return ""
+        return (
+            f"the zero of the horizontal force of {' or '.join(names)} along {axis} is wrong, or drifts: while "
+            f"somebody stands on it, it shows {zero_n:+.0f} N that do not accelerate the body (what the forces cause "
+            f"differs from its velocity by {left.as_read:.3f} m/s RMS, and by {zeroed:.3f} m/s without them); zero the "
+            "plates before each trial, let the amplifiers warm up, or subtract what an unloaded plate reads before and "
+            "after the step, unless something that is not measured was pushed (a handrail, a crutch)"
+        )
+    return ""
+
+
 def agreement(trial: Trial, owners: Mapping[str, str]) -> dict[str, Agreement]:
     """Forces against markers along X and Z over the measured windows; empty where these are too short.
 
@@ -244,13 +282,13 @@ def agreement(trial: Trial, owners: Mapping[str, str]) -> dict[str, Agreement]:
 
 
 def _agreement(parts: Sequence[CausedVelocity]) -> dict[str, Agreement]:
-    changes = _Changes.of(parts)
+    changes = VelocityChanges.of(parts)
     spans = np.array([np.ptp(part.time) for part in parts])
     limit = OFFSET_LIMIT_N * max(1.0, _OFFSET_WINDOW_S / float(spans.max()))
     agreements = {}
     for axis, k in _HORIZONTAL.items():
         caused, *shown = (part[:, k] for part in (changes.caused, changes.pelvis, changes.centre))
-        still = min(part.std() for part in (caused, *shown)) < _LEAST_CHANGE_M_S
+        still = min(part.std() for part in (caused, *shown)) < LEAST_CHANGE_M_S
         correlation = np.nan if still else float(np.mean([np.corrcoef(caused, part)[0, 1] for part in shown]))
         trends = [
             part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, k] - part.pelvis[:, k], 1)[0]
@@ -258,29 +296,3 @@ def _agreement(parts: Sequence[CausedVelocity]) -> dict[str, Agreement]:
         ]
         agreements[axis] = Agreement(correlation, float(np.average(trends, weights=spans**3)), limit)
     return agreements
-
-
-@dataclass(frozen=True, eq=False)
-class _Changes:
-    """(n, 3) m/s: the same of all windows, one after the other, each without its trend."""
-
-    pelvis: FloatArray
-    centre: FloatArray
-    caused: FloatArray
-
-    @classmethod
-    def of(cls, parts: Sequence[CausedVelocity]) -> _Changes:
-        """Of these windows."""
-        pelvis, centre, caused = (
-            np.concatenate([_without_trend(part.time, getattr(part, name)) for part in parts])
-            for name in ("pelvis", "centre", "caused")
-        )
-        return cls(pelvis, centre, caused)
-
-
-def _without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (n,) or (n, k) less a line of each column."""
-    after = time - time.mean()
-    slope, level = np.polyfit(after, values, 1)
-    result: FloatArray = values - np.multiply.outer(after, slope) - level
-    return result

@@ -66,19 +66,20 @@ def _ups_and_downs(recording: Recording, trial: Trial, owners: Mapping[str, str]
         by_plate = {p: found for p in used if (found := ups_and_downs_of(part, own[p]))}
         if not read or len(by_plate) < 2:
             continue
-        best = min(by_plate, key=lambda p: sum(one.left for one in by_plate[p]))
-        gain, left = np.array([one.gain for one in by_plate[best]]), np.array([one.left for one in by_plate[best]])
-        rivals = np.array([_LEFT * one.left for one in read]), np.array([one.left for one in rate or read])
+        best = min(by_plate, key=lambda p: sum(each.left for each in by_plate[p]))
+        gain, left = np.array([(each.gain, each.left) for each in by_plate[best]]).T
+        rivals = np.array([_LEFT * each.left for each in read]), np.array([each.left for each in rate or read])
         if abs(np.sign(gain).sum()) < len(gain) or np.abs(gain).min() < _LEAST_GAIN or (left > rivals).any():
             continue
-        others = " and ".join(plates.names[p] for p in used if p != best)
-        heavy, light = (others, plates.names[best]) if gain.mean() > 0 else (plates.names[best], others)
+        one, others = plates.names[best], " and ".join(plates.names[p] for p in used if p != best)
+        heavy, light = (others, one) if gain.mean() > 0 else (one, others)
+        as_read = np.mean([each.left for each in read])
         return [
             f"the gain of {heavy} or of {light} is wrong, or the zero of one of them: the body goes up and down as its "
-            f"markers show if {plates.names[best]} should read {100 * gain.mean():+.1f} % beside {others} "
-            f"({100 * left.mean():.0f} % of the velocity are left then, {100 * np.mean([one.left for one in read]):.0f} "
-            "% as it is); check the sensitivities of both plates with a known weight, and their zeros, or see whether a "
-            f"part of the weight was on no plate over {light} (a handrail, a crutch)"
+            f"markers show if {one} should read {100 * gain.mean():+.1f} % beside {others} (which leaves "
+            f"{100 * left.mean():.0f} % of the velocity, and {100 * as_read:.0f} % as it is); check the sensitivities "
+            "of both plates with a known weight, and their zeros, or see whether a part of the weight was on no plate "
+            f"over {light} (a handrail, a crutch)"
         ]
     return []
 
