@@ -52,7 +52,7 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
     """Of the energy of motion, median over markers of swinging feet; None where no foot swings."""
     shares = []
     for k, label in enumerate(markers.labels):
-        seen = np.isfinite(markers.positions[:, k]).all(axis=1)
+        seen = np.asarray(np.isfinite(markers.positions[:, k]).all(axis=1))
         if not owners.get(label, "").startswith("foot") or seen.mean() < _MOSTLY_SEEN:
             continue
         velocity = np.gradient(_bridged(markers, k, seen), markers.time, axis=0)
