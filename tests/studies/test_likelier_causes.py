@@ -104,3 +104,16 @@ def test_labels_swapped_in_the_static_trial_come_before_another_session(person, 
     findings = checked(write_person(tmp_path, swapped))
     assert "look swapped" in findings[0].sentence
     assert not [one for one in findings if "another session" in one.sentence]
+
+
+@pytest.mark.parametrize("plates", [[0], [1], [0, 1]])
+def test_the_gain_of_one_axis(person, tmp_path, plates):
+    def change(force, time):
+        force = force.copy()
+        force[:, plates, 0] *= 2.0
+        return force
+
+    sentence = said(tmp_path, with_force(person, change))
+    assert sentence.startswith("the gain of the horizontal force of ")
+    assert ("all plates" if len(plates) > 1 else person.plates.names[plates[0]]) in sentence
+    assert float(sentence.partition("reads ")[2].partition(" times")[0]) == pytest.approx(2.0, rel=0.2)

@@ -14,13 +14,9 @@ from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
-from kinertia.motion.force_faults import (
-    direction_trouble,
-    offset_trouble,
-    plate_offset_trouble,
-    plate_sign_trouble,
-)
+from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
+from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, plate_sign_trouble
 from kinertia.motion.over_smoothed import over_smoothed_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
@@ -121,9 +117,13 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
         trouble = plate_sign_trouble(plates, trial, owners)
     if trouble := trouble or direction_trouble(trial, owners):
         return _refused(trouble)
-    one_zero = "" if plates is None else plate_offset_trouble(plates, trial, owners)
-    offset = one_zero or offset_trouble(trial, owners)
-    sentences = [*([offset] if offset else []), *gain_doubts(recording, trial, owners)]
+    along = (
+        []
+        if plates is None
+        else [axis_gain_trouble(plates, trial, owners), plate_offset_trouble(plates, trial, owners)]
+    )
+    along = [one for one in along if one] or [offset_trouble(trial, owners)]
+    sentences = [*filter(None, along), *gain_doubts(recording, trial, owners)]
     return _told([*rate_doubts(trial, owners), *sentences])
 
 
