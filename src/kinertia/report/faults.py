@@ -49,8 +49,8 @@ Sentences and changes of the joint moments are in `faults.json`.
 - A wrong rate of a C3D file by less than a factor of 1.8. Markers and forces share its clock, so that loads still begin
   when feet land. Only the body's ups and downs show it: at 1.2 times the rate forces move it 0.7 times as fast as its
   markers show in the Plug-in Gait walk of subject A, and 0.8 to 1.05 times (by the markers' centre) on sound trials.
-- A zero or a gain of one plate in less than a second of measured steps: one plate's share of so short a motion is not
-  told from what pelvis and limbs do against one another.
+- A zero of one loaded plate, or a gain by less than 7.5 %, in less than a second of measured steps: its share of so
+  short a motion is not told from what pelvis and limbs do against one another.
 
 ## What is said of sound walks
 
