@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
-from kinertia.motion.force_faults import direction_trouble, offset_trouble, plate_sign_trouble
+from kinertia.motion.force_faults import direction_trouble, offset_trouble
+from kinertia.motion.one_plate import plate_sign_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.plate_assignment import build_trial

@@ -14,8 +14,10 @@ from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
-from kinertia.motion.force_faults import direction_trouble, offset_trouble, plate_sign_trouble
+from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
+from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, plate_sign_trouble
+from kinertia.motion.over_smoothed import over_smoothed_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
@@ -78,7 +80,8 @@ def trial_doubts(
         or exchanged_trouble(own)
     )
     session: list[str] = []
-    if not trouble and static is not None and marker_set is not None:
+    # labels that are swapped in the static trial are named with it, and put its distances wrong
+    if not trouble and static is not None and marker_set is not None and not _sides(static.markers, marker_set):
         trouble = body_trouble(static.markers, markers, marker_set)
         session = [] if trouble else session_doubts(static.markers, markers, marker_set)
     if not trouble and recording.plates is not None:
@@ -108,11 +111,19 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
         marker_set: which marker is on which segment.
     """
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
-    one_plate = "" if recording.plates is None else plate_sign_trouble(recording.plates, trial, owners)
-    if trouble := one_plate or direction_trouble(trial, owners):
+    plates = recording.plates
+    trouble = over_smoothed_trouble(trial, owners)
+    if not trouble and plates is not None:
+        trouble = plate_sign_trouble(plates, trial, owners)
+    if trouble := trouble or direction_trouble(trial, owners):
         return _refused(trouble)
-    offset = offset_trouble(trial, owners)
-    sentences = [*([offset] if offset else []), *gain_doubts(recording, trial, owners)]
+    along = (
+        []
+        if plates is None
+        else [axis_gain_trouble(plates, trial, owners), plate_offset_trouble(plates, trial, owners)]
+    )
+    along = [one for one in along if one] or [offset_trouble(trial, owners)]
+    sentences = [*filter(None, along), *gain_doubts(recording, trial, owners)]
     return _told([*rate_doubts(trial, owners), *sentences])
 
 

@@ -115,11 +115,14 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
+    signs = list(free_moment_sign_warnings(outcome.trials))
     warnings = (
         *ready.warnings,
         *turning_warnings(ready.skeleton, ready.kinematics),
-        *_free_moment_warnings(outcome),
+        *signs,
         *outcome.warnings,
+        # free moments of the wrong sign are off like mirror images, too
+        *([] if signs else _mirrored_free_moments(outcome)),
         *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),
         *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
     )
@@ -143,11 +146,10 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
     )
 
 
-def _free_moment_warnings(outcome: _Outcome) -> list[str]:
-    """Free moments of the wrong sign are off like mirror images, too."""
-    signs = list(free_moment_sign_warnings(outcome.trials))
-    if signs or outcome.posterior is None:
-        return signs
+def _mirrored_free_moments(outcome: _Outcome) -> list[str]:
+    """What is left of free moments once plates and signs that are wrong have been named."""
+    if outcome.posterior is None:
+        return []
     return list(filter(None, [mirrored_free_moments_warning(outcome.posterior.calibration)]))
 
 

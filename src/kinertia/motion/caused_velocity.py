@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,8 @@ from kinertia.trial.data import FloatArray, Trial
 
 _PELVIS_HZ = 6.0
 _LEAST_WINDOW_S = 0.4
+LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
+"""Velocities that change by less (standard deviation) say nothing of forces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,47 @@ class CausedVelocity:
     centre: FloatArray
     caused: FloatArray
     mass_kg: float
+
+    def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
+        """(n,) m/s that a force (k,) N over time (k,) s causes."""
+        force = np.interp(self.time, time, force)
+        impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(self.time))
+        return np.concatenate(([0.0], impulse)) / self.mass_kg
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityChanges:
+    """(n, 3) m/s: the same of all windows, one after the other, each without its trend."""
+
+    pelvis: FloatArray
+    centre: FloatArray
+    caused: FloatArray
+
+    @classmethod
+    def of(cls, parts: Sequence[CausedVelocity]) -> VelocityChanges:
+        """Of these windows."""
+        pelvis, centre, caused = (
+            np.concatenate([without_trend(part.time, getattr(part, name)) for part in parts])
+            for name in ("pelvis", "centre", "caused")
+        )
+        return cls(pelvis, centre, caused)
+
+    def times_up(self, shown: FloatArray) -> float | None:
+        """How many times as fast the forces move the body up and down as these velocities (n, 3) show; None where they
+        do not follow the forces.
+        """
+        up, caused = shown[:, 1], self.caused[:, 1]
+        if min(up.std(), caused.std()) < LEAST_CHANGE_M_S or np.corrcoef(up, caused)[0, 1] < _FOLLOWS:
+            return None
+        return float((up * caused).sum() / (up * up).sum())
+
+
+def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Values (n,) or (n, k) over times (n,) s, less a line of each column."""
+    after = time - time.mean()
+    slope, level = np.polyfit(after, values, 1)
+    result: FloatArray = values - np.multiply.outer(after, slope) - level
+    return result
 
 
 def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:

@@ -13,25 +13,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.motion.caused_velocity import CausedVelocity, caused_velocities
-from kinertia.trial.data import FloatArray, PlateLoads, Trial
+from kinertia.motion.caused_velocity import (
+    LEAST_CHANGE_M_S,
+    CausedVelocity,
+    VelocityChanges,
+    caused_velocities,
+)
+from kinertia.motion.unexplained_velocity import TOLD_APART, Unexplained
+from kinertia.trial.data import Trial
 
 _OPPOSED = -0.4
-_LEAST_CHANGE_M_S = 0.02
-"""Velocities that change by less (standard deviation) say nothing about the sign of forces."""
-OFFSET_LIMIT_N, _OFFSET_WINDOW_S = 20.0, 1.0
+OFFSET_LIMIT_N, OFFSET_WINDOW_S = 20.0, 1.0
 """Horizontal force that no acceleration of the body accounts for, mean over a window; over one that is shorter than
 this, pelvis and centre of mass part by as much velocity in less time."""
 _CLEAR, _CLEAR_TURN, _TURNED_DEG = 0.7, 0.35, 60.0
 _VERTICAL_FACTOR, _USUAL_FACTOR = (0.4, 1.8), 0.9
 """On 26 sound trials, from squats to runs, 0.67 to 0.99; at half the true rate it is four times as much."""
-_ONE_TURNED, _CLEARLY_BEST, _LEAST_TURNED_M_S = 0.65, 0.85, 0.08
-"""Where one plate's sign is wrong, turning it leaves 0.04 to 0.57 of the difference of velocities on five trials; on
-nine sound ones 0.9 (squats), 1.4 (runs) and more."""
-_TOLD_APART = 0.5
-"""Across the walk a foot pushes to one side all the time: with the wrong sign it looks like another zero. On nine
-trials what is true leaves 0.1 to 0.66 of what the other would, in one walk 0.7 to 1.7."""
-_HORIZONTAL = {"X": 0, "Z": 2}
+HORIZONTAL = {"X": 0, "Z": 2}
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     parts = caused_velocities(trial, owners)
     if not parts:
         return ""
-    changes = _Changes.of(parts)
+    changes = VelocityChanges.of(parts)
     if trouble := _time_scale_trouble(changes):
         return trouble
     angle, strength = _turn(changes)
@@ -69,13 +67,13 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     against = {
         axis: one.correlation
         for axis, one in agreements.items()
-        if one.correlation < _OPPOSED and not _one_zero_off(trial, parts, _HORIZONTAL[axis])
+        if one.correlation < _OPPOSED and not _one_zero_off(trial, parts, HORIZONTAL[axis])
     }
     # beside an axis that is opposed, one that goes with the markers says that they are not turned
     enough = -_OPPOSED if against else _CLEAR
     fitting = any(one.correlation > enough for one in agreements.values())
     evidence = ", ".join(f"correlation {value:.2f} along {axis}" for axis, value in against.items())
-    if len(against) == len(_HORIZONTAL):
+    if len(against) == len(HORIZONTAL):
         cause = "the forces are turned by 180 degrees about the vertical"
         remedy = "turn the forces, or the markers, before export"
     elif strength > _CLEAR_TURN and abs(angle) > _TURNED_DEG and not fitting:
@@ -93,18 +91,15 @@ def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
 
 def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], k: int) -> bool:
     """Whether a wrong zero under one foot accounts for more than turning the sign of all."""
-    left = _Unexplained.of(trial.loads.time, trial.loads.force, parts, k)
-    return bool(left.plate_zeroed.min() < _TOLD_APART * left.all_turned)
+    left = Unexplained.of(trial.loads.time, trial.loads.force, parts, k)
+    return bool(left.plate_zeroed.min() < TOLD_APART * left.all_turned)
 
 
-def _time_scale_trouble(changes: _Changes) -> str:
+def _time_scale_trouble(changes: VelocityChanges) -> str:
     """A vertical velocity that is not what the forces cause by a factor: both are right, and the time is not."""
-    shown, caused = changes.pelvis[:, 1], changes.caused[:, 1]
-    if min(shown.std(), caused.std()) < _LEAST_CHANGE_M_S:
-        return ""
-    factor = float((shown * caused).sum() / (shown * shown).sum())
+    factor = changes.times_up(changes.pelvis)
     least, most = _VERTICAL_FACTOR
-    if np.corrcoef(shown, caused)[0, 1] < _CLEAR or least < factor < most:
+    if factor is None or least < factor < most:
         return ""
     rate = float(np.sqrt(factor / _USUAL_FACTOR))
     return (
@@ -114,7 +109,7 @@ def _time_scale_trouble(changes: _Changes) -> str:
     )
 
 
-def _turn(changes: _Changes) -> tuple[float, float]:
+def _turn(changes: VelocityChanges) -> tuple[float, float]:
     """The angle (deg) about the vertical by which the forces' velocities are turned from the markers', and how well
     both correlate once it is taken back: of the mean over pelvis and markers' centre.
     """
@@ -123,107 +118,6 @@ def _turn(changes: _Changes) -> tuple[float, float]:
     sizes = [max(float(np.linalg.norm(caused) * np.linalg.norm(part)), 1e-12) for part in shown]
     turn = sum(complex(np.vdot(part, caused)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
     return float(np.degrees(np.angle(turn))), abs(turn)
-
-
-def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str]) -> str:
-    """Which single plate has a horizontal force of the wrong sign, where others have it right; empty where none.
-
-    With its sign turned, the forces must move the body much more as the markers show: more than with that of any other
-    plate, or of all, or with another zero.
-
-    Args:
-        plates: as read.
-        trial: what became of them, in the same axes.
-        owners: the segment that each marker is on.
-    """
-    parts = caused_velocities(trial, owners)
-    if not parts or len(plates.names) < 2:
-        return ""
-    for axis, k in _HORIZONTAL.items():
-        left = _Unexplained.of(plates.time, plates.force, parts, k)
-        best = int(np.argmin(left.plate_turned))
-        turned = left.plate_turned[best]
-        rivals = [left.all_turned, left.without_trend, *np.delete(left.plate_turned, best)]
-        if turned > min(_ONE_TURNED * left.as_read, _CLEARLY_BEST * min(rivals)) or left.as_read < _LEAST_TURNED_M_S:
-            continue
-        zero = int(np.argmin(left.plate_zeroed))
-        if left.plate_zeroed[zero] < _TOLD_APART * turned:
-            continue
-        return (
-            f"the horizontal force of {plates.names[best]} along {axis} has the wrong sign, and that of the other "
-            f"plates has not: with it, what the forces cause differs from the velocity of the body by "
-            f"{left.as_read:.2f} m/s (RMS), and by {turned:.3f} m/s once it is turned; turn the sign of that axis of "
-            f"this plate (or correct the order of its corners) before export{left.or_zero(plates.names, zero, turned)}"
-        )
-    return ""
-
-
-@dataclass(frozen=True, eq=False)
-class _Unexplained:
-    """m/s, along one axis: how far the velocity that the forces cause is from that of the body (RMS), as it is and by
-    each of some mistakes.
-
-    Attributes:
-        as_read: none.
-        all_turned: all plates have the wrong sign.
-        without_trend: all plates have the same wrong zero.
-        plate_turned, plate_zeroed: (p,) one plate has the wrong sign, or the wrong zero.
-        zero_n: (p,) N, that zero.
-    """
-
-    as_read: float
-    all_turned: float
-    without_trend: float
-    plate_turned: FloatArray
-    plate_zeroed: FloatArray
-    zero_n: FloatArray
-
-    @classmethod
-    def of(cls, time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity], k: int) -> _Unexplained:
-        """Along X (0) or Z (2); forces (k, p, 3) N of plates, or of feet, over (k,) s."""
-        body = _middled([(part.pelvis[:, k] + part.centre[:, k]) / 2 for part in parts])
-        caused = _middled([part.caused[:, k] for part in parts])
-        off = caused - body
-        turned, zeroed, zero_n = [], [], []
-        for own_force in np.moveaxis(force, 1, 0):
-            own, one_newton = (
-                _middled([_impulse(time, each, part) for part in parts])
-                for each in (own_force[:, k], (own_force[:, 1] > 0.0).astype(float))
-            )
-            zero_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
-            turned.append(np.std(off - 2.0 * own))
-            zeroed.append(np.std(off - zero_n[-1] * one_newton))
-        trends = np.concatenate([_without_trend(part.time, part.caused[:, k] - part.centre[:, k]) for part in parts])
-        return cls(
-            float(np.std(off)),
-            float(np.std(caused + body)),
-            float(np.std(trends)),
-            np.array(turned),
-            np.array(zeroed),
-            np.array(zero_n),
-        )
-
-    def or_zero(self, names: Sequence[str], zero: int, turned: float) -> str:
-        """The other cause, where a zero of one plate accounts for as much."""
-        if turned < _TOLD_APART * self.plate_zeroed[zero]:
-            return ""
-        return (
-            f"; or the zero of that axis of {names[zero]} is off by {self.zero_n[zero]:+.0f} N: without that it is "
-            f"{self.plate_zeroed[zero]:.3f} m/s, and a foot that pushes to one side all the time does not tell which; "
-            "see what the plate reads while nobody stands on it"
-        )
-
-
-def _impulse(time: FloatArray, force: FloatArray, part: CausedVelocity) -> FloatArray:
-    """(n,) m/s that a force (k,) N over time (k,) s causes."""
-    force = np.interp(part.time, time, force)
-    impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(part.time))
-    return np.concatenate(([0.0], impulse)) / part.mass_kg
-
-
-def _middled(windows: Sequence[FloatArray]) -> FloatArray:
-    """One after the other, each less its mean."""
-    return np.concatenate([each - each.mean() for each in windows])
 
 
 def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
@@ -251,13 +145,13 @@ def agreement(trial: Trial, owners: Mapping[str, str]) -> dict[str, Agreement]:
 
 
 def _agreement(parts: Sequence[CausedVelocity]) -> dict[str, Agreement]:
-    changes = _Changes.of(parts)
+    changes = VelocityChanges.of(parts)
     spans = np.array([np.ptp(part.time) for part in parts])
-    limit = OFFSET_LIMIT_N * max(1.0, _OFFSET_WINDOW_S / float(spans.max()))
+    limit = OFFSET_LIMIT_N * max(1.0, OFFSET_WINDOW_S / float(spans.max()))
     agreements = {}
-    for axis, k in _HORIZONTAL.items():
+    for axis, k in HORIZONTAL.items():
         caused, *shown = (part[:, k] for part in (changes.caused, changes.pelvis, changes.centre))
-        still = min(part.std() for part in (caused, *shown)) < _LEAST_CHANGE_M_S
+        still = min(part.std() for part in (caused, *shown)) < LEAST_CHANGE_M_S
         correlation = np.nan if still else float(np.mean([np.corrcoef(caused, part)[0, 1] for part in shown]))
         trends = [
             part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, k] - part.pelvis[:, k], 1)[0]
@@ -265,29 +159,3 @@ def _agreement(parts: Sequence[CausedVelocity]) -> dict[str, Agreement]:
         ]
         agreements[axis] = Agreement(correlation, float(np.average(trends, weights=spans**3)), limit)
     return agreements
-
-
-@dataclass(frozen=True, eq=False)
-class _Changes:
-    """(n, 3) m/s: the same of all windows, one after the other, each without its trend."""
-
-    pelvis: FloatArray
-    centre: FloatArray
-    caused: FloatArray
-
-    @classmethod
-    def of(cls, parts: Sequence[CausedVelocity]) -> _Changes:
-        """Of these windows."""
-        pelvis, centre, caused = (
-            np.concatenate([_without_trend(part.time, getattr(part, name)) for part in parts])
-            for name in ("pelvis", "centre", "caused")
-        )
-        return cls(pelvis, centre, caused)
-
-
-def _without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (n,) or (n, k) less a line of each column."""
-    after = time - time.mean()
-    slope, level = np.polyfit(after, values, 1)
-    result: FloatArray = values - np.multiply.outer(after, slope) - level
-    return result

@@ -46,6 +46,11 @@ Sentences and changes of the joint moments are in `faults.json`.
   to the line from heel to toe.
 - A floor that is too low by less than thick soles are high. It is named where the feet's lowest marker is more than
   50 mm above the floor; on fourteen people it is 23 to 44 mm. The forces would show it to 13 to 24 mm: too little.
+- A wrong rate of a C3D file by less than a factor of 1.8. Markers and forces share its clock, so that loads still begin
+  when feet land. Only the body's ups and downs show it: at 1.2 times the rate forces move it 0.7 times as fast as its
+  markers show in the Plug-in Gait walk of subject A, and 0.8 to 1.05 times (by the markers' centre) on sound trials.
+- A zero of one loaded plate, or a gain by less than 7.5 %, in less than a second of measured steps: its share of so
+  short a motion is not told from what pelvis and limbs do against one another.
 
 ## What is said of sound walks
 

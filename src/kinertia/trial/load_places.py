@@ -16,6 +16,7 @@ from kinertia.trial.exchanged_plates import exchanged_plates_trouble
 from kinertia.trial.foot_ways import FootWay, foot_ways
 from kinertia.trial.load_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, Contact, contacts_of, half_within
 from kinertia.trial.load_times import delay_trouble, rate_trouble
+from kinertia.trial.other_clock import other_delay_trouble, other_rate_trouble
 from kinertia.trial.turned_plates import turned_plates_trouble
 
 _FAR_TOO_FAR_M = 5.0
@@ -45,11 +46,13 @@ def load_places_trouble(recording: Recording, feet: Mapping[str, Sequence[str]])
     if not contacts:
         return ""
     return (
-        _unit_trouble(contacts)
+        _unit_trouble(recording.plates, contacts)
+        or other_rate_trouble(recording.plates, contacts, ways)
         or rate_trouble(recording.plates, contacts, ways)
         or exchanged_plates_trouble(recording.plates, contacts, ways)
         or delay_trouble(recording.plates, contacts, ways)
         or turned_plates_trouble(recording.plates, contacts, ways)
+        or other_delay_trouble(recording.plates, contacts, ways)
         or _place_trouble(contacts)
     )
 
@@ -64,13 +67,21 @@ def load_places_doubts(recording: Recording, feet: Mapping[str, Sequence[str]]) 
     return [one for one in doubts if one]
 
 
-def _unit_trouble(contacts: Sequence[Contact]) -> str:
-    far = min(half_within(contact) for contact in contacts)
-    if far < _FAR_TOO_FAR_M:
+def _unit_trouble(plates: PlateLoads, contacts: Sequence[Contact]) -> str:
+    """Plates whose loads are all out of the laboratory: one alone, where each has columns of its own."""
+    nearest: dict[int, float] = {}
+    for contact in contacts:
+        nearest[contact.plate] = min(half_within(contact), nearest.get(contact.plate, np.inf))
+    far = [p for p, distance in nearest.items() if distance >= _FAR_TOO_FAR_M]
+    if not far:
         return ""
+    near = len(nearest) - len(far)
+    which = f" of {' and '.join(plates.names[p] for p in far)}" if near else ""
+    others = ", and those of the other plates are not" if near else ""
     return (
-        f"the points at which the forces act are {far:.3g} m away from the feet: they are in mm, or in other axes than "
-        "the markers, or torques are in N mm; export points in m and torques in N m"
+        f"the points{which} at which the forces act are {min(nearest[p] for p in far):.3g} m away from the feet{others}"
+        ": they are in mm, or in other axes than the markers, or torques are in N mm; export points in m and torques "
+        "in N m"
     )
 
 

@@ -13,6 +13,8 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
 
 _SPIKE_M, _FEW_SPIKES = 0.08, 2
 _STEP_M = 0.04
+_ALONE = 1.5
+"""A single frame is off by twice as much as it makes those beside it look; one before or after a jump, by as much."""
 _LANDING_M = 0.04
 """Two markers exchanged their labels where each is this near to the other's way."""
 _LOST_M, _LOST_TIMES = 0.006, 3.0
@@ -35,8 +37,7 @@ def spikes_trouble(markers: Markers) -> str:
     """
     if len(markers.time) < 3:
         return ""
-    place = markers.positions
-    away = np.nan_to_num(np.linalg.norm(place[1:-1] - (place[2:] + place[:-2]) / 2, axis=-1))
+    away = _away(markers.positions)
     # of three frames around a spike the middle one is farthest away
     beside = np.pad(away, ((1, 1), (0, 0)))
     spike = (away > _SPIKE_M) & (away >= beside[2:]) & (away >= beside[:-2])
@@ -99,12 +100,42 @@ def exchanged_trouble(markers: Markers) -> str:
 
 
 def jump_doubts(markers: Markers) -> list[str]:
-    """Markers that step once or twice, and stay."""
+    """Markers that leave their way for single frames, which `spikes_trouble` found to be small or few, and markers that
+    step once or twice, and stay.
+    """
     if len(markers.time) < 5:
         return []
     size = np.nan_to_num(np.linalg.norm(_steps(markers.positions), axis=-1))
+    size[size <= _STEP_M * _slowness(markers)] = 0.0
+    # a frame that is off makes a step to it, and one from it
+    step = np.pad(size > 0.0, ((1, 1), (0, 0)))
+    away = _away(markers.positions)
+    spike = _alone(away) & (step[1:] | step[:-1])
+    size[spike[1:] | spike[:-1]] = 0.0
+    return [*_spikes_doubt(markers, np.where(spike, away, 0.0)), *_jumps_doubt(markers, size)]
+
+
+def _spikes_doubt(markers: Markers, away: FloatArray) -> list[str]:
+    """Of how far (n - 2, m) m single frames are off; 0 where they are not."""
+    worn = np.flatnonzero(away.any(axis=0))
+    if not worn.size:
+        return []
+    named = ", ".join(
+        f"{markers.labels[k]} by up to {1e3 * away[:, k].max():.0f} mm ({np.count_nonzero(away[:, k])} times, first at "
+        f"{markers.time[1 + int(np.argmax(away[:, k] > 0))]:.3f} s)"
+        for k in worn[:_LISTED]
+    )
+    more = f" and {worn.size - _LISTED} more" if worn.size > _LISTED else ""
+    return [
+        f"spikes: single frames in which markers are off their way: {named}{more}; delete those frames of the marker, "
+        "a gap is bridged"
+    ]
+
+
+def _jumps_doubt(markers: Markers, size: FloatArray) -> list[str]:
+    """Of steps (n - 3, m) m; 0 where there are none."""
     jumps = []
-    for k in np.flatnonzero((size > _STEP_M * _slowness(markers)).any(axis=0)):
+    for k in np.flatnonzero(size.any(axis=0)):
         frame = int(np.argmax(size[:, k]))
         jumps.append(f"{markers.labels[k]} by {1e3 * size[frame, k]:.0f} mm at {markers.time[frame + 2]:.3f} s")
     if not jumps:
@@ -176,6 +207,18 @@ def _straight(place: FloatArray, count: int) -> BoolArray:
         off = np.abs(between - (1 - share) * first - share * last).max(axis=-1)
         result &= np.nan_to_num(off, nan=np.inf) < _STRAIGHT_M
     return np.asarray(result)
+
+
+def _away(place: FloatArray) -> FloatArray:
+    """(n - 2, m) m, from the middle between the frames before and after; 0 where one of them is not seen."""
+    result: FloatArray = np.nan_to_num(np.linalg.norm(place[1:-1] - (place[2:] + place[:-2]) / 2, axis=-1))
+    return result
+
+
+def _alone(away: FloatArray) -> BoolArray:
+    """Where single frames are off: those beside them are half as far off then, and as far where a marker jumps."""
+    beside = np.pad(away, ((1, 1), (0, 0)))
+    return np.asarray(away > _ALONE * np.maximum(beside[2:], beside[:-2]))
 
 
 def _slowness(markers: Markers) -> float:

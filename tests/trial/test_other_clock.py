@@ -1,0 +1,76 @@
+"""A wrong rate is told from a late clock by the one correction that puts all loads under standing feet."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.trial.data import Markers
+from kinertia.trial.load_places import load_places_trouble
+from walk_on_plates import ALL_STEPS, FEET, STRIDE_M
+from walk_on_plates import walk as simple_walk
+
+FEW_STEPS = [("r", 0), ("l", 0)]
+
+
+def measured_walk(steps, edge_s=0.04, stance_s=0.6, belt_m_s=0.0, **more):
+    """Loads as long as the feet look to stand: in the simple walk these are slow `edge_s` before and after."""
+    markers = simple_walk(steps, stance_s - 2 * edge_s, belt_m_s=belt_m_s, **more).markers
+    early = late(simple_walk(steps, stance_s, belt_m_s=belt_m_s, **more), -edge_s)
+    back = np.cross([belt_m_s * edge_s, 0.0, 0.0], early.plates.force)
+    return replace(early, markers=markers, plates=replace(early.plates, moment=early.plates.moment + back))
+
+
+def marked_at(recording, factor):
+    """The rate of the markers stated so many times too high."""
+    markers = recording.markers
+    time = markers.time[0] + (markers.time - markers.time[0]) / factor
+    return replace(recording, markers=replace(markers, time=time))
+
+
+def late(recording, by_s):
+    plates = recording.plates
+    rows = round(by_s / float(plates.time[1] - plates.time[0]))
+    earlier = np.clip(np.arange(len(plates.time)) - rows, 0, len(plates.time) - 1)
+    return replace(recording, plates=replace(plates, force=plates.force[earlier], moment=plates.moment[earlier]))
+
+
+@pytest.mark.parametrize("steps", [FEW_STEPS, ALL_STEPS], ids=["two plates", "all steps"])
+@pytest.mark.parametrize("factor", [1.2, 0.8, 2.0])
+def test_a_wrong_rate_is_no_late_clock(steps, factor):
+    trouble = load_places_trouble(marked_at(measured_walk(steps), factor), FEET)
+    assert trouble.startswith("markers and forces do not run at the same speed, by a factor of about ")
+    assert float(trouble.partition("of about ")[2].partition(":")[0]) == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize("late_s", [-0.1, 0.1])
+def test_a_late_clock_is_no_wrong_rate(late_s):
+    word = "late" if late_s > 0 else "early"
+    assert f" ms {word}" in load_places_trouble(late(measured_walk(FEW_STEPS), late_s), FEET)
+
+
+def test_loads_that_a_belt_takes_along_are_late():
+    """On a fast belt, loads that come late are under no foot."""
+    run = measured_walk(ALL_STEPS, 0.08, 0.2, stride_m=3 * STRIDE_M, belt_m_s=3 * STRIDE_M)
+    assert load_places_trouble(run, FEET) == ""
+    trouble = load_places_trouble(late(run, 0.1), FEET)
+    assert trouble.startswith("the forces are ")
+    assert " ms late" in trouble
+    assert "of another trial" in trouble
+
+
+def test_who_does_not_step_has_no_clock_to_compare():
+    standing = simple_walk(ALL_STEPS)
+    still = np.repeat(standing.markers.positions[:1], len(standing.markers.time), axis=0)
+    markers = Markers(standing.markers.time, standing.markers.labels, still)
+    assert "speed" not in load_places_trouble(replace(standing, markers=markers), FEET)
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+def test_points_of_one_plate_in_mm(plate):
+    recording = simple_walk(FEW_STEPS)
+    moment = recording.plates.moment.copy()
+    moment[:, plate] *= 1000.0
+    trouble = load_places_trouble(replace(recording, plates=replace(recording.plates, moment=moment)), FEET)
+    assert trouble.startswith(f"the points of plate {plate + 1} at which the forces act are ")
+    assert "in mm" in trouble
