@@ -34,6 +34,7 @@ def main() -> None:
             page.wait_for_url("**#results")
             page.goto(page.url.partition("#")[0])
             page.frame_locator("iframe.report").locator(".headline").wait_for()
+            page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(3000)
             page.screenshot(path=str(PICTURE))
             browser.close()
