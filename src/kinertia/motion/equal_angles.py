@@ -81,16 +81,20 @@ class EqualAngles:
         Where those would leave a clamped range, a joint keeps the values that it has.
         """
         q = q.copy()
-        paths = [(joint.columns, joint) for joint in self.joints] + [((column,), None) for column in self.single]
-        for columns, joint in paths:
+        always = np.isfinite(q).all(axis=0)
+        known_together = tuple(column for column in self.single if always[column])
+        alone = [((column,), None) for column in self.single if not always[column]]
+        for columns, joint in [*((joint.columns, joint) for joint in self.joints), (known_together, None), *alone]:
             known = np.flatnonzero(np.isfinite(q[:, columns]).all(axis=1))
-            if known.size:
+            if known.size and columns:
                 some = np.ix_(known, np.array(columns))
                 q[some] = self._one_branch(q[some], columns, joint)
         return q
 
     def _one_branch(self, angles: np.ndarray, columns: Sequence[int], joint: ThreeAngles | None) -> np.ndarray:
-        """The equals of the angles (n, k) of one joint that do not jump and leave their ranges least."""
+        """The equals of the angles (n, k) of one joint, or of k joints of one angle, that do not jump and leave their
+        ranges least.
+        """
         paths = [angles]
         if joint is not None:
             twins = joint.twins(angles)
@@ -101,10 +105,14 @@ class EqualAngles:
         # which twin is meant shows in the middle angle: the others may have come round
         k = len(columns) // 2
         choices = [self._whole_turns(np.unwrap(path, axis=0), columns) for path in paths]
-        best = min(choices, key=lambda path: self._beyond(path, columns).sum() + self._from_neutral(path, columns)[k])
+        best = choices[0]
+        if joint is not None:
+            best = min(
+                choices, key=lambda path: self._beyond(path, columns).sum() + self._from_neutral(path, columns)[k]
+            )
         low, high = self.bounds.least[list(columns)], self.bounds.most[list(columns)]
-        leaves = (np.abs(best - np.clip(best, low, high)) > _END_RAD).any()
-        return angles if leaves else best
+        leaves = (np.abs(best - np.clip(best, low, high)) > _END_RAD).any(axis=0)
+        return np.where(leaves if joint is None else leaves.any(), angles, best)
 
     def _whole_turns(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
         """The same path (n, k), every angle shifted by the whole turns that make it least strange."""
