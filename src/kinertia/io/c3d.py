@@ -161,10 +161,10 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
 
 def _size(positions: FloatArray) -> float:
     """How far markers (n, m, 3) reach along an axis: the median of the frames that show most of them."""
-    seen = np.isfinite(positions).all(axis=2)
-    fullest = seen.sum(axis=1)
-    reached = [np.ptp(frame[show], axis=0).max() for frame, show in zip(positions, seen, strict=True) if show.any()]
-    return float(np.median(np.array(reached)[fullest[fullest > 0] == fullest.max()])) if reached else np.nan
+    seen = np.asarray(np.isfinite(positions).all(axis=2))
+    count = seen.sum(axis=1)
+    fullest = np.flatnonzero(count == count.max(initial=1))
+    return float(np.median([np.ptp(positions[k, seen[k]], axis=0).max() for k in fullest])) if len(fullest) else np.nan
 
 
 def _times(file: Any, kind: str) -> FloatArray:
