@@ -110,9 +110,16 @@ def test_init_matches_one_force_file_to_each_trial(tmp_path):
     assert forces == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
 
 
-@pytest.mark.parametrize(("trial", "forces"), [("DJ1", "DJ1_forces"), ("T1", "T1"), ("W2", "grf_W2"), ("w-3", "W-3 GRF")])
-def test_init_matches_short_names_that_are_whole_words_of_the_force_files(tmp_path, trial, forces):
-    other = {"DJ1": "DJ12_forces", "T1": "T10", "W2": "grf_W22", "w-3": "W-31 GRF"}[trial]
+@pytest.mark.parametrize(
+    ("trial", "forces", "other"),
+    [
+        ("DJ1", "DJ1_forces", "DJ12_forces"),
+        ("T1", "T1", "T10"),
+        ("W2", "grf_W2", "grf_W22"),
+        ("w-3", "W-3 GRF", "W-31 GRF"),
+    ],
+)
+def test_init_matches_short_names_that_are_whole_words_of_the_force_files(tmp_path, trial, forces, other):
     for name in ("static.trc", f"{trial}.trc", "walk_1.trc"):
         (tmp_path / name).touch()
     for name in (forces, other, "walk_1_forces"):
