@@ -102,10 +102,11 @@ class ForceMass:
             return ""
         first, last = max(spans, key=lambda span: span[1] - span[0])
         lost = -100.0 * float(share[first : last + 1].mean())
+        more = f", and a part {len(spans) - 1} more times" if len(spans) > 1 else ""
         return (
             f"in {100 * whole.mean():.0f} % of the time the plates carry all of it, but from {self.time[first]:.3f} to "
-            f"{self.time[last]:.3f} s {lost:.0f} % are missing: something that is not measured was stood, sat or leant "
-            f"on; give the other part of the trial as window_s"
+            f"{self.time[last]:.3f} s {lost:.0f} % are missing{more}: something that is not measured was stood, sat or "
+            f"leant on; give the other part of the trial as window_s"
         )
 
 

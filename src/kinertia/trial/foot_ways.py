@@ -21,7 +21,7 @@ _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 _LEAST_SWING_M_S = 1.0
 """Who does not move the feet faster takes no steps."""
 _NOISE_M_S, _FARTHEST_S = 0.15, 0.05
-"""A speed known to the former needs no frames farther apart; the latter on either side still shows landing and leaving."""
+"""A speed known to the former needs no frames farther apart; frames the latter apart still show landing and leaving."""
 _THIRD_DIFFERENCE = 0.6745 * np.sqrt(20.0)
 """Median size of third differences of white noise with a deviation of one."""
 _SHORTEST_S = 0.1
@@ -128,7 +128,7 @@ def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | N
 
 
 def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
-    """(n, m, 3) m/s of markers (n, m, 3): differences of neighbouring frames or, of noisy ones, of frames farther apart.
+    """(n, m, 3) m/s of markers (n, m, 3), by neighbouring frames or, where they are noisy, by frames farther apart.
 
     The noise is that of third differences, which hardly show how feet move: poses from video jitter by some mm in every
     frame, a speed of 0.4 m/s that no standing foot has.
