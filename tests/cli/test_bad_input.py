@@ -73,7 +73,7 @@ def test_xml_that_explains_no_loads(lab, shared_data):
 @pytest.mark.parametrize(
     ("change", "line", "what"),
     [
-        (edit_cell(3, 3, "40"), r"(, line \d)?", "40"),
+        (edit_cell(4, 5, ""), ", line 4", r"marker labels, expected \d\d as NumMarkers says"),
         (edit_cell(3, 3, "many"), ", line 3", "many"),
         (edit_cell(3, 4, "furlong"), ", line 3", "furlong.*expected.*mm"),
         (

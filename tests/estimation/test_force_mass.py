@@ -1,5 +1,6 @@
 """A person whose mass is known walks (synthetic): what do forces and markers alone say of it?"""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -63,11 +64,30 @@ def test_each_cause_is_told_by_its_evidence_and_none_is_accused_without(made):
         assert "gain and zero" in text
     hand = said(made, lambda time, force: force * np.where((time > 0.5) & (time < 0.9), 0.4, 1.0))
     assert "from 0.5" in hand
-    assert "not measured was stood or leant on" in hand
+    assert "not measured was stood, sat or leant on" in hand
     assert "gain" not in hand
     heavy = said(made, lambda time, force: 1.3 * force)
     assert "units of the plates" in heavy
     assert "chair" not in heavy
+
+
+def test_a_chair_is_told_though_the_mean_force_hardly_shows_it(made):
+    carried = CarriedMass.of(made.bsp.total_mass_kg, ())
+    middle = made.time[0] + np.ptp(made.time) / 2
+
+    def sitting(for_s):
+        seat = np.clip(1.5 * for_s / 2 - np.abs(made.time - middle), 0, for_s / 2) / (for_s / 2)
+        return trial(made, lambda time, force: force * (1.0 - 0.6 * seat[:, None, None]))
+
+    sat = force_mass(made.skeleton, sitting(0.35))
+    said = sat.lost_for_a_while(carried)
+    begins, ends = (float(word) for word in re.search(r"from (\S+) to (\S+) s", said).groups())
+    assert begins < middle < ends
+    assert ends - begins == pytest.approx(0.35, abs=0.15)
+    assert "something that is not measured was stood, sat or leant on" in said
+    assert force_mass(made.skeleton, trial(made)).lost_for_a_while(carried) == ""
+    gain = trial(made, lambda time, force: 0.7 * force)
+    assert force_mass(made.skeleton, gain).lost_for_a_while(carried) == "", "all the time is not for a while"
 
 
 def test_trials_of_different_masses_are_not_pooled(made):

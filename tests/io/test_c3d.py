@@ -168,6 +168,28 @@ def test_units(tmp_path, unit):
     expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
 
 
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_plates_of_a_file_whose_length_unit_is_inferred(tmp_path, unit):
+    size = {"m": 1000, "cm": 10, "mm": 1}[unit]
+    points, labels = standing()
+    analogs = stepping() / [1, 1, 1, size, size, size]
+    plate = plate_parameters(CORNERS / size, origin_z=-20 / size)
+    parameters = {**SCREEN, "FORCE_PLATFORM": plate}
+    for said in ("", f"N{unit}"):
+        path = write_c3d(tmp_path / "x.c3d", points / size, labels, analogs, parameters, unit="", moment_unit=said)
+        recording = read_c3d(path)
+        assert recording.length_unit == unit
+        expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+
+
+def test_plates_of_a_file_whose_length_unit_has_no_entry(tmp_path):
+    points, labels = standing()
+    parameters = {"POINT": {"Y_SCREEN": ["+Z"], "UNITS": []}, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters))
+    assert recording.length_unit == "mm"
+    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+
+
 def test_calibrated_plate_of_type_4(tmp_path):
     points, labels = standing()
     plate = plate_parameters(CORNERS, kind=4)
@@ -395,3 +417,12 @@ def test_an_empty_length_unit_is_inferred_from_the_size_of_a_person(tmp_path, un
     ant = write_c3d(tmp_path / "y.c3d", 0.1 * person, [f"M{k}" for k in range(9)], unit="")
     with pytest.raises(FileError, match=r"POINT:UNITS is empty, and its markers, which reach 0\.1"):
         read_c3d(ant)
+
+
+def test_a_length_unit_is_inferred_though_no_frame_shows_every_marker(tmp_path):
+    person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (0.6, 0.5, 1.8), (40, 9, 3))
+    for k in range(40):
+        person[k, k % 8] = np.nan
+    person[:, 8] = np.nan
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", 1000.0 * person, [f"M{k}" for k in range(9)], unit=""))
+    assert recording.length_unit == "mm"

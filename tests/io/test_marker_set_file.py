@@ -58,6 +58,19 @@ def test_a_whole_set_that_lacks_a_label_is_not_taken_for_its_lower_half(lost):
     assert choose_marker_set(legs).name == "Plug-in Gait, lower body"
 
 
+@pytest.mark.parametrize("trunk", [False, True])
+@pytest.mark.parametrize("name", preset_names())
+def test_a_preset_is_recognised_by_its_legs(name, trunk):
+    """Plug-in Gait's legs have a preset of their own."""
+    preset = read_marker_set(name)
+    parts = ("pelvis", "thigh", "shank", "foot", *(["torso"] if trunk else []))
+    legs = [label for segment, own in preset.segments.items() if segment.startswith(parts) for label in own]
+    expected = "plug-in-gait-lower-body" if name == "plug-in-gait" and not trunk else name
+    assert choose_marker_set(legs) == read_marker_set(expected)
+    with pytest.raises(MarkerSetError, match="no marker-set preset fits"):
+        choose_marker_set([label for label in preset.labels if label not in preset.segments["pelvis"]][::2])
+
+
 @pytest.mark.parametrize("name", preset_names())
 def test_presets_are_symmetric_and_put_every_marker_on_one_segment(name):
     preset = read_marker_set(name)

@@ -110,6 +110,25 @@ def test_init_matches_one_force_file_to_each_trial(tmp_path):
     assert forces == {"walk_1": "walk_1_forces.mot", "walk_2": "walk_2_forces.mot", "run_12": None}
 
 
+@pytest.mark.parametrize(
+    ("trial", "forces", "other"),
+    [
+        ("DJ1", "DJ1_forces", "DJ12_forces"),
+        ("T1", "T1", "T10"),
+        ("W2", "grf_W2", "grf_W22"),
+        ("w-3", "W-3 GRF", "W-31 GRF"),
+    ],
+)
+def test_init_matches_short_names_that_are_whole_words_of_the_force_files(tmp_path, trial, forces, other):
+    for name in ("static.trc", f"{trial}.trc", "walk_1.trc"):
+        (tmp_path / name).touch()
+    for name in (forces, other, "walk_1_forces"):
+        (tmp_path / f"{name}.mot").write_text("x\nendheader\ntime\tground_force_vx\tground_force_vy\n")
+    result = draft(tmp_path, completed(init_subject(tmp_path)))
+    found = {trial.name: trial.forces and trial.forces.name for trial in result.trials}
+    assert found == {trial: f"{forces}.mot", "walk_1": "walk_1_forces.mot"}
+
+
 def laboratory(tmp_path, force_folder):
     """Markers of a person in a folder, forces in another one."""
     person = tmp_path / "person"

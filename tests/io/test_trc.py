@@ -133,8 +133,18 @@ def test_a_header_that_miscounts_its_frames_is_a_note(write):
     assert "announces 4 frames, the file has 3: all of them were read" in recording.notes[0]
 
 
+def test_a_header_that_miscounts_its_markers_is_a_note_where_labels_and_columns_agree(write):
+    recording = read_trc_recording(write(HEADER.replace("\t3\t2\t", "\t3\t12\t") + ROWS))
+    assert recording.markers.positions.shape == (3, 2, 3)
+    assert "announces 12 markers, the file has 2: all of them were read" in recording.notes[0]
+
+
+THIRD = ROWS.replace("\t6\n", "\t6\t7\t8\t9\n")
+"""Rows with numbers of a third marker."""
 BROKEN = {
-    "marker count": (HEADER.replace("\t3\t2\t", "\t3\t3\t") + ROWS, 4, "2 marker labels, expected 3"),
+    "lost label": (HEADER.replace("\t3\t2\t", "\t3\t3\t") + THIRD, 4, "2 marker labels, expected 3"),
+    "label too many": (HEADER.replace("L Heel", "X\t\t\tL Heel") + ROWS, 4, "3 marker labels, expected 2"),
+    "no labels": (HEADER.replace("R.Heel", "").replace("L Heel", "") + ROWS, 4, "no marker labels"),
     "odd count": (HEADER.replace("\t3\t2\t", "\t3.5\t2\t") + ROWS, 3, "NumFrames is 3.5"),
     "unit": (HEADER.replace("mm", "inch") + ROWS, 3, "unknown unit 'inch'"),
     "not a number": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\tx"), 7, "'x' in column 3"),

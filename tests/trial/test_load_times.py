@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
@@ -70,3 +71,12 @@ def test_three_contacts_exclude_a_rate_that_is_far_off(measured_recording):
 
 def test_sound_walks_at_their_rate(walk):
     assert said_of(walk) == ""
+
+
+@pytest.mark.parametrize("noise_mm", [3.0, 5.0])
+def test_markers_that_jitter_are_no_wrong_rate(walk, noise_mm):
+    """Poses and markers from video do, by some millimetres in every frame."""
+    noise = 1e-3 * noise_mm * np.random.default_rng(2).standard_normal(walk.markers.positions.shape)
+    noisy = replace(walk, markers=replace(walk.markers, positions=walk.markers.positions + noise))
+    assert said_of(noisy) == ""
+    assert "speed" in said_of(noisy, 1.6)

@@ -185,6 +185,19 @@ def test_double_support_on_one_plate_is_not_measured():
     assert trial.measured[~double].mean() > 0.6
 
 
+def test_both_feet_on_one_plate_all_the_time_is_said():
+    """Somebody who squats, swaying from foot to foot."""
+    standing = walk([("r", 0)], stride_m=0.0, stance_s=0.99)
+    markers = replace(standing.markers, positions=standing.markers.positions[[25]].repeat(300, axis=0))
+    plates = standing.plates
+    force = np.tile([0.0, 700.0, 0.0], (len(plates.time), 1, 1))
+    sway = np.zeros_like(force)
+    sway[:, 0, 2] = 0.05 * np.sin(2 * np.pi * 0.7 * plates.time)
+    squats = replace(standing, markers=markers, plates=replace(plates, force=force, moment=np.cross(sway, force)))
+    with pytest.raises(TrialError, match=r"both feet stand on one plate in \d+ % of the frames, and only the sum"):
+        build_trial(squats, FEET)
+
+
 def test_load_far_from_both_feet_is_noted():
     recording = walk([("r", 0)])
     plates = recording.plates

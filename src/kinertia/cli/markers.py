@@ -11,10 +11,10 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table
 from kinertia.errors import FileError
 from kinertia.io.marker_set_draft import draft_marker_set
-from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
-from kinertia.model.marker_set import ENOUGH_WORN, share_worn
+from kinertia.model.marker_set import is_worn, share_worn
 
 _LISTED = 6
 
@@ -27,8 +27,8 @@ def markers(
 ) -> Outcome:
     """Show the labels of a file against every marker-set preset, and draft a marker set from them.
 
-    A preset is recognised by itself where a file has at least 80 % of its labels. For any other set give -o, complete
-    the draft, and name it with --markers.
+    A preset is recognised by itself where a file has at least 80 % of its labels, or of those of its pelvis, legs and
+    feet. For any other set give -o, complete the draft, and name it with --markers.
 
     [bold]Examples[/]
 
@@ -48,8 +48,8 @@ def markers(
         table.add_row(name, f"{len(wanted) - len(absent)} of {len(wanted)}", ", ".join(absent[:_LISTED]) + more)
         presets.append({"name": name, "labels": len(wanted), "absent": absent})
     out.print(table)
-    best = max(shares, key=lambda name: shares[name])
-    recognised = best if shares[best] >= ENOUGH_WORN else None
+    best = nearest_preset(labels)
+    recognised = next((name for name in shares if is_worn(best, labels) and read_marker_set(name) == best), None)
     if recognised:
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
     elif output is None:

@@ -35,6 +35,9 @@ _FEWEST_FRAMES = 2 * MIN_SAMPLES
 _CARRIED, _MISSING = 0.15, 0.25
 """Share of body weight within which all of it is carried, and from which on some of it is not."""
 _SHORTEST_S = 0.1
+UNMEASURED_S = 0.2
+"""A part of the weight that is missing this long is on something else, whatever the mean says: in sound walks, runs and
+jumps it is missing for 0.06 s at most, in flight."""
 CARRIED_HINT = "if something was worn or carried that the scale did not weigh, give it as [[attached]]"
 UNMEASURED_HINT = (
     "or see whether a part of the weight was on no plate (a handrail, a walker, crutches, a harness): all the time, it "
@@ -77,26 +80,33 @@ class ForceMass:
         )
         if hint := unit_hint(self.mass_kg, mass_kg):
             return f"{hint}: {text}"
-        share = self.carried / mass_kg - 1.0
         if self.mass_kg > mass_kg:
             return (
                 f"{text}: {CARRIED_HINT}; else correct the mass, the gain, the zero or the units of the plates, or see "
                 f"who else is on them"
             )
-        whole = np.abs(share) < _CARRIED
-        spans = [(a, b) for a, b in runs(share < -_MISSING) if self.time[b] - self.time[a] >= _SHORTEST_S]
-        if whole.mean() >= _MOSTLY and spans:
-            first, last = max(spans, key=lambda span: span[1] - span[0])
-            lost = -100.0 * float(share[first : last + 1].mean())
-            return (
-                f"{text}; in {100 * whole.mean():.0f} % of this time the plates carry all of it, but from "
-                f"{self.time[first]:.3f} to {self.time[last]:.3f} s {lost:.0f} % are missing: something that is not "
-                f"measured was stood or leant on; give the other part of the trial as window_s"
-            )
+        if lost := self.lost_for_a_while(carried, _SHORTEST_S):
+            return f"{text}; {lost}"
         return (
             f"{text}, and something is missing nearly all the time: correct the mass, or the gain and zero of the "
             f"plates, if nothing else can have carried a part of the weight (a chair, a handrail, a walker, crutches, "
             f"a harness, a foot beside the plates)"
+        )
+
+    def lost_for_a_while(self, carried: CarriedMass, shortest_s: float = UNMEASURED_S) -> str:
+        """When a part of the weight is on no plate though at other times none is, and what to do; else empty."""
+        share = self.carried / carried.total_kg - 1.0
+        whole = np.abs(share) < _CARRIED
+        spans = [(a, b) for a, b in runs(share < -_MISSING) if self.time[b] - self.time[a] >= shortest_s]
+        if whole.mean() < _MOSTLY or not spans:
+            return ""
+        first, last = max(spans, key=lambda span: span[1] - span[0])
+        lost = -100.0 * float(share[first : last + 1].mean())
+        more = f", and a part {len(spans) - 1} more times" if len(spans) > 1 else ""
+        return (
+            f"in {100 * whole.mean():.0f} % of the time the plates carry all of it, but from {self.time[first]:.3f} to "
+            f"{self.time[last]:.3f} s {lost:.0f} % are missing{more}: something that is not measured was stood, sat or "
+            f"leant on; give the other part of the trial as window_s"
         )
 
 

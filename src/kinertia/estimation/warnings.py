@@ -50,7 +50,9 @@ def force_warnings(
         if by_markers is None:
             continue
         by_force, by_motion = by_markers.mass_kg, mass_from_force_kg(literature, trial)
-        if abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg + 2 * carried.sd_kg:
+        if lost := by_markers.lost_for_a_while(carried):
+            warnings.append(f"{trial.name}: the plates do not carry the stated {carried} all the time: {lost}")
+        elif abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg + 2 * carried.sd_kg:
             hint = f"; {CARRIED_HINT}" if by_force - mass_kg > LIGHTEST_LOAD_KG else ""
             hint = f", {UNMEASURED_HINT}" if by_force < mass_kg else hint
             warnings.append(

@@ -76,7 +76,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
             f"deviation of {POSE_SD_M * 1e3:.0f} mm each" + (", of the person standing upright" if standing else "")
         ]
     time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
-    plates, plate_notes = lab_plates(path, file, unit)
+    plates, plate_notes = lab_plates(path, file, unit_name)
     stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
     rotation, up, axis_notes = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
@@ -144,8 +144,7 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
             path,
             f"POINT:UNITS is '{unit}'; expected mm, cm or m: correct it, or state length_unit in the subject file",
         )
-    whole = positions[np.isfinite(positions).all(axis=(1, 2))]
-    size = float(np.median(np.ptp(whole, axis=1).max(axis=1))) if len(whole) else np.nan
+    size = _size(positions)
     low, high = _PERSON_M
     likely = [name for name, metres in METRES_PER_UNIT.items() if low < size * metres < high]
     if len(likely) != 1:
@@ -158,6 +157,14 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
         f"{path.name}: POINT:UNITS is empty; taken as {likely[0]}, in which the markers reach "
         f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, state it: length_unit in the subject file"
     ]
+
+
+def _size(positions: FloatArray) -> float:
+    """How far markers (n, m, 3) reach along an axis: the median of the frames that show most of them."""
+    seen = np.asarray(np.isfinite(positions).all(axis=2))
+    count = seen.sum(axis=1)
+    fullest = np.flatnonzero(count == count.max(initial=1))
+    return float(np.median([np.ptp(positions[k, seen[k]], axis=0).max() for k in fullest])) if len(fullest) else np.nan
 
 
 def _times(file: Any, kind: str) -> FloatArray:

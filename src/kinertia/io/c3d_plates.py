@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.idle_plate import without_idle
 
@@ -52,15 +53,16 @@ class LabPlates:
         return result
 
 
-def lab_plates(path: Path, file: Any, unit: float) -> tuple[LabPlates | None, list[str]]:
-    """The plates that can be used, in lab axes; None where there is none. `unit` is metres per file unit."""
+def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | None, list[str]]:
+    """The plates that can be used, in lab axes; None where there is none. `length_unit` is the file's: mm, cm or m."""
+    unit = METRES_PER_UNIT[length_unit]
     platforms = file["data"].get("platform", [])
     group = file["parameters"].get("FORCE_PLATFORM", {})
     names, forces, moments, corners, notes = [], [], [], [], []
     for number, platform in enumerate(platforms, start=1):
         name = f"plate {number}"
         places = unit * platform["corners"].T
-        trouble = _corner_trouble(places) or _unit_trouble(file, group, number - 1)
+        trouble = _corner_trouble(places) or _unit_trouble(file, group, number - 1, length_unit)
         trouble = trouble or ("" if platform["force"].size else "it has no samples")
         if trouble:
             notes.append(f"{path.name}: {name} was left out, {trouble}")
@@ -137,8 +139,8 @@ def _corner_trouble(corners: FloatArray) -> str:
     return f"its corners do not form a plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
 
 
-def _unit_trouble(file: Any, group: Any, plate: int) -> str:
-    """ezc3d takes moments to be in N times POINT:UNITS; say where the analog channels say otherwise."""
+def _unit_trouble(file: Any, group: Any, plate: int, length: str) -> str:
+    """Moments are taken to be in N times the file's unit of `length`; say where the analog channels say otherwise."""
     if int(group["TYPE"]["value"][plate]) not in (2, 4):
         return ""
     channels = np.atleast_2d(group["CHANNEL"]["value"])[:, plate]
@@ -146,8 +148,7 @@ def _unit_trouble(file: Any, group: Any, plate: int) -> str:
     channel = int(channels[3]) - 1
     unit = units[channel] if channel < len(units) else ""
     said = "".join(letter for letter in str(unit).lower() if letter.isalpha())
-    length = str(file["parameters"]["POINT"]["UNITS"]["value"][0]).strip().lower()
-    if length and said in ("nm", "nmm", "ncm") and said != "n" + length:
+    if said in ("nm", "nmm", "ncm") and said != "n" + length:
         return f"its moments are in {unit} while points are in {length}"
     return ""
 

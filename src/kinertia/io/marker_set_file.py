@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.toml_lines import TomlFile, parse_toml, read_toml
-from kinertia.model.marker_set import ENOUGH_WORN, LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, mismatch, share_worn
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, is_worn, mismatch, share_worn
 
 
 def preset_names() -> list[str]:
@@ -38,27 +38,27 @@ def read_marker_set(name: str | Path) -> MarkerSet:
 
 
 def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
-    """The preset that fits the labels of a static trial.
+    """The preset that fits the labels of a static trial, or of one of pelvis and legs only.
 
     Raises:
         MarkerSetError: no preset fits; says for the best one what is missing and the nearest labels.
     """
     best = nearest_preset(labels)
-    if share_worn(best, labels) < ENOUGH_WORN:
+    if not is_worn(best, labels):
         raise mismatch(best, labels, "no marker-set preset fits the static trial; the nearest is")
     return best
 
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
-    """Of the presets that these labels hardly lack anything of, the one that has most of them; else the one that shares
-    most of its labels, be it many or few; if several share as many, the one that does so but for capitals and
-    punctuation; of such that are part of one another, the larger.
+    """Of the presets that these labels hardly lack anything of, but for trunk and arms, the one that has most of them;
+    else the one that shares most of its labels, be it many or few; if several share as many, the one that does so but
+    for capitals and punctuation; of such that are part of one another, the larger.
     """
     letters = {_letters(label) for label in labels}
 
     def nearness(preset: MarkerSet) -> tuple[float, float, float, int]:
         own, share = {_letters(label) for label in preset.labels}, share_worn(preset, labels)
-        worn = share * len(preset.labels) if share >= ENOUGH_WORN else 0.0
+        worn = len(set(preset.labels) & set(labels)) if is_worn(preset, labels) else 0
         return worn, share, len(own & letters) / len(own), len(preset.labels)
 
     return max(map(read_marker_set, preset_names()), key=nearness)

@@ -226,16 +226,22 @@ def has_force_columns(file: Path) -> bool:
 def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
     """Pairs of files by the longest common part of their names, the best pair first; each file once.
 
-    At least four letters must agree, unless there is one file on each side.
+    First come names that have the other as a whole word, however short: DJ1 and DJ1_forces, but not DJ12. Of others at
+    least four letters must agree, unless there is one file on each side.
     """
     scores = {}
     for wants in wanting:
         for offers in offered:
-            matcher = difflib.SequenceMatcher(None, wants.stem.lower(), offers.stem.lower(), autojunk=False)
-            scores[wants, offers] = (matcher.find_longest_match().size, matcher.ratio())
+            one, other = wants.stem.lower(), offers.stem.lower()
+            matcher = difflib.SequenceMatcher(None, one, other, autojunk=False)
+            scores[wants, offers] = (_has_word(other, one), matcher.find_longest_match().size, matcher.ratio())
     least = 0 if len(wanting) == len(offered) == 1 else 4
     pairs: dict[Path, Path] = {}
     for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):
-        if score[0] >= least and wants not in pairs and offers not in pairs.values():
+        if (score[0] or score[1] >= least) and wants not in pairs and offers not in pairs.values():
             pairs[wants] = offers
     return pairs
+
+
+def _has_word(text: str, word: str) -> bool:
+    return re.search(rf"(?<![a-z0-9]){re.escape(word)}(?![a-z0-9])", text) is not None

@@ -39,7 +39,8 @@ def read_trc_recording(path: str | Path) -> Recording:
     path = Path(path)
     lines = read_lines(path)
     header = _header(path, lines)
-    labels = _labels(path, lines, _count(path, header, "NumMarkers"))
+    labels = _labels(path, lines)
+    label_notes = _label_notes(path, lines, labels, _count(path, header, "NumMarkers"))
     values, line_numbers = read_rows(path, lines, _first_row(lines), 2 + 3 * len(labels), may_be_short=True)
     frames = _count(path, header, "NumFrames")
     if not len(values):
@@ -60,7 +61,8 @@ def read_trc_recording(path: str | Path) -> Recording:
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
     markers = Markers(time, labels, positions * METRES_PER_UNIT[unit])
-    return Recording(path.stem, markers, notes=(*count_notes, *time_notes, *position_notes), length_unit=unit)
+    notes = (*label_notes, *count_notes, *time_notes, *position_notes)
+    return Recording(path.stem, markers, notes=notes, length_unit=unit)
 
 
 def write_trc(path: str | Path, markers: Markers) -> None:
@@ -133,16 +135,14 @@ def _count(path: Path, header: dict[str, str], key: str) -> int:
     return int(number)
 
 
-def _labels(path: Path, lines: list[str], count: int) -> tuple[str, ...]:
-    line = lines[3]
-    cells = line.split("\t") if "\t" in line else line.split()
-    labels = tuple(cell.strip() for cell in cells if cell.strip())[2:]
-    if len(labels) != count or not count:
-        raise FileError(
-            path,
-            f"{len(labels)} marker labels, expected {count} as NumMarkers says; correct or export it again",
-            4,
-        )
+def _cells(line: str) -> list[str]:
+    return [cell.strip() for cell in (line.split("\t") if "\t" in line else line.split())]
+
+
+def _labels(path: Path, lines: list[str]) -> tuple[str, ...]:
+    labels = tuple(cell for cell in _cells(lines[3]) if cell)[2:]
+    if not labels:
+        raise FileError(path, "no marker labels; export it again", 4)
     repeated = [label for label, times in Counter(labels).items() if times > 1]
     if repeated:
         raise FileError(
@@ -151,6 +151,23 @@ def _labels(path: Path, lines: list[str], count: int) -> tuple[str, ...]:
             4,
         )
     return labels
+
+
+def _label_notes(path: Path, lines: list[str], labels: tuple[str, ...], count: int) -> tuple[str, ...]:
+    """A sentence where the header counts other markers than the labels and the columns of numbers, which agree.
+
+    Raises:
+        FileError: labels and columns do not agree either, so that nobody knows which label is whose.
+    """
+    if len(labels) == count:
+        return ()
+    rows = lines[_first_row(lines) :]
+    columns = max((len(_cells(row.rstrip())) for row in rows), default=0)
+    if columns != 2 + 3 * len(labels):
+        raise FileError(
+            path, f"{len(labels)} marker labels, expected {count} as NumMarkers says; correct or export it again", 4
+        )
+    return (f"{path.name}: its header announces {count} markers, the file has {len(labels)}: all of them were read",)
 
 
 def _first_row(lines: list[str]) -> int:

@@ -41,7 +41,8 @@ LANDMARKS = (
     "head_top",
 )
 ENOUGH_WORN = 0.8
-"""Share of a preset's labels from which on a recording has it."""
+"""Share of a preset's labels, or of those of its pelvis, legs and feet, from which on a recording has it."""
+_LEGS = ("pelvis", "thigh", "shank", "foot")
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
 
 
@@ -86,6 +87,20 @@ def share_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
     """Share of the set's labels that are among these."""
     wanted = set(marker_set.labels)
     return len(wanted & set(labels)) / len(wanted)
+
+
+def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
+    """Whether these labels are the set's, hardly one of them missing: its own, or those of its pelvis, legs and feet.
+
+    Without trunk and arms a set still makes a model (`kinertia.estimation.unseen_body`), without legs it does not.
+    """
+    return share_worn(marker_set, labels) >= ENOUGH_WORN or _legs_worn(marker_set, labels) >= ENOUGH_WORN
+
+
+def _legs_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
+    """Share of the labels of pelvis, legs and feet that are among these."""
+    legs = {label for name in SEGMENTS if name.startswith(_LEGS) for label in marker_set.segments[name]}
+    return len(legs & set(labels)) / len(legs)
 
 
 def mismatch(marker_set: MarkerSet, labels: Sequence[str], what: str) -> MarkerSetError:

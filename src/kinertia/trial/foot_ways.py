@@ -20,6 +20,10 @@ _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 """A foot stands while one of its markers is slower than this share of its own fast speed, within these limits."""
 _LEAST_SWING_M_S = 1.0
 """Who does not move the feet faster takes no steps."""
+_NOISE_M_S, _FARTHEST_S = 0.15, 0.05
+"""A speed known to the former needs no frames farther apart; frames the latter apart still show landing and leaving."""
+_THIRD_DIFFERENCE = 0.6745 * np.sqrt(20.0)
+"""Median size of third differences of white noise with a deviation of one."""
 _SHORTEST_S = 0.1
 _LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
 """Shares of the line between a foot's outermost markers."""
@@ -114,7 +118,7 @@ def _seen(place: FloatArray) -> BoolArray:
 
 def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | None) -> list[FloatArray]:
     """(n, m, 3) m/s of every marker of each foot against the ground."""
-    velocities = [np.gradient(place, markers.time, axis=0) for place in places]
+    velocities = [_velocity(markers.time, place) for place in places]
     belts = _belts(places, velocities)
     if stated is None:
         belts = [belt if np.linalg.norm(belt) >= _LEAST_BELT_M_S else np.zeros(3) for belt in belts]
@@ -123,12 +127,29 @@ def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | N
     return [velocity - belt for velocity, belt in zip(velocities, belts, strict=True)]
 
 
+def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
+    """(n, m, 3) m/s of markers (n, m, 3), by neighbouring frames or, where they are noisy, by frames farther apart.
+
+    The noise is that of third differences, which hardly show how feet move: poses from video jitter by some mm in every
+    frame, a speed of 0.4 m/s that no standing foot has.
+    """
+    step = float(np.median(np.diff(time)))
+    third = np.abs(np.diff(place, 3, axis=0))
+    noise_m = float(np.nanmedian(third)) / _THIRD_DIFFERENCE if np.isfinite(third).any() else 0.0
+    farthest = max(round(_FARTHEST_S / step), 1)
+    k = int(np.clip(np.ceil(noise_m * np.sqrt(1.5) / (step * _NOISE_M_S)), 1, farthest))
+    velocity = np.gradient(place, time, axis=0)
+    if k > 1 and len(time) > 2 * k:
+        velocity[k:-k] = (place[2 * k :] - place[: -2 * k]) / (time[2 * k :] - time[: -2 * k])[:, None, None]
+    return velocity
+
+
 def belt_doubts(markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt) -> list[str]:
     """A stated speed of the belt that is not that of the standing feet."""
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
     if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
         return []
-    velocities = [np.gradient(place, markers.time, axis=0) for place in places]
+    velocities = [_velocity(markers.time, place) for place in places]
     belts = [float(np.linalg.norm(each)) for each in _belts(places, velocities)]
     stated = [belt.under(f).way_m(*markers.time[[0, -1]]) / float(np.ptp(markers.time)) for f in range(len(FEET))]
     pairs = list(zip(stated, belts, strict=True))

@@ -50,6 +50,9 @@ SHARED_FRACTION = 0.15
 DOUBLE_SUPPORT_S = 0.2
 """So long, in a slow walk, both feet are down when the load of one plate goes from one to the other."""
 
+_MOSTLY_SHARED = 0.5
+"""Share of the frames with both feet down and one plate loaded from which on that is why nothing is measured."""
+_LISTED_SPANS = 4
 _FOOT_NAMES = ("right", "left")
 
 
@@ -80,7 +83,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
             f"by the data, all ground contact is measured in {spans}",
         )
     if not measured.any():
-        raise TrialError(recording.name, _nothing_measured(recording.markers.time, contact, window_s))
+        raise TrialError(recording.name, _nothing_measured(recording.markers.time, loads, contact, window_s))
     told = (*recording.notes, *notes)
     return Trial(recording.name, recording.markers, loads, measured, told, recording.virtual_sd_m, recording.belt)
 
@@ -227,15 +230,24 @@ def _nearer_foot(
 
 
 def _spans(time: FloatArray, mask: BoolArray) -> str:
-    spans = sorted(windows(time, mask))
-    return ", ".join(f"{start:.3f} to {end:.3f} s" for start, end in spans) or "no frame"
+    spans = [f"{start:.3f} to {end:.3f} s" for start, end in sorted(windows(time, mask))]
+    more = f" and {len(spans) - _LISTED_SPANS} times more" if len(spans) > _LISTED_SPANS else ""
+    return ", ".join(spans[:_LISTED_SPANS]) + more or "no frame"
 
 
-def _nothing_measured(time: FloatArray, contact: GroundContact, window_s: tuple[float, float] | None) -> str:
+def _nothing_measured(
+    time: FloatArray, loads: FootLoads, contact: GroundContact, window_s: tuple[float, float] | None
+) -> str:
     if window_s is not None:
         return (
             f"the window {window_s[0]:.3f} to {window_s[1]:.3f} s holds no frame with forces (they cover "
             f"{_spans(time, contact.inside)}); give a window within them"
+        )
+    shared = contact.ground.all(axis=1) & (contact.loaded.sum(axis=1) == 1)
+    if loads.together is not None and shared.mean() > _MOSTLY_SHARED:
+        return (
+            f"both feet stand on one plate in {100 * shared.mean():.0f} % of the frames, and only the sum of their "
+            f"forces is known; use a trial in which each foot has a plate of its own, or stands alone for a while"
         )
     feet = "; ".join(
         f"{name} foot on the ground {_spans(time, contact.ground[:, foot])}, on a plate "
