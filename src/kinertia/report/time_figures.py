@@ -24,6 +24,8 @@ from kinertia.trial.rms import rms, rms_length
 
 MOST_FRAMES = 1200
 """Drawn per curve."""
+BAND_EVERY = 2
+"""Of these, one is drawn of a band's edges: they change more slowly than the curves."""
 MOST_EVENTS = 40
 """Gait events in the frames shown up to which they are drawn; more would hide the curves."""
 _AROUND = 0.2
@@ -150,7 +152,7 @@ def moment_figure(
 
 def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
     """A 95 % band around values (w, c) for each side: an unseen lower edge, and an upper one filled down to it."""
-    traces = []
+    traces, thin = [], slice(None, None, BAND_EVERY * thin.step)
     for side, column in one.columns.items():
         word, colour = style.SIDES[side]
         middle, half = values[:, column], INTERVAL_SD * sd[:, column]
