@@ -58,7 +58,7 @@ def test_every_plot_is_drawn(opened):
 def test_every_curve_has_a_path(demo):
     lines = demo.page.locator("#trial1-coordinates .cartesianlayer .js-line")
     paths = lines.evaluate_all("lines => lines.map(line => line.getAttribute('d') || '')")
-    assert len(paths) == 2 * 27
+    assert len(paths) == 4 * 27, "before and after, and the two edges of the band"
     assert min(len(path) for path in paths) > 100
 
 

@@ -17,10 +17,9 @@ from scipy.ndimage import minimum_filter1d
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 
-_UNSEEN = 1.5
+_UNSEEN = 3.0
 """Skin that moves as a block moves the segment and leaves nothing to see: the power of all errors over that of those
-which are seen. Set on synthetic people, so that bars are neither too wide where skin goes with the joints nor too short
-where it moves as blocks."""
+which are seen. Set here; with it, bars hold in a laboratory whose skin moves as blocks."""
 _LEAST_FREE = 0.1
 _ENDS = 3
 """Knot intervals beside gaps and ends, where a fitted spline swings more than elsewhere."""
