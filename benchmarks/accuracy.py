@@ -122,15 +122,16 @@ and trunk sway beside the walk masses are better in 92 %.
 inverse kinematics. What varies in time is better throughout; constant offsets are where markers were put.
 
 **Joint moments** lie in their intervals, which are rather too wide: 94 to 100 % per joint, but for the knee where
-skin moves in blocks (91 %). With calibration errors, which the bars allow for, deviations are 1.1 to 1.6 times the
-errors at hips, back and knees; where skin goes with the joints and the skeleton is exact, two times.
+skin moves in blocks (91 %). With calibration errors, which the bars allow for, deviations are 1.0 to 1.8 times the
+errors at hips, back and knees (0.8 to 1.5 with skin in blocks); where skin goes with the joints and the skeleton is
+exact, two to three times.
 
 **Long walks and several**: skin motion is the same in every stride, and does not average out. What comes back counts
 once, in whatever trial and at whatever pace, so that the bars hold after twelve strides, too, and errors are hardly
 smaller than after two. Other motions tell more.
 
 What breaks the bars breaks those of joint moments first: hip centres 15 mm off and calibration switched off leave 48
-% for hip flexion and 69 % for knees, axes 5 degrees off 81 % for ankles, a gain of 2 % that is not calibrated 89 %
+% for hip flexion and 69 % for knees, axes 5 degrees off 82 % for ankles, a gain of 2 % that is not calibrated 89 %
 for ankles. Bars of masses, CoMs and inertias hold whatever is done: most are wide. Wobbling thighs do little in the
 smooth synthetic walk, which has no impacts.
 """
