@@ -16,6 +16,7 @@ from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.coordinate_range import Range
 from kinertia.model.gait27 import build_gait27
 from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.motion.marker_sums import variances
 from kinertia.motion.pose_fit import _STEP_TOLERANCE, normal_equations
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim
@@ -134,6 +135,14 @@ def test_normal_equations_are_those_of_the_explicit_jacobian(skeleton):
         np.testing.assert_allclose(normal[k], j.T @ j, atol=1e-10)
         np.testing.assert_allclose(gradient[k], j.T @ r, atol=1e-10)
         assert cost[k] == pytest.approx(r @ r)
+
+
+def test_variances_are_the_diagonals_of_the_inverses():
+    jacobian = np.random.default_rng(2).standard_normal((4, 60, 27))
+    jacobian[1, :, 5] = 0.0  # a coordinate that no marker shows
+    normal = jacobian.transpose(0, 2, 1) @ jacobian
+    inverse = np.linalg.inv(normal + 1e-9 * np.eye(27))
+    np.testing.assert_allclose(variances(normal, 1e-9), np.einsum("ncc->nc", inverse), rtol=1e-9)
 
 
 def test_the_fit_is_a_minimum(skeleton):

@@ -187,7 +187,9 @@ class Skeleton:
 
     def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
         """The same skeleton with other markers."""
-        return replace(self, markers=tuple(markers))
+        other = replace(self, markers=tuple(markers))
+        other.__dict__.update(tree=self.tree, map=self.map)  # markers move nothing
+        return other
 
     def with_places(self, positions: np.ndarray) -> Skeleton:
         """The same skeleton with its markers at these positions (m, 3) in their segments."""

@@ -95,42 +95,38 @@ class EqualAngles:
         """The equals of the angles (n, k) of one joint, or of k joints of one angle, that do not jump and leave their
         ranges least.
         """
-        paths = [angles]
+        paths = angles[None]
         if joint is not None:
             twins = joint.twins(angles)
             stay, change = (np.abs(within_half_a_turn(one[1:] - angles[:-1])).sum(axis=1) for one in (angles, twins))
             # a change from twin to twin is as large as one between the angles themselves
             other = np.concatenate([[False], np.logical_xor.accumulate(change < stay)])[:, None]
-            paths = [np.where(other, twins, angles), np.where(other, angles, twins)]
+            paths = np.stack([np.where(other, twins, angles), np.where(other, angles, twins)])
+        choices = self._whole_turns(np.unwrap(paths, axis=1), columns)
         # which twin is meant shows in the middle angle: the others may have come round
-        k = len(columns) // 2
-        choices = [self._whole_turns(np.unwrap(path, axis=0), columns) for path in paths]
-        best = choices[0]
-        if joint is not None:
-            best = min(
-                choices, key=lambda path: self._beyond(path, columns).sum() + self._from_neutral(path, columns)[k]
-            )
+        middle = self._from_neutral(choices, columns)[:, len(columns) // 2]
+        best = choices[np.argmin(self._beyond(choices, columns).sum(axis=1) + middle)]
         low, high = self.bounds.least[list(columns)], self.bounds.most[list(columns)]
         leaves = (np.abs(best - np.clip(best, low, high)) > _END_RAD).any(axis=0)
         return np.where(leaves if joint is None else leaves.any(), angles, best)
 
-    def _whole_turns(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """The same path (n, k), every angle shifted by the whole turns that make it least strange."""
-        usual = np.round((np.median(path, axis=0) - self.neutral[list(columns)]) / (2 * np.pi))
-        shifted = np.stack([path - 2 * np.pi * (usual + turns) for turns in (0, 1, -1)])
-        badness = [self._beyond(one, columns) + self._from_neutral(one, columns) for one in shifted]
-        least: np.ndarray = np.take_along_axis(shifted, np.argmin(badness, axis=0)[None, None, :], axis=0)[0]
+    def _whole_turns(self, paths: np.ndarray, columns: Sequence[int]) -> np.ndarray:
+        """The same paths (p, n, k), every angle shifted by the whole turns that make it least strange."""
+        usual = np.round((np.median(paths, axis=1, keepdims=True) - self.neutral[list(columns)]) / (2 * np.pi))
+        shifted = np.stack([paths - 2 * np.pi * (usual + turns) for turns in (0, 1, -1)])
+        badness = self._beyond(shifted, columns) + self._from_neutral(shifted, columns)
+        least: np.ndarray = np.take_along_axis(shifted, np.argmin(badness, axis=0)[None, :, None], axis=0)[0]
         return least
 
     def _beyond(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """(k,) how far angles (n, k) are out of their ranges, mean square."""
+        """(..., k) how far angles (..., n, k) are out of their ranges, mean square."""
         low, high = self.bounds.low[list(columns)], self.bounds.high[list(columns)]
-        result: np.ndarray = np.square(path - np.clip(path, low, high)).mean(axis=0)
+        result: np.ndarray = np.square(path - np.clip(path, low, high)).mean(axis=-2)
         return result
 
     def _from_neutral(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """(k,) a little for being far from neutral, which decides between equals within their ranges."""
-        result: np.ndarray = 1e-3 * np.square(path - self.neutral[list(columns)]).mean(axis=0)
+        """(..., k) a little for being far from neutral, which decides between equals within their ranges."""
+        result: np.ndarray = 1e-3 * np.square(path - self.neutral[list(columns)]).mean(axis=-2)
         return result
 
 

@@ -19,6 +19,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.equal_angles import EqualAngles
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.held_errors import HeldErrors
+from kinertia.motion.marker_sums import variances
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.pose_fit import BEYOND_M2, PoseFit, Stop, fit_poses
 from kinertia.trial.data import Markers
@@ -236,7 +237,5 @@ def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.nd
 
 def _uninformed(normal: np.ndarray) -> np.ndarray:
     """(n, c) True where the visible markers do not determine the coordinate, from J^T J (n, c, c)."""
-    c = normal.shape[-1]
-    deviation = np.sqrt(np.einsum("ncc->nc", np.linalg.inv(normal + 1e-9 * np.eye(c))))
-    result: np.ndarray = deviation > _UNINFORMED_RAD_PER_M
+    result: np.ndarray = np.sqrt(variances(normal, 1e-9)) > _UNINFORMED_RAD_PER_M
     return result

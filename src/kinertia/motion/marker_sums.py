@@ -147,32 +147,50 @@ def add_force(force: np.ndarray, at: np.ndarray, total: np.ndarray) -> None:
     total[5] += at[0] * force[1] - at[1] * force[0]
 
 
+@part
+def _factors(matrix: np.ndarray, added: float, least: float, upper: np.ndarray, diagonal: np.ndarray) -> None:
+    """Unit upper U and diagonal D (not below `least`, as rounding might have it) of matrix + added 1 = U^T D U."""
+    upper[:] = matrix
+    for j in range(len(matrix)):
+        diagonal[j] = max(upper[j, j] + added, least)
+        for i in range(j + 1, len(matrix)):
+            factor = upper[j, i] / diagonal[j]
+            for m in range(i, len(matrix)):
+                upper[i, m] -= factor * upper[j, m]
+        for i in range(j + 1, len(matrix)):
+            upper[j, i] /= diagonal[j]
+
+
 @compiled
 def damped_steps(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    """(n, c) solutions of (normal + damping mean(diag) 1) step = gradient, frame by frame, by L D L^T."""
+    """(n, c) solutions of (normal + damping mean(diag) 1) step = gradient, frame by frame."""
     n, c = gradient.shape
-    step, lower, diagonal = gradient.copy(), np.empty((c, c)), np.empty(c)
+    step, upper, diagonal = gradient.copy(), np.empty((c, c)), np.empty(c)
     for k in range(n):
-        scale = 0.0
-        for i in range(c):
-            scale += normal[k, i, i] / c
-        for i in range(c):
-            for j in range(i + 1):
-                value = normal[k, i, j]
-                if i == j:
-                    value += damping[k] * scale
-                for m in range(j):
-                    value -= lower[i, m] * lower[j, m] * diagonal[m]
-                if i == j:
-                    # rounding must not turn it negative
-                    diagonal[i] = max(value, 1e-16 * scale)
-                else:
-                    lower[i, j] = value / diagonal[j]
-        for i in range(c):
-            for m in range(i):
-                step[k, i] -= lower[i, m] * step[k, m]
+        scale = np.trace(normal[k]) / c
+        _factors(normal[k], damping[k] * scale, 1e-16 * scale, upper, diagonal)
+        for m in range(c):
+            for i in range(m + 1, c):
+                step[k, i] -= upper[m, i] * step[k, m]
         for i in range(c - 1, -1, -1):
             step[k, i] /= diagonal[i]
             for m in range(i + 1, c):
-                step[k, i] -= lower[m, i] * step[k, m]
+                step[k, i] -= upper[i, m] * step[k, m]
     return step
+
+
+@compiled
+def variances(normal: np.ndarray, added: float) -> np.ndarray:
+    """(n, c) diagonals of the inverses of normal + added 1, frame by frame."""
+    n, c = normal.shape[:2]
+    result, upper, diagonal, column = np.zeros((n, c)), np.empty((c, c)), np.empty(c), np.empty(c)
+    for k in range(n):
+        _factors(normal[k], added, added, upper, diagonal)
+        for j in range(c):  # this column of the inverse of U^T
+            column[:] = 0.0
+            column[j] = 1.0
+            for m in range(j, c):
+                result[k, j] += column[m] * column[m] / diagonal[m]
+                for i in range(m + 1, c):
+                    column[i] -= upper[m, i] * column[m]
+    return result

@@ -8,15 +8,23 @@ setting is back afterwards.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _held = False
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Those of NumPy and SciPy: to look for them takes as long as some of what they are held for."""
+    import scipy.linalg  # noqa: F401  # brings its own
+
+    return ThreadpoolController()
 
 
 def one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
@@ -29,7 +37,7 @@ def one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
             return function(*args, **kwargs)
         _held = True
         try:
-            with threadpool_limits(limits=1, user_api="blas"):
+            with _libraries().limit(limits=1, user_api="blas"):
                 return function(*args, **kwargs)
         finally:
             _held = False

@@ -77,7 +77,7 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
     converged = np.zeros(n, dtype=bool)
     active = np.arange(n)
     normal = np.zeros((n, q.shape[1], q.shape[1]))
-    gradient = np.zeros_like(q)
+    last_h, last_g = normal, np.zeros_like(q)
     for _ in range(stop.most_steps):
         h, g, cost = normal_equations(model, measured[active], q[active])
         beyond = bounds.beyond(q[active])
@@ -86,22 +86,22 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
         better = cost <= best[active] * (1 + 1e-12)
         up = active[better]
         best[up], accepted[up] = cost[better], q[up]
-        normal[up], gradient[up] = h[better], g[better]
+        h[~better], g[~better] = last_h[~better], last_g[~better]
         damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
         damping[active[~better]] *= 100.0
-        step[active] = _steps(
-            model, normal[active], gradient[active], accepted[active], damping[active], stop.beyond_m2
-        )
-        gain = np.einsum("nc,nc->n", step[active], gradient[active])
+        step[active] = _steps(model, h, g, accepted[active], damping[active], stop.beyond_m2)
+        gain = np.einsum("nc,nc->n", step[active], g)
         # a step that was cut at the end of a range may lead upwards: then the next one is shorter
         small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | ((gain >= 0) & (gain < stop.gain_tolerance_m2))
         done = active[small]
         converged[done] = True
         accepted[done] += step[done]
-        active = active[~small]
+        normal[done] = h[small]
+        active, last_h, last_g = active[~small], h[~small], g[~small]
         if not active.size:
             break
         q[active] = accepted[active] + step[active]
+    normal[active] = last_h
     return PoseFit(accepted, converged, best, normal)
 
 
