@@ -93,7 +93,7 @@ def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
     ]
     learnt, shift = learn(people[:60]), relative(obese.mean)
     error, informed = learnt.mean - shift, learnt.mean_sd < 0.5
-    assert informed.sum() > 20
+    assert informed.sum() > 10
     assert np.mean(np.abs(error) < 1.96 * learnt.mean_sd) > 0.9
     assert np.mean(np.abs(error[informed]) < 1.96 * learnt.mean_sd[informed]) > 0.9
     assert np.sqrt(np.mean(error[informed] ** 2)) < 0.4 * np.sqrt(np.mean(shift[informed] ** 2))
@@ -109,7 +109,7 @@ def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
                 within.append(np.abs(after - body) < 1.96 * deviations)
     assert 0.93 < np.mean(within) < 0.98
     by_kind = errors.reshape(3, 40, -1, 10)
-    for columns, most in ((slice(0, 1), 0.95), (slice(1, 4), 0.98), (slice(4, 7), 0.75)):
+    for columns, most in ((slice(0, 1), 0.90), (slice(1, 4), 0.96), (slice(4, 7), 0.65)):
         single, after, bound = np.sqrt(np.mean(np.square(by_kind[..., columns]), axis=(1, 2, 3)))
         assert bound < after < most * single
 

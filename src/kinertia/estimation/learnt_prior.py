@@ -35,13 +35,14 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.sides import by_side
 
 BETWEEN, WITHIN = 0.4, 1.0
-"""Squared scale of a group's mean about the tables, and variance of its people about their mean, over the literature's
-variance."""
+"""Variances of a group's mean about the tables, and of its people about their mean, over the literature's."""
 PSEUDO_PEOPLE = 120.0
 """The literature's spread within a group counts as much as so many people: as many as a body has parameters, since the
 correlations of so many take more people than groups have."""
 _FREEDOM = 3.0
 """Degrees of freedom of Student's t of the mean."""
+_TAILS = _FREEDOM / (_FREEDOM - 2.0)
+"""Variance of Student's t over its squared scale."""
 _PSEUDO_SCALES = 4.0
 """`BETWEEN` counts as much as so many parameters' means for the scale that they have in common."""
 FEWEST_PEOPLE = 5
@@ -128,7 +129,7 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
     root = np.linalg.cholesky(correlations)
     seen, means = _Seen.of(root, people), _Means.of(root, people)
     anchor = WITHIN * np.eye(len(root))
-    within, scales = anchor, np.full(len(means.blocks), BETWEEN)
+    within, scales = anchor, np.full(len(means.blocks), BETWEEN / _TAILS)
     for _ in range(_ITERATIONS):
         mean, of_mean = seen.mean(within, means.covariance(scales))
         spread = seen.spread(within, mean, of_mean)
@@ -138,7 +139,8 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
         within, scales = new_within, new_scales
         if change < _SETTLED:
             break
-    mean, of_mean = seen.mean(within, means.covariance(scales))
+    mean, _ = seen.mean(within, means.covariance(scales))
+    _, of_mean = seen.mean(within, means.covariance(_TAILS * scales))
     of_group, whole = (root @ part @ root.T for part in (of_mean, within + of_mean))
     return LearntPrior(segments, root @ mean, np.sqrt(np.diag(of_group)), 0.5 * (whole + whole.T), len(people))
 
@@ -190,7 +192,7 @@ class _Means:
     def scales(self, mean: np.ndarray, of_mean: np.ndarray, scales: np.ndarray) -> np.ndarray:
         """What mean and covariance of the mean, in the coordinates of `root`, make of the squared scales."""
         square = self.root @ (of_mean + np.outer(mean, mean)) @ self.root.T
-        common = (len(scales) + _PSEUDO_SCALES) / (np.sum(1.0 / scales) + _PSEUDO_SCALES / BETWEEN)
+        common = (len(scales) + _PSEUDO_SCALES) / (np.sum(1.0 / scales) + _PSEUDO_SCALES * _TAILS / BETWEEN)
         return np.array(
             [
                 (_FREEDOM * common + np.trace(np.linalg.solve(self.correlation[at], square[at])))
