@@ -157,6 +157,34 @@ def test_init_finds_forces_in_folders_beside_and_within(tmp_path, force_folder):
 
 
 @needs_data
+def test_init_finds_forces_in_a_folder_of_forces_beside_the_one_above(tmp_path):
+    person = laboratory(tmp_path, "ForceData")
+    folder = person / "MarkerData" / "Mocap"
+    folder.mkdir()
+    for file in [file for file in folder.parent.iterdir() if file.is_file()]:
+        file.rename(folder / file.name)
+    assert 'forces = "../../ForceData/subject01_walk1_grf.mot"' in init_subject(folder)
+    (person / "ForceData").rename(person / "ID")
+    assert "# No forces were found for subject01_walk1.trc" in init_subject(folder)
+
+
+def test_init_leaves_folders_alone_that_it_may_not_look_into(tmp_path, monkeypatch):
+    here, locked = tmp_path / "here", tmp_path / "locked"
+    for folder in (here, locked):
+        folder.mkdir()
+    (here / "walk.trc").touch()
+    listed = Path.iterdir
+
+    def iterdir(folder):
+        if folder == locked:
+            raise PermissionError(13, "Permission denied", str(folder))
+        return listed(folder)
+
+    monkeypatch.setattr(Path, "iterdir", iterdir)
+    assert 'markers = "walk.trc"' in init_subject(here)
+
+
+@needs_data
 def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path):
     person = laboratory(tmp_path, "ID")
     shutil.copy(DATA / "gait2354" / "subject01_walk1.trc", person / "ID" / "subject02_walk1.trc")

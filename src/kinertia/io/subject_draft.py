@@ -22,6 +22,7 @@ FILL_IN = "  # FILL IN: "
 """What is before the words of an entry that stays unknown."""
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 """What the names of static trials contain."""
+_FORCE_FOLDER = re.compile("force|grf", re.IGNORECASE)
 NO_FORCES = "# No forces were found for"
 """How the line begins that says so of a trial."""
 
@@ -190,17 +191,26 @@ def _has_plates(file: Path) -> bool:
 
 
 def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], bool]) -> list[Path]:
-    """The files of the folder that hold it; where there are none, those of the folders in it and beside it, but for
-    folders with markers of their own: those may be another person's.
+    """The files of the folder that hold it; where there are none, those of the folders in it and beside it, else those
+    of folders of forces beside the one it is in (OpenCap's `MarkerData/Mocap` and `ForceData`). Folders with markers of
+    their own may be another person's and are left out.
     """
     holding = [file for file in files if holds(file)]
-    if holding:
-        return holding
-    for other in (*files, *sorted(folder.parent.iterdir())):
-        inside = sorted(file for file in other.iterdir() if file.is_file()) if other.is_dir() else []
-        if other != folder and not any(map(is_capture, inside)):
-            holding += [file for file in inside if holds(file)]
+    of_forces = [one for one in _entries(folder.parent.parent) if _FORCE_FOLDER.search(one.name)]
+    for near in ([*files, *_entries(folder.parent)], of_forces):
+        for other in near if not holding else ():
+            inside = [file for file in _entries(other) if file.is_file()]
+            if other != folder and not any(map(is_capture, inside)):
+                holding += [file for file in inside if holds(file)]
     return holding
+
+
+def _entries(folder: Path) -> list[Path]:
+    """What is in it; nothing where it is a file or another user's."""
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []
 
 
 def _relative(file: Path, folder: Path) -> str:
