@@ -59,6 +59,12 @@ def test_adults_keep_the_tables(values):
     assert not result.warnings
 
 
+def test_a_rucksack_on_the_scale_makes_nobody_obese():
+    heavy = subject(mass_kg=100.0)
+    assert population_prior(PRIOR, heavy).warnings
+    assert not population_prior(PRIOR, heavy, body_kg=90.0).warnings
+
+
 def test_what_is_stated_is_a_note():
     result = population_prior(PRIOR, subject(population="obese"))
     assert not result.warnings

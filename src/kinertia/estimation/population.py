@@ -49,15 +49,18 @@ class PopulationPrior:
     warnings: tuple[str, ...]
 
 
-def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
+def population_prior(prior: BspPrior, subject: Subject, body_kg: float | None = None) -> PopulationPrior:
     """The prior for this person: as the subject says, or by age and body-mass index.
 
     Args:
         prior: the literature's, or that of a scaled model.
         subject: mass and height may be unknown.
+        body_kg: of the body alone, where things were weighed with it; None: the mass of the subject.
     """
     stated = subject.population
-    population, why = (stated, "as stated") if stated is not None else _by_age_and_build(subject)
+    population, why = (
+        (stated, "as stated") if stated is not None else _by_age_and_build(subject, body_kg or subject.mass_kg)
+    )
     said = []
     if population == "elderly" and subject.sex is not None:
         prior = _spread(_with_masses(prior, _PAVOL[subject.sex]), keep_masses=True)
@@ -70,8 +73,8 @@ def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
     return PopulationPrior(prior, tuple(notes), tuple(warnings))
 
 
-def _by_age_and_build(subject: Subject) -> tuple[str, str]:
-    age, mass_kg, height_m = subject.age_years, subject.mass_kg, subject.height_m
+def _by_age_and_build(subject: Subject, mass_kg: float | None) -> tuple[str, str]:
+    age, height_m = subject.age_years, subject.height_m
     if age is not None and age < GROWN_UP_YEARS:
         return "child", f"{age:g} years"
     if mass_kg and height_m and mass_kg / height_m**2 >= OBESE_KG_M2:
