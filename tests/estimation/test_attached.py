@@ -202,6 +202,8 @@ def test_what_cannot_be_is_an_error(change, words):
         ({"mass_kg": 0}, "must be a mass in kg"),
         ({"com_mm": [1, 2]}, "must be three numbers"),
         ({"com_mm": [0, 3000, 0]}, "none beyond 2000"),
+        ({"com_mm": [-0.2, 0.3, 0.0]}, "are they in m"),
+        ({"size_mm": [0.28, 0.09, 0.1]}, "are they in m"),
         ({"size_mm": [100, 0, 100]}, "lengths above zero"),
         ({"name": "a b"}, "should match pattern"),
     ],

@@ -144,6 +144,13 @@ def test_slips_are_the_likeliest_cause_of_a_body_that_cannot_be():
         measured_body(wrong, {}, 0.08, MAN_KG, MAN_M)
 
 
+def test_of_a_sheet_in_inches_a_few_slips_are_named():
+    inches = {name: (value / 2.54, sd) for name, (value, sd) in stated().items()}
+    with pytest.raises(PriorError, match=r"; and \d+ more like these: are they in cm, and of this person\?") as caught:
+        measured_body(inches, {}, 0.08, MAN_KG, MAN_M)
+    assert str(caught.value).count("lead to expect") == 3
+
+
 def test_another_model_is_refused():
     prior = literature_prior(replace(WALKER.literature, segments=tuple(f"body{k}" for k in range(12))))
     with pytest.raises(PriorError, match="built-in model's segments; this model has no pelvis"):

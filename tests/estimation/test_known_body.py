@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from kinertia.errors import PriorError
 from kinertia.estimation.estimate import named_by_source
@@ -90,6 +91,14 @@ def test_an_earlier_estimate_takes_the_place_of_the_literature(ready):
         informed(ready, earlier=other)
 
 
+def test_what_an_earlier_estimate_held_is_as_it_was(ready):
+    prior, held = ready.prior, np.arange(12)[:, None] == 4
+    sd = np.where(held, 0.0, 0.5 * prior.sd)
+    after = informed(ready, earlier=BspTable("bsp.csv", prior.mean.segments, 1.1 * prior.mean.table(), sd)).prior
+    np.testing.assert_allclose(after.sd, np.where(held, 1.0, 0.5) * prior.sd)
+    np.testing.assert_allclose(after.mean.table(), np.where(held, 1.0, 1.1) * prior.mean.table())
+
+
 def test_sides_and_masses(ready):
     alone = informed(ready, PriorSettings(sides_correlation=0.0))
     right, left = (10 * ready.prior.mean.segments.index(f"shank_{side}") for side in "rl")
@@ -103,3 +112,10 @@ def test_sides_and_masses(ready):
 def test_an_unknown_segment_is_told_with_those_that_there_are(ready):
     with pytest.raises(PriorError, match=r"\[segment.femur_r\].*no such segment; it has pelvis, "):
         informed(ready, femur_r=KnownSegment(mass_kg="9 +- 1"))
+
+
+@pytest.mark.parametrize("key", ["mass_kg", "ixx_kgm2"])
+def test_masses_and_moments_of_inertia_are_above_zero(key):
+    with pytest.raises(ValidationError, match="must be above zero"):
+        KnownSegment(**{key: "-8.9 +- 0.4"})
+    assert KnownSegment(com_y_mm="-189 +- 4").com_y_mm == (-189.0, 4.0)

@@ -63,7 +63,8 @@ _KINDS_OF_PART = {
 """By the letter of the package's keys."""
 _STEP = 1e-4
 _TELLS = ("mass", "com", "ixx", "iyy", "izz")
-_FAR_SD, _FAR_TOTAL_SD = 4.0, 3.0
+_FAR_SD = 4.0
+_FEW_DOUBTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +172,10 @@ def measured_body(
         return _with_errors(logs, left, lumbar_m, doubts)
     except PriorError as error:
         if doubts:  # the likelier cause, and in the words of the sheet
-            raise PriorError(f"no body has these girths and lengths: {'; '.join(doubts)}") from error
+            more = len(doubts) - _FEW_DOUBTS
+            others = f"; and {more} more like these: are they in cm, and of this person?" if more > 0 else ""
+            told = "; ".join(doubts[:_FEW_DOUBTS])
+            raise PriorError(f"no body has these girths and lengths: {told}{others}") from error
         raise
 
 

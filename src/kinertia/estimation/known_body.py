@@ -152,7 +152,7 @@ def _with_measures(
 
 
 def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
-    """The prior with the mean and the deviations of an earlier estimate."""
+    """The prior with the mean and the deviations of an earlier estimate; of what it held, the prior's own."""
     names = prior.mean.segments
     if missing := [name for name in names if name not in earlier.segments]:
         raise PriorError(
@@ -160,11 +160,12 @@ def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
             "another model?"
         )
     rows = [earlier.segments.index(name) for name in names]
-    sd = earlier.sd[rows].ravel()
+    held = ~earlier.sd[rows].any(axis=1, keepdims=True)
     own = prior.sd.ravel()
+    sd = np.where(held, prior.sd, earlier.sd[rows]).ravel()
     return replace(
         prior,
-        mean=BodySegmentParameters.from_table(names, earlier.estimate[rows]),
+        mean=BodySegmentParameters.from_table(names, np.where(held, prior.mean.table(), earlier.estimate[rows])),
         covariance=prior.covariance / np.outer(own, own) * np.outer(sd, sd),
     )
 
