@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from kinertia.errors import KinertiaError, PriorError, SettingsError
-from kinertia.estimation.attached import with_attached
+from kinertia.estimation.attached import not_found_warnings, with_attached
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import ForceMass
 from kinertia.estimation.from_files import fit_subject
@@ -211,6 +211,16 @@ def test_what_cannot_be_is_an_error(change, words):
 def test_entries_that_cannot_be_say_what_is_expected(change, words):
     with pytest.raises(ValidationError, match=words):
         Attached(**{"mass_kg": 10.0, **PACK, **change})
+
+
+def test_a_thing_that_is_not_to_be_told_from_nothing_is_named():
+    pack, weighed = (Attached(mass_kg=mass, **PACK) for mass in ("unknown", "0.2 +- 0.5"))
+    bsp = with_attached(ready(pack)).prior.mean
+    sd = np.full((13, 10), 0.51 * bsp.mass_kg[-1])
+    (said,) = not_found_warnings([pack], bsp, sd)
+    assert said.startswith("[[attached]] rucksack: 7.26 kg are found, with a deviation of 3.70 kg, which is not")
+    assert not not_found_warnings([pack], bsp, 0.9 * sd)
+    assert not not_found_warnings([weighed], bsp, sd)
 
 
 def test_things_that_weigh_more_than_the_scale_said_are_an_error():
