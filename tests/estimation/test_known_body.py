@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from kinertia.errors import PriorError
 from kinertia.estimation.estimate import named_by_source
 from kinertia.estimation.known_body import with_known_body
+from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
@@ -97,6 +98,14 @@ def test_what_an_earlier_estimate_held_is_as_it_was(ready):
     after = informed(ready, earlier=BspTable("bsp.csv", prior.mean.segments, 1.1 * prior.mean.table(), sd)).prior
     np.testing.assert_allclose(after.sd, np.where(held, 1.0, 0.5) * prior.sd)
     np.testing.assert_allclose(after.mean.table(), np.where(held, 1.0, 1.1) * prior.mean.table())
+
+
+def test_a_group_is_of_the_built_in_model(ready):
+    """Nothing is learnt from fits with OpenSim models, so that no other group could help."""
+    size = len(ready.prior.covariance)
+    group = LearntPrior(ready.prior.mean.segments, np.zeros(size), np.ones(size), np.eye(size), 12)
+    with pytest.raises(PriorError, match="of the built-in model's segments; OpenSim models have others"):
+        with_known_body(replace(ready, file=object()), PriorSettings(), None, {}, group)
 
 
 def test_sides_and_masses(ready):

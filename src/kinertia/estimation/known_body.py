@@ -95,6 +95,10 @@ def _leaning_on(
     if group is not None:
         if earlier is not None:
             raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
+        if ready.file is not None:
+            raise PriorError(
+                "[prior] population is learnt of the built-in model's segments; OpenSim models have others"
+            )
         prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
         notes.append(f"prior: learnt from {group.people} people in place of the literature's")
     if earlier is not None:
