@@ -150,8 +150,10 @@ class Subject(Table):
         lt=130.0,
         description="age; the tables are of young adults, below 18 and from 65 others apply",
     )
-    population: Literal["adult", "child", "elderly", "obese"] | None = Field(
-        default=None, description='"adult", "child", "elderly" or "obese"; left out: by age and body-mass index'
+    population: Literal["adult", "child", "elderly", "obese", "other"] | None = Field(
+        default=None,
+        description='"adult", "child", "elderly", "obese" or "other" (pregnant, very muscular, ...); left out: by age '
+        "and body-mass index",
     )
     knee_width_mm: float | None = Field(
         default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"

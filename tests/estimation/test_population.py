@@ -72,6 +72,14 @@ def test_what_is_stated_is_a_note():
     np.testing.assert_allclose(result.prior.covariance, UNKNOWN_SPREAD**2 * PRIOR.covariance)
 
 
+def test_of_anybody_else_nothing_is_invented():
+    """Pregnant or very muscular people."""
+    result = population_prior(PRIOR, subject(population="other"))
+    np.testing.assert_array_equal(result.prior.mean.table(), PRIOR.mean.table())
+    np.testing.assert_allclose(result.prior.sd, UNKNOWN_SPREAD * PRIOR.sd)
+    assert "population: other (as stated), of whom the tables are not: no numbers" in result.notes[0]
+
+
 def test_somebody_short_is_likely_a_child():
     result = population_prior(PRIOR, subject(height_m=1.2, mass_kg=25.0))
     (warning,) = result.warnings

@@ -10,6 +10,7 @@ Pavol found in the elderly are 1.58 times the tables' deviations from Dumas' val
   other places. Deviations of masses stay, those of centres of mass and inertias grow.
 - child: head and trunk are heavier, thighs, shanks and feet lighter than an adult's (Jensen 1986, J Biomech 19:359);
   his coefficients could not be checked. Deviations grow.
+- other: anybody else whom the tables do not describe, pregnant or very muscular people, say. Deviations grow.
 - obese: trunks are heavier, thighs and shanks lighter for the same mass (Chambers et al. 2010, Clin Biomech 25:131,
   people over 65); de Leva's masses were off by up to 60 % on average in a sample of working adults (Merrill et al.
   2019). Deviations grow.
