@@ -44,7 +44,15 @@ def _stated(value: object) -> tuple[float, float]:
     raise ValueError('must be a value with its standard deviation in quotes, like "8.9 +- 0.4"')
 
 
+def _stated_positive(value: object) -> tuple[float, float]:
+    stated = _stated(value)
+    if stated[0] > 0.0:
+        return stated
+    raise ValueError("must be above zero, as every mass and moment of inertia is")
+
+
 Stated = Annotated[tuple[float, float], BeforeValidator(_stated)]
+StatedPositive = Annotated[tuple[float, float], BeforeValidator(_stated_positive)]
 
 
 _WEIGHED_SD = 0.01
@@ -69,12 +77,14 @@ def _attached_mass(value: object) -> tuple[float, float] | None:
 def _three(value: object) -> tuple[float, float, float]:
     match value:
         case [int() | float() as x, int() | float() as y, int() | float() as z]:
+            if 0.0 < max(abs(x), abs(y), abs(z)) < _NEAREST_MM:
+                raise ValueError(f"must be in mm, and none of these is {_NEAREST_MM:g} mm; are they in m?")
             if all(abs(number) <= _FARTHEST_MM for number in (x, y, z)):
                 return float(x), float(y), float(z)
     raise ValueError(f"must be three numbers, [x, y, z] in mm, none beyond {_FARTHEST_MM:g}")
 
 
-_FARTHEST_MM = 2000.0
+_NEAREST_MM, _FARTHEST_MM = 2.0, 2000.0
 
 
 def _size(value: object) -> tuple[float, float, float]:
@@ -140,8 +150,10 @@ class Subject(Table):
         lt=130.0,
         description="age; the tables are of young adults, below 18 and from 65 others apply",
     )
-    population: Literal["adult", "child", "elderly", "obese"] | None = Field(
-        default=None, description='"adult", "child", "elderly" or "obese"; left out: by age and body-mass index'
+    population: Literal["adult", "child", "elderly", "obese", "other"] | None = Field(
+        default=None,
+        description='"adult", "child", "elderly", "obese" or "other" (pregnant, very muscular, ...); left out: by age '
+        "and body-mass index",
     )
     knee_width_mm: float | None = Field(
         default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"
@@ -238,13 +250,13 @@ class KnownSegment(Table):
         {'mass': (8.9, 0.4)}
     """
 
-    mass_kg: Stated | None = Field(default=None, description='"value +- sd", kg')
+    mass_kg: StatedPositive | None = Field(default=None, description='"value +- sd", kg')
     com_x_mm: Stated | None = Field(default=None, description="centre of mass, forwards, mm")
     com_y_mm: Stated | None = Field(default=None, description="centre of mass, upwards along the segment, mm")
     com_z_mm: Stated | None = Field(default=None, description="centre of mass, to the person's right, mm")
-    ixx_kgm2: Stated | None = Field(default=None, description="moment of inertia about the x axis, kg m2")
-    iyy_kgm2: Stated | None = Field(default=None, description="about the y axis")
-    izz_kgm2: Stated | None = Field(default=None, description="about the z axis")
+    ixx_kgm2: StatedPositive | None = Field(default=None, description="moment of inertia about the x axis, kg m2")
+    iyy_kgm2: StatedPositive | None = Field(default=None, description="about the y axis")
+    izz_kgm2: StatedPositive | None = Field(default=None, description="about the z axis")
     prosthesis: bool = Field(
         default=False, description="true: not the body's own: neither like the tables nor like the other side"
     )

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from kinertia.errors import KinertiaError, PriorError, SettingsError
-from kinertia.estimation.attached import with_attached
+from kinertia.estimation.attached import not_found_warnings, with_attached
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import ForceMass
 from kinertia.estimation.from_files import fit_subject
@@ -84,6 +84,36 @@ def test_the_scale_weighs_what_stood_on_it():
     assert covariance[row, row] == prior.covariance[row, row], "the scale says nothing of what it did not weigh"
 
 
+def test_the_body_is_the_lighter_the_heavier_what_was_weighed_with_it():
+    """Of 72.6 kg on the scale nobody knows how many are the body's: its shares of them are no second weighing."""
+    before, pack = ready(), Attached(mass_kg="unknown", **{**PACK, "on_scale": True})
+    prior = with_attached(ready(pack)).prior
+    body = np.zeros(len(prior.covariance))
+    body[:120:10] = 1.0
+    own = body[:120] @ before.prior.covariance @ body[:120]
+    assert body @ prior.covariance @ body == pytest.approx(own + (0.15 * MASS_KG) ** 2)
+    both = body.copy()
+    both[120] = 1.0
+    assert both @ prior.covariance @ both == pytest.approx(own), "the total is as well known as before"
+    _, weighed = prior.given_scale()
+    assert weighed[120, 120] > (0.14 * MASS_KG) ** 2, "the scale does not tell them apart"
+    assert np.linalg.eigvalsh(prior.covariance / np.outer(*[prior.sd.ravel()] * 2))[0] > 0
+
+
+def test_segments_that_are_known_by_themselves_are_no_shares_of_it():
+    pack = Attached(mass_kg="unknown", **{**PACK, "on_scale": True})
+    segments = {"shank_l": KnownSegment(prosthesis=True), "torso": KnownSegment(mass_kg="29 +- 0.3")}
+    prior = with_attached(with_known_body(ready(pack), PriorSettings(), None, segments)).prior
+    shank = 10 * prior.mean.segments.index("shank_l")
+    assert prior.covariance[shank, 120] == 0.0
+    _, weighed = prior.given_scale()
+    assert weighed[120, 120] < (0.08 * 0.9 * MASS_KG) ** 2, "the body is known by its torso's share, within 8 %"
+    with pytest.raises(
+        PriorError, match=r"masses_kept = true under .prior., but rucksack, of unknown mass, was weighed"
+    ):
+        with_known_body(ready(pack), PriorSettings(masses_kept=True), None, {})
+
+
 def test_a_welded_segment_moves_as_the_torso_does():
     """The dynamics are those of a torso that is as much heavier."""
     after = with_attached(ready(Attached(mass_kg=10.0, **PACK)))
@@ -156,6 +186,7 @@ def test_a_rucksack_that_nobody_declared_is_named(tmp_path):
     [
         ({"segment": "trunk"}, r"\[\[attached\]\] rucksack: the model has no segment 'trunk'; it has pelvis, "),
         ({"name": "torso"}, r"\[\[attached\]\] torso: there is a segment of this name already"),
+        ({"name": "ground"}, r"\[\[attached\]\] ground: OpenSim calls the laboratory so; give it another name"),
     ],
 )
 def test_what_cannot_be_is_an_error(change, words):
@@ -171,6 +202,8 @@ def test_what_cannot_be_is_an_error(change, words):
         ({"mass_kg": 0}, "must be a mass in kg"),
         ({"com_mm": [1, 2]}, "must be three numbers"),
         ({"com_mm": [0, 3000, 0]}, "none beyond 2000"),
+        ({"com_mm": [-0.2, 0.3, 0.0]}, "are they in m"),
+        ({"size_mm": [0.28, 0.09, 0.1]}, "are they in m"),
         ({"size_mm": [100, 0, 100]}, "lengths above zero"),
         ({"name": "a b"}, "should match pattern"),
     ],
@@ -178,6 +211,23 @@ def test_what_cannot_be_is_an_error(change, words):
 def test_entries_that_cannot_be_say_what_is_expected(change, words):
     with pytest.raises(ValidationError, match=words):
         Attached(**{"mass_kg": 10.0, **PACK, **change})
+
+
+def test_a_thing_that_is_not_to_be_told_from_nothing_is_named():
+    pack, weighed = (Attached(mass_kg=mass, **PACK) for mass in ("unknown", "0.2 +- 0.5"))
+    bsp = with_attached(ready(pack)).prior.mean
+    sd = np.full((13, 10), 0.51 * bsp.mass_kg[-1])
+    (said,) = not_found_warnings([pack], bsp, sd)
+    assert said.startswith("[[attached]] rucksack: 7.26 kg are found, with a deviation of 3.70 kg, which is not")
+    assert not not_found_warnings([pack], bsp, 0.9 * sd)
+    assert not not_found_warnings([weighed], bsp, sd)
+
+
+def test_things_that_weigh_more_than_the_scale_said_are_an_error():
+    heavy = [Attached(mass_kg=35, **{**PACK, "name": name, "on_scale": True}) for name in ("bag", "vest")]
+    words = r"bag, vest: 70 kg, weighed with the person .* of the 72\.6 kg .* leaves 2\.6 kg for the person"
+    with pytest.raises(PriorError, match=words):
+        CarriedMass.of(72.6, heavy)
 
 
 def test_two_level_refuses():

@@ -144,6 +144,13 @@ def test_slips_are_the_likeliest_cause_of_a_body_that_cannot_be():
         measured_body(wrong, {}, 0.08, MAN_KG, MAN_M)
 
 
+def test_of_a_sheet_in_inches_a_few_slips_are_named():
+    inches = {name: (value / 2.54, sd) for name, (value, sd) in stated().items()}
+    with pytest.raises(PriorError, match=r"; and \d+ more like these: are they in cm, and of this person\?") as caught:
+        measured_body(inches, {}, 0.08, MAN_KG, MAN_M)
+    assert str(caught.value).count("lead to expect") == 3
+
+
 def test_another_model_is_refused():
     prior = literature_prior(replace(WALKER.literature, segments=tuple(f"body{k}" for k in range(12))))
     with pytest.raises(PriorError, match="built-in model's segments; this model has no pelvis"):
@@ -165,3 +172,22 @@ def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(measured_walk, 
     assert ready.prior.mean.mass_kg[thigh] > ready.literature.mass_kg[thigh]
     assert any("girths and lengths: 2 of 58 from measures.csv" in note for note in ready.notes)
     assert any("leg_calf_girth is 15 cm" in warning for warning in ready.warnings)
+
+
+def test_what_is_a_prosthesis_on_both_sides_says_nothing_of_the_others():
+    """The errors of what was not measured go with those of what was; they must not be taken for measured."""
+    names, feet = PRIOR.mean.segments, ("foot_r", "foot_l")
+    whole, without = (
+        with_measures(PRIOR, WALKER.skeleton, stated(), MASS_KG, HEIGHT_M, each)[0] for each in ((), feet)
+    )
+    apart = (without.mean.table() - whole.mean.table()) / PRIOR.sd
+    others = [k for k, name in enumerate(names) if name not in feet]
+    assert np.abs(apart[others]).max() < 0.5
+
+
+def test_who_was_weighed_with_something_of_unknown_mass_has_girths_of_more_masses():
+    _, known = expected_measures(MASS_KG, HEIGHT_M)
+    _, unknown = expected_measures(MASS_KG, HEIGHT_M, 0.1 * MASS_KG)
+    girth, length = NAMES.index("leg_mid_girth"), NAMES.index("leg_knee_length")
+    assert unknown[girth, girth] == pytest.approx(known[girth, girth] + 0.05**2)
+    assert unknown[length, length] == known[length, length]

@@ -1,8 +1,9 @@
 import pytest
 
 from kinertia.errors import SettingsError
-from kinertia.estimation.from_files import read_inputs, read_trials
-from kinertia.io.subject_file import read_subject
+from kinertia.estimation.from_files import prepare_subject, read_inputs, read_trials
+from kinertia.io.subject_file import read_subject, with_settings
+from kinertia.settings import KnownSegment
 from osim_models import PEOPLE, subject_file
 
 
@@ -28,3 +29,12 @@ def test_one_trial_keeps_its_names(subject):
 def test_a_static_trial_is_missing_where_one_is_needed(subject):
     with pytest.raises(SettingsError, match="needs a static trial"):
         read_inputs(subject)
+
+
+def test_a_prosthesis_is_no_mirror_image(measured_walk):
+    wanted = read_subject(measured_walk / "subject.toml")
+    wanted = wanted.model_copy(update={"segments": {"shank_l": KnownSegment(prosthesis=True)}})
+    with pytest.raises(SettingsError, match=r"shank_l: a prosthesis is no mirror image .* symmetry = false"):
+        prepare_subject(with_settings(wanted, method="two-level"))
+    two_level = prepare_subject(with_settings(wanted, method="two-level", symmetry=False))
+    assert any("[segment] are not used" in note for note in two_level.notes)

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from kinertia.errors import PriorError
 from kinertia.estimation.estimate import named_by_source
 from kinertia.estimation.known_body import with_known_body
+from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
@@ -90,6 +92,22 @@ def test_an_earlier_estimate_takes_the_place_of_the_literature(ready):
         informed(ready, earlier=other)
 
 
+def test_what_an_earlier_estimate_held_is_as_it_was(ready):
+    prior, held = ready.prior, np.arange(12)[:, None] == 4
+    sd = np.where(held, 0.0, 0.5 * prior.sd)
+    after = informed(ready, earlier=BspTable("bsp.csv", prior.mean.segments, 1.1 * prior.mean.table(), sd)).prior
+    np.testing.assert_allclose(after.sd, np.where(held, 1.0, 0.5) * prior.sd)
+    np.testing.assert_allclose(after.mean.table(), np.where(held, 1.0, 1.1) * prior.mean.table())
+
+
+def test_a_group_is_of_the_built_in_model(ready):
+    """Nothing is learnt from fits with OpenSim models, so that no other group could help."""
+    size = len(ready.prior.covariance)
+    group = LearntPrior(ready.prior.mean.segments, np.zeros(size), np.ones(size), np.eye(size), 12)
+    with pytest.raises(PriorError, match="of the built-in model's segments; OpenSim models have others"):
+        with_known_body(replace(ready, file=object()), PriorSettings(), None, {}, group)
+
+
 def test_sides_and_masses(ready):
     alone = informed(ready, PriorSettings(sides_correlation=0.0))
     right, left = (10 * ready.prior.mean.segments.index(f"shank_{side}") for side in "rl")
@@ -103,3 +121,10 @@ def test_sides_and_masses(ready):
 def test_an_unknown_segment_is_told_with_those_that_there_are(ready):
     with pytest.raises(PriorError, match=r"\[segment.femur_r\].*no such segment; it has pelvis, "):
         informed(ready, femur_r=KnownSegment(mass_kg="9 +- 1"))
+
+
+@pytest.mark.parametrize("key", ["mass_kg", "ixx_kgm2"])
+def test_masses_and_moments_of_inertia_are_above_zero(key):
+    with pytest.raises(ValidationError, match="must be above zero"):
+        KnownSegment(**{key: "-8.9 +- 0.4"})
+    assert KnownSegment(com_y_mm="-189 +- 4").com_y_mm == (-189.0, 4.0)

@@ -59,11 +59,25 @@ def test_adults_keep_the_tables(values):
     assert not result.warnings
 
 
+def test_a_rucksack_on_the_scale_makes_nobody_obese():
+    heavy = subject(mass_kg=100.0)
+    assert population_prior(PRIOR, heavy).warnings
+    assert not population_prior(PRIOR, heavy, body_kg=90.0).warnings
+
+
 def test_what_is_stated_is_a_note():
     result = population_prior(PRIOR, subject(population="obese"))
     assert not result.warnings
     assert "obese (as stated)" in result.notes[0]
     np.testing.assert_allclose(result.prior.covariance, UNKNOWN_SPREAD**2 * PRIOR.covariance)
+
+
+def test_of_anybody_else_nothing_is_invented():
+    """Pregnant or very muscular people."""
+    result = population_prior(PRIOR, subject(population="other"))
+    np.testing.assert_array_equal(result.prior.mean.table(), PRIOR.mean.table())
+    np.testing.assert_allclose(result.prior.sd, UNKNOWN_SPREAD * PRIOR.sd)
+    assert "population: other (as stated), of whom the tables are not: no numbers" in result.notes[0]
 
 
 def test_somebody_short_is_likely_a_child():

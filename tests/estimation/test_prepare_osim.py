@@ -187,3 +187,9 @@ def test_a_trial_without_markers_of_a_foot(gait2354, walk):
 def test_mass_is_needed_and_nothing_else(gait2354, walk):
     with pytest.raises(SubjectError, match="--mass"):
         prepare_osim(Subject(name="A"), gait2354, [TrialInput(walk)], Settings(), False)
+
+
+def test_somebody_old_is_warned_of_with_a_model_too(gait2354, walk):
+    old = SUBJECT.model_copy(update={"age_years": 72.0})
+    warnings = prepare_osim(old, gait2354, [TrialInput(walk)], Settings(), False).warnings
+    assert any(one.startswith("population: elderly (72 years)") for one in warnings)

@@ -25,6 +25,16 @@ def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
     np.testing.assert_allclose(read_bsp(path).estimate[0], [0.1 * k for k in range(10)])
 
 
+def test_a_segment_that_was_held_has_no_deviations(tmp_path):
+    """Light bodies of an OpenSim model are not estimated; the bsp.csv of such a fit starts the next one too."""
+    path = tmp_path / "bsp.csv"
+    held = [f"talus_r,{name},{unit},9,{value},0.0\n" for name, unit, value, _ in VALUES]
+    path.write_text(GOOD + "".join(held))
+    table = read_bsp(path)
+    assert table.segments[-1] == "talus_r"
+    assert table.sd.any(axis=1).tolist() == [True, True, False]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -33,6 +43,7 @@ def test_as_excel_saves_it_where_decimals_have_commas(tmp_path):
         ("thigh_r,mass,kg", "thigh_r,mass,lb", r"line 2: thigh_r mass is in 'lb'; expected kg"),
         ("thigh_l,mass,kg,9,0.0,", "thigh_l,mass,kg,9,,", r"line 12: estimate is ''; expected a number"),
         ("kg,9,0.0,0.01", "kg,9,0.0,0", r"line 2: the sd of thigh_r mass must be positive"),
+        ("m,9,0.1,0.02", "m,9,0.1,-0.02", r"line 3: the sd of thigh_r com_x must be positive"),
         ("thigh_r,com_x", "thigh_r,mass", "is in 'm'; expected kg"),
         ("thigh_l,com_x,m,9,0.1,0.02\n", "", "thigh_l lacks com_x"),
         (GOOD[GOOD.index("\n") + 1 :], "", "a heading and no rows"),

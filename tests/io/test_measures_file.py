@@ -51,6 +51,8 @@ def test_a_filled_in_sheet_is_read_with_what_it_leaves_out(tmp_path):
         "leg_mid_girth": (0.525, pytest.approx(0.007)),
         "leg_knee_girth": (0.38, 0.005),
     }
+    quoted = sheet(tmp_path, 'leg_mid_girth,"52,5","0,7"')
+    assert read_measures(quoted).values == {"leg_mid_girth": (0.525, pytest.approx(0.007))}
     excel = sheet(tmp_path, "leg_mid_girth;52,5;0,7", columns="measure;cm;sd_cm")
     assert read_measures(excel).values == {"leg_mid_girth": (0.525, pytest.approx(0.007))}
 
@@ -62,6 +64,8 @@ def test_a_filled_in_sheet_is_read_with_what_it_leaves_out(tmp_path):
         (["waist,52,0.7"], 2, "unknown measure 'waist'; kinertia init --measures writes"),
         (["leg_mid_girth,525,0.7"], 2, "leg_mid_girth is 525 cm; expected 1 to 250 cm; was it in mm?"),
         (["leg_knee_girth,,", "leg_mid_girth,0.52,0.7"], 3, "was it in m?"),
+        (["leg_mid_girth,-52,0.7"], 2, "leg_mid_girth is -52 cm; expected 1 to 250 cm"),
+        (['leg_mid_girth,"1,052",0.7'], 2, "cm is '1,052'; expected a number"),
         (["leg_mid_girth,52,0.7", "leg_mid_girth,53,0.7"], 3, "leg_mid_girth stands there twice"),
         (["leg_mid_girth,52,0"], 2, "the sd of leg_mid_girth must be positive"),
         (["leg_mid_girth,about 50,0.7"], 2, "cm is 'about 50'; expected a number"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Joint
 from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import segment_name
 from kinertia.report.style import between
@@ -51,6 +52,32 @@ def test_each_side_is_drawn_from_its_own_side_and_from_the_front(fit):
     ]
     knees = [body["shank, right"][0] - body["pelvis"][0] for body in centres(body_figure(fit), "CoM, literature")[:2]]
     assert knees[1] < -0.05, "the right leg is on the left of a person who faces us"
+
+
+def test_what_weighs_nothing_is_not_drawn(fit):
+    """OpenSim models have bodies without mass between joints, as our own has at the ankles."""
+    table, prior_sd = fit.literature.table().copy(), fit.posterior.prior_sd.copy()
+    row = fit.literature.segments.index("foot_r")
+    table[row] = prior_sd[row] = 0.0
+    literature = BodySegmentParameters.from_table(fit.literature.segments, table)
+    bare = replace(fit, literature=literature, posterior=replace(fit.posterior, prior_sd=prior_sd))
+    assert set(outlines(body_figure(fit))) - set(outlines(body_figure(bare))) == {"foot, right"}
+
+
+def test_what_is_attached_is_drawn_where_it_is(fit):
+    pack = np.array([[10.0, -0.3, 0.25, 0.0, 0.2, 0.2, 0.2, 0.0, 0.0, 0.0]])
+    names = (*fit.literature.segments, "rucksack")
+    literature, estimate = (
+        BodySegmentParameters.from_table(names, np.concatenate([bsp.table(), pack]))
+        for bsp in (fit.literature, fit.estimate)
+    )
+    joint = Joint("torso", "rucksack", np.eye(3), np.zeros(3), ())
+    skeleton = replace(fit.skeleton, joints=(*fit.skeleton.joints, joint))
+    figure = body_figure(replace(fit, skeleton=skeleton, literature=literature, estimate=estimate, posterior=None))
+    centre = centres(figure, "CoM, literature")[0]["rucksack"]
+    outline = outlines(figure)["rucksack"][0]
+    assert np.mean([min(outline["x"]), max(outline["x"])]) == pytest.approx(centre[0], abs=2e-3)
+    assert np.mean([min(outline["y"]), max(outline["y"])]) == pytest.approx(centre[1], abs=2e-3)
 
 
 def test_colours_go_by_the_change_of_mass(fit):

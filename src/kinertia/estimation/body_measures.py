@@ -63,7 +63,8 @@ _KINDS_OF_PART = {
 """By the letter of the package's keys."""
 _STEP = 1e-4
 _TELLS = ("mass", "com", "ixx", "iyy", "izz")
-_FAR_SD, _FAR_TOTAL_SD = 4.0, 3.0
+_FAR_SD = 4.0
+_FEW_DOUBTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ class MeasuredBody:
     doubts: tuple[str, ...]
 
 
-def expected_measures(mass_kg: float, height_m: float) -> tuple[np.ndarray, np.ndarray]:
+def expected_measures(mass_kg: float, height_m: float, mass_sd_kg: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Mean (58,) and covariance (58, 58) of the logarithms of all measures (m) of a person.
 
     Lengths grow with stature, girths, widths and depths with the root of mass over stature, as those of similar bodies
@@ -92,7 +93,8 @@ def expected_measures(mass_kg: float, height_m: float) -> tuple[np.ndarray, np.n
     median of its kind's, and correlations are halved.
     """
     shape, spread = _sample_shape()
-    return shape + _size(mass_kg, height_m), spread
+    by_mass = (_size(np.e, 1.0) - _size(1.0, 1.0)) * mass_sd_kg / mass_kg
+    return shape + _size(mass_kg, height_m), spread + np.outer(by_mass, by_mass)
 
 
 def _size(mass_kg: float, height_m: float) -> np.ndarray:
@@ -144,6 +146,7 @@ def measured_body(
     lumbar_m: float,
     mass_kg: float,
     height_m: float,
+    mass_sd_kg: float = 0.0,
 ) -> MeasuredBody:
     """What measurements say of a person.
 
@@ -151,14 +154,14 @@ def measured_body(
         stated: value and deviation (m) by name, of those that were made.
         lengths_m: by name, from joint centres.
         lumbar_m: height of the lumbar joint above the hip joint centres.
-        mass_kg, height_m: of the person alone.
+        mass_kg, height_m, mass_sd_kg: of the person alone, and the mass' deviation.
 
     Raises:
         PriorError: the package yeadon is missing, or the measures cannot be of a person.
     """
     expect_yeadon()
     names = [one.name for one in measures()]
-    expected, spread = expected_measures(mass_kg, height_m)
+    expected, spread = expected_measures(mass_kg, height_m, mass_sd_kg)
     rows = [(names.index(name), value, sd / value) for name, (value, sd) in stated.items()]
     rows += [(names.index(name), value, _JOINT_LENGTH_SD_M / value) for name, value in lengths_m.items()]
     places, values, sd = (np.array(each) for each in zip(*rows, strict=True))
@@ -169,7 +172,10 @@ def measured_body(
         return _with_errors(logs, left, lumbar_m, doubts)
     except PriorError as error:
         if doubts:  # the likelier cause, and in the words of the sheet
-            raise PriorError(f"no body has these girths and lengths: {'; '.join(doubts)}") from error
+            more = len(doubts) - _FEW_DOUBTS
+            others = f"; and {more} more like these: are they in cm, and of this person?" if more > 0 else ""
+            told = "; ".join(doubts[:_FEW_DOUBTS])
+            raise PriorError(f"no body has these girths and lengths: {told}{others}") from error
         raise
 
 
@@ -276,6 +282,7 @@ def with_measures(
     mass_kg: float,
     height_m: float,
     artificial: Collection[str] = (),
+    mass_sd_kg: float = 0.0,
 ) -> tuple[BspPrior, MeasuredBody]:
     """The prior of the built-in model once a person's measurements are known, and what they said.
 
@@ -284,6 +291,7 @@ def with_measures(
         stated: value and deviation (m) by name, of the mean of both sides.
         mass_kg, height_m: of the person alone.
         artificial: segments that are prostheses; of these nothing was measured.
+        mass_sd_kg: deviation of the mass, where something was weighed with the person.
 
     Raises:
         PriorError: another model, the package yeadon is missing, or the measures cannot be of a person.
@@ -292,13 +300,14 @@ def with_measures(
     if missing := [kind for kind in KINDS if kind not in names]:
         raise PriorError(f"[prior] measures are of the built-in model's segments; this model has no {missing[0]}")
     lengths_m, hip, lumbar = _joint_lengths(skeleton)
-    body = measured_body(stated, lengths_m, float(lumbar[1] - hip[1]), mass_kg, height_m)
+    body = measured_body(stated, lengths_m, float(lumbar[1] - hip[1]), mass_kg, height_m, mass_sd_kg)
     seen = np.zeros((body.values.size, 10 * len(names)))
     for i, kind in enumerate(KINDS):
         both = [name for name in names if name in (kind, kind.removesuffix("_r") + "_l") and name not in artificial]
         for name, (j, told) in product(both, enumerate(_TELLS)):
             seen[len(_TELLS) * i + j, 10 * names.index(name) + _column(kind, told)] = 1.0 / len(both)
     kept = _with_whole_trunk()
+    kept = kept[(kept @ seen).any(axis=1)]  # where both sides are prostheses nothing was measured
     seen, values, errors = kept @ seen, kept @ body.values.ravel(), kept @ body.covariance @ kept.T
     # in deviations, for kilograms and kg m2 are far apart
     own, off = prior.sd.ravel(), np.sqrt(np.diag(errors))

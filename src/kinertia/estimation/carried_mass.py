@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from kinertia.errors import PriorError
 from kinertia.settings import Attached
 
 UNKNOWN_SHARE, UNKNOWN_SHARE_SD = 0.10, 0.15
 """Share of body mass that something of unknown mass is expected to have: anything up to 40 %."""
+_LIGHTEST_KG = 10.0
+"""What a person weighs at least (`check_subject`)."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,28 @@ class CarriedMass:
 
     @classmethod
     def of(cls, scale_kg: float, attached: Sequence[Attached]) -> CarriedMass:
-        """What follows from the mass on the scale."""
+        """What follows from the mass on the scale.
+
+        Raises:
+            PriorError: what was on the scale leaves nothing for the person.
+        """
         masses = [(mass_of(one, scale_kg), one.on_scale) for one in attached]
         body = scale_kg - sum(mass for (mass, _), weighed in masses if weighed)
+        if body < min(_LIGHTEST_KG, scale_kg):
+            names = ", ".join(one.name for one in attached if one.on_scale)
+            raise PriorError(
+                f"[[attached]] {names}: {scale_kg - body:.4g} kg, weighed with the person (on_scale = true), of the "
+                f"{scale_kg:.4g} kg under [subject]: that leaves {body:.4g} kg for the person; give masses in kg, and "
+                "on_scale = false for what the scale did not weigh"
+            )
         beside = [mass for mass, weighed in masses if not weighed]
         return cls(body, scale_kg + sum(mass for mass, _ in beside), sum(sd * sd for _, sd in beside) ** 0.5)
+
+
+def body_sd_kg(scale_kg: float, attached: Sequence[Attached]) -> float:
+    """How far the body's own mass may be off besides the scale, by what was weighed with it."""
+    variances = [mass_of(one, scale_kg)[1] ** 2 for one in attached if one.on_scale]
+    return float(sum(variances) ** 0.5)
 
 
 def mass_of(attached: Attached, scale_kg: float) -> tuple[float, float]:

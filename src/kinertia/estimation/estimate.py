@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.estimation.attached import with_attached
+from kinertia.estimation.attached import not_found_warnings, with_attached
 from kinertia.estimation.forces_used import forces_used
 from kinertia.estimation.free_moment_sign import free_moment_sign_warnings
 from kinertia.estimation.mirrored_free_moments import mirrored_free_moments_warning
@@ -121,6 +121,7 @@ def estimate(ready: Prepared, settings: Settings | None = None, progress: Progre
         *turning_warnings(ready.skeleton, ready.kinematics),
         *signs,
         *outcome.warnings,
+        *([] if outcome.posterior is None else not_found_warnings(ready.attached, outcome.bsp, outcome.posterior.sd)),
         # free moments of the wrong sign are off like mirror images, too
         *([] if signs else _mirrored_free_moments(outcome)),
         *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),

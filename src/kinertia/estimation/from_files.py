@@ -53,6 +53,7 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
     known = wanted.instruments
+    _expect_no_mirrored_prosthesis(wanted)
     session = () if known.session is None else read_session(known.session)
     if session:
         check_plates(wanted)
@@ -65,6 +66,15 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
             ready, notes=(*ready.notes, "[instruments] is not used: two-level takes plates and clock as exact")
         )
     return with_instruments(ready, known, session, recordings(wanted))
+
+
+def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
+    names = [name for name, segment in wanted.segments.items() if segment.prosthesis]
+    if names and wanted.settings.method == "two-level" and wanted.settings.symmetry:
+        raise SettingsError(
+            f"{', '.join(names)}: a prosthesis is no mirror image of the other side, as two-level with symmetry = true "
+            "has it; use the default method, or symmetry = false under [settings]"
+        )
 
 
 def _measures(wanted: SubjectFile) -> BodyMeasures | None:

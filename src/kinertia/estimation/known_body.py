@@ -8,13 +8,15 @@ thigh is cut from) moves along.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from kinertia.errors import PriorError
+from kinertia.estimation.attached import with_attached
 from kinertia.estimation.body_measures import with_measures
+from kinertia.estimation.carried_mass import body_sd_kg
 from kinertia.estimation.gaussian_update import updated
 from kinertia.estimation.input_checks import known as known_value
 from kinertia.estimation.learnt_prior import LearntPrior
@@ -24,7 +26,7 @@ from kinertia.io.bsp_file import BspTable
 from kinertia.io.measures_file import BodyMeasures
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.measures import measures as all_measures
-from kinertia.settings import KnownSegment, PriorSettings
+from kinertia.settings import Attached, KnownSegment, PriorSettings
 
 _UNLIKE_SD = 3.0
 """Deviations from the tables beyond which the user is asked to look again."""
@@ -56,21 +58,9 @@ def with_known_body(
         PriorError: both an earlier estimate and a group, a segment that the model has not, either of another model, or
             measures that cannot be used.
     """
+    body = len(ready.prior.mean.segments)
+    ready = with_attached(*_leaning_on(ready, settings, earlier, segments, group))
     prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
-    if group is not None:
-        if earlier is not None:
-            raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
-        prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
-        notes.append(f"prior: learnt from {group.people} people in place of the literature's")
-    if earlier is not None:
-        prior = _from_earlier(prior, earlier)
-        notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")
-    if settings.sides_correlation is not None:
-        covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
-        prior = replace(prior, covariance=covariance)
-    for name in (name for name, known in segments.items() if known.prosthesis):
-        prior = with_prosthesis(prior, name)
-        notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
     if measures is not None:
         prior = _with_measures(ready, prior, segments, measures, notes, warnings)
     measured = _measured(prior, segments)
@@ -87,11 +77,53 @@ def with_known_body(
                 f"{expected:.4g} +- {own:.2g}; is its unit right, and the segment cut at the joint?"
             )
     if settings.masses_kept:
-        masses = zip(prior.mean.mass_kg.tolist(), prior.sd[:, 0].tolist(), strict=True)
-        kept = {(k, 0): (mass, _KEPT_SHARE * own) for k, (mass, own) in enumerate(masses)}
+        kept = _kept(prior, body, ready.attached)
         measured = {**kept, **measured}
         notes.append("prior: the masses are kept")
     return replace(ready, prior=_given(prior, measured), notes=tuple(notes), warnings=tuple(warnings))
+
+
+def _leaning_on(
+    ready: Prepared,
+    settings: PriorSettings,
+    earlier: BspTable | None,
+    segments: Mapping[str, KnownSegment],
+    group: LearntPrior | None,
+) -> tuple[Prepared, Collection[str]]:
+    """The person with the prior that measurements then move, and segments whose masses are no shares of the body's."""
+    prior, notes = ready.prior, list(ready.notes)
+    if group is not None:
+        if earlier is not None:
+            raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
+        if ready.file is not None:
+            raise PriorError(
+                "[prior] population is learnt of the built-in model's segments; OpenSim models have others"
+            )
+        prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
+        notes.append(f"prior: learnt from {group.people} people in place of the literature's")
+    if earlier is not None:
+        prior = _from_earlier(prior, earlier)
+        notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")
+    if settings.sides_correlation is not None:
+        covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
+        prior = replace(prior, covariance=covariance)
+    artificial = [name for name, known in segments.items() if known.prosthesis]
+    for name in artificial:
+        prior = with_prosthesis(prior, name)
+        notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
+    by_itself = artificial if earlier is None else prior.mean.segments
+    return replace(ready, prior=prior, notes=tuple(notes)), by_itself
+
+
+def _kept(prior: BspPrior, body: int, attached: Sequence[Attached]) -> dict[tuple[int, int], tuple[float, float]]:
+    """Masses of the body's segments, the first ones, and their deviations when they are kept; as `_measured`."""
+    if unknown := [one.name for one in attached if one.mass_kg is None and one.on_scale]:
+        raise PriorError(
+            f"masses_kept = true under [prior], but {unknown[0]}, of unknown mass, was weighed with the person, so "
+            "that the body's masses are not known either; weigh one of the two alone, or leave masses_kept out"
+        )
+    masses = zip(prior.mean.mass_kg[:body].tolist(), prior.sd[:body, 0].tolist(), strict=True)
+    return {(k, 0): (mass, _KEPT_SHARE * own) for k, (mass, own) in enumerate(masses)}
 
 
 def _with_measures(
@@ -107,14 +139,15 @@ def _with_measures(
         raise PriorError("[prior] measures are of the built-in model's segments, which OpenSim models cut elsewhere")
     body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
     artificial = [name for name, known in segments.items() if known.prosthesis]
-    prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial)
+    body_sd = body_sd_kg(known_value(ready.subject.mass_kg), ready.attached)
+    prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial, body_sd)
     total = f"{body.total_kg:.1f} +- {body.total_sd_kg:.1f} kg"
     notes.append(
         f"girths and lengths: {len(measures.values)} of {len(all_measures())} from {measures.name}, the others as "
         f"expected of this mass, height and them; Yeadon's body of these has {total}, the person {body_kg:.1f} kg"
     )
     warnings += [f"{measures.name}: {doubt}" for doubt in body.doubts]
-    if abs(body.total_kg - body_kg) > _UNLIKE_SD * body.total_sd_kg:
+    if abs(body.total_kg - body_kg) > _UNLIKE_SD * np.hypot(body.total_sd_kg, body_sd):
         warnings.append(
             f"{measures.name}: Yeadon's body of these girths and lengths has {total}, the person {body_kg:.1f} kg; are "
             "all of them in cm, and of this person?"
@@ -123,7 +156,7 @@ def _with_measures(
 
 
 def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
-    """The prior with the mean and the deviations of an earlier estimate."""
+    """The prior with the mean and the deviations of an earlier estimate; of what it held, the prior's own."""
     names = prior.mean.segments
     if missing := [name for name in names if name not in earlier.segments]:
         raise PriorError(
@@ -131,11 +164,12 @@ def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
             "another model?"
         )
     rows = [earlier.segments.index(name) for name in names]
-    sd = earlier.sd[rows].ravel()
+    held = ~earlier.sd[rows].any(axis=1, keepdims=True)
     own = prior.sd.ravel()
+    sd = np.where(held, prior.sd, earlier.sd[rows]).ravel()
     return replace(
         prior,
-        mean=BodySegmentParameters.from_table(names, earlier.estimate[rows]),
+        mean=BodySegmentParameters.from_table(names, np.where(held, prior.mean.table(), earlier.estimate[rows])),
         covariance=prior.covariance / np.outer(own, own) * np.outer(sd, sd),
     )
 

@@ -10,6 +10,7 @@ Pavol found in the elderly are 1.58 times the tables' deviations from Dumas' val
   other places. Deviations of masses stay, those of centres of mass and inertias grow.
 - child: head and trunk are heavier, thighs, shanks and feet lighter than an adult's (Jensen 1986, J Biomech 19:359);
   his coefficients could not be checked. Deviations grow.
+- other: anybody else whom the tables do not describe, pregnant or very muscular people, say. Deviations grow.
 - obese: trunks are heavier, thighs and shanks lighter for the same mass (Chambers et al. 2010, Clin Biomech 25:131,
   people over 65); de Leva's masses were off by up to 60 % on average in a sample of working adults (Merrill et al.
   2019). Deviations grow.
@@ -49,15 +50,18 @@ class PopulationPrior:
     warnings: tuple[str, ...]
 
 
-def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
+def population_prior(prior: BspPrior, subject: Subject, body_kg: float | None = None) -> PopulationPrior:
     """The prior for this person: as the subject says, or by age and body-mass index.
 
     Args:
         prior: the literature's, or that of a scaled model.
         subject: mass and height may be unknown.
+        body_kg: of the body alone, where things were weighed with it; None: the mass of the subject.
     """
     stated = subject.population
-    population, why = (stated, "as stated") if stated is not None else _by_age_and_build(subject)
+    population, why = (
+        (stated, "as stated") if stated is not None else _by_age_and_build(subject, body_kg or subject.mass_kg)
+    )
     said = []
     if population == "elderly" and subject.sex is not None:
         prior = _spread(_with_masses(prior, _PAVOL[subject.sex]), keep_masses=True)
@@ -70,8 +74,8 @@ def population_prior(prior: BspPrior, subject: Subject) -> PopulationPrior:
     return PopulationPrior(prior, tuple(notes), tuple(warnings))
 
 
-def _by_age_and_build(subject: Subject) -> tuple[str, str]:
-    age, mass_kg, height_m = subject.age_years, subject.mass_kg, subject.height_m
+def _by_age_and_build(subject: Subject, mass_kg: float | None) -> tuple[str, str]:
+    age, height_m = subject.age_years, subject.height_m
     if age is not None and age < GROWN_UP_YEARS:
         return "child", f"{age:g} years"
     if mass_kg and height_m and mass_kg / height_m**2 >= OBESE_KG_M2:

@@ -182,7 +182,7 @@ def prepare(
     literature = literature_bsp(
         carried.body_kg, known(subject.height_m), known(subject.sex), model.geometry, settings.bsp
     )
-    expected = population_prior(literature_prior(literature), subject)
+    expected = population_prior(literature_prior(literature), subject, carried.body_kg)
     calibration_s = (time.perf_counter() - started) / len(inputs)
 
     kinematics, seconds = [], []

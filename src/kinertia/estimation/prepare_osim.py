@@ -76,7 +76,7 @@ def prepare_osim(
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, carried.body_kg)
     prior, held = parted(skeleton, own)
-    expected = population_prior(prior, subject.model_copy(update={"sex": None}))
+    expected = population_prior(prior, subject.model_copy(update={"sex": None}), carried.body_kg)
     prior = expected.prior
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     uncertainty = ModelUncertainty(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
@@ -107,7 +107,7 @@ def prepare_osim(
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=(*warnings, *_impossible_warning(model, prior.mean)),
+        warnings=(*warnings, *expected.warnings, *_impossible_warning(model, prior.mean)),
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )

@@ -21,7 +21,7 @@ class BspTable:
     Attributes:
         name: of the file.
         segments: in the file's order.
-        estimate, sd: (s, 10) in the order of `PARAMETERS`, SI.
+        estimate, sd: (s, 10) in the order of `PARAMETERS`, SI; deviations of a segment that was held are all zero.
     """
 
     name: str
@@ -39,6 +39,7 @@ def read_bsp(path: Path) -> BspTable:
         FileError: no such file, a column or a parameter is missing, or a value is none; with the line.
     """
     values: dict[str, dict[str, tuple[float, float]]] = {}
+    without_sd: dict[str, dict[str, int]] = {}
     for row in read_csv(path, _COLUMNS, "the bsp.csv of a simultaneous fit (two-level has no sd)"):
         line, segment, parameter, written_unit = row.line, *(row.cells[name] for name in _COLUMNS[:3])
         if parameter not in PARAMETERS:
@@ -50,9 +51,13 @@ def read_bsp(path: Path) -> BspTable:
             raise FileError(path, f"{segment} {parameter} stands there twice", line)
         values[segment][parameter] = row.number("estimate"), row.number("sd")
         if not values[segment][parameter][1] > 0.0:
-            raise FileError(path, f"the sd of {segment} {parameter} must be positive", line)
+            without_sd.setdefault(segment, {})[parameter] = line
     for segment, known in values.items():
         if lacking := [name for name in PARAMETERS if name not in known]:
             raise FileError(path, f"{segment} lacks {', '.join(lacking)}")
+    for segment, lines in without_sd.items():
+        parameter, line = next(iter(lines.items()))
+        if any(sd != 0.0 for _, sd in values[segment].values()):
+            raise FileError(path, f"the sd of {segment} {parameter} must be positive", line)
     table = np.array([[known[name] for name in PARAMETERS] for known in values.values()])
     return BspTable(path.name, tuple(values), table[..., 0], table[..., 1])

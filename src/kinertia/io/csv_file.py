@@ -1,12 +1,14 @@
 """Tables that people write in a spreadsheet: CSV with a heading, as every country's programs save it.
 
-Cells are separated by commas, semicolons or tabs. Where commas do not separate cells they may be decimal marks.
+Cells are separated by commas, semicolons or tabs. Where commas do not separate cells they may be decimal marks; where
+they do, one with one or two digits behind it in a quoted cell is one, too ("1,234" might be a thousand).
 """
 
 from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -18,6 +20,7 @@ from kinertia.io.number_table import expect_file
 
 _SEPARATORS = ",;\t"
 _BEGINNING_BYTES = 2000
+_QUOTED_DECIMAL = re.compile(r"[-+]?\d+,\d{1,2}")
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,9 @@ class Row:
             5.1
         """
         cell = self.cells[column]
+        decimal_comma = self.decimal_commas or _QUOTED_DECIMAL.fullmatch(cell)
         try:
-            value = float(cell.replace(",", ".") if self.decimal_commas else cell)
+            value = float(cell.replace(",", ".") if decimal_comma else cell)
         except ValueError:
             raise FileError(self.path, f"{column} is '{cell}'; expected a number", self.line) from None
         if not math.isfinite(value):

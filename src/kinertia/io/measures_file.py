@@ -78,6 +78,7 @@ def read_measures(path: Path) -> BodyMeasures:
 def _length_m(path: Path, line: int, measure: Measure, value_cm: float) -> float:
     if _SHORTEST_CM <= value_cm <= _LONGEST_CM:
         return value_cm / 100.0
-    unit = "m" if value_cm < _SHORTEST_CM else "mm"
-    problem = f"{measure.name} is {value_cm:g} cm; expected {_SHORTEST_CM:g} to {_LONGEST_CM:g} cm; was it in {unit}?"
+    problem = f"{measure.name} is {value_cm:g} cm; expected {_SHORTEST_CM:g} to {_LONGEST_CM:g} cm"
+    if value_cm > 0.0:
+        problem += f"; was it in {'m' if value_cm < _SHORTEST_CM else 'mm'}?"
     raise FileError(path, problem, line)

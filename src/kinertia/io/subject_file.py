@@ -391,6 +391,8 @@ def _sentence(detail: Any) -> str:
     problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
     if kind == "value_error":
         problem = str(detail["ctx"]["error"])
+    if kind == "bool_type":
+        problem = "must be true or false, without quotes"
     if kind == "float_type" and isinstance(detail["input"], str):
         with suppress(ValueError):
             problem += f"; write it without quotes: {number_of(detail['input']):g}"

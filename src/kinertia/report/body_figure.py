@@ -102,7 +102,8 @@ class _Body:
 
     Attributes:
         segments: their names.
-        points: per segment (p, 3) what it reaches: its joints, or its joint and its last marker.
+        points: per segment (p, 3) what it reaches: its joints, or its joint and its last marker; of something attached
+            its centre of mass.
         radii: per segment.
         before, after: (s, 3) centres of mass.
     """
@@ -114,9 +115,10 @@ class _Body:
     after: np.ndarray
 
     def seen(self, view: _View) -> list[int]:
-        """Rows of the segments in a view; from one side the limbs of the other are left out."""
+        """Rows of the segments in a view that weigh something; from one side the limbs of the other are left out."""
         hidden = {"_r": "_l", "_l": "_r"}.get(view.near)
-        return [i for i, name in enumerate(self.segments) if hidden is None or not name.endswith(hidden)]
+        shown = [i for i, radius in enumerate(self.radii) if radius > 0.0]
+        return [i for i in shown if hidden is None or not self.segments[i].endswith(hidden)]
 
     @property
     def top(self) -> float:
@@ -129,12 +131,14 @@ def _standing(fit: Fit) -> _Body:
     rows = [skeleton.segments.index(name) for name in segments]
     pose = skeleton.pose(np.array([[skeleton.start.get(name, 0.0) for name in skeleton.coordinates]]))
     rotation, origin = pose.rotation[0], pose.translation[0]
+    com_m = dict(zip(rows, fit.literature.com_m, strict=True))
     points = []
     for i in rows:
         marker = last_marker(skeleton, i)
         if marker is None:
             joints = [skeleton.segments.index(j.child) for j in skeleton.joints if j.parent == skeleton.segments[i]]
-            points.append(origin[[i, *joints]])
+            at = origin[[i, *joints]] if joints else origin[i] + rotation[i] @ com_m[i] + np.zeros((1, 3))
+            points.append(at)
         else:  # the trunk's may be in front of it or on one side
             end = marker if skeleton.segments[i].endswith(("_r", "_l")) else marker * [0.0, 1.0, 0.0]
             points.append(np.array([origin[i], origin[i] + rotation[i] @ end]))

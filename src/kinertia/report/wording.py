@@ -90,5 +90,7 @@ def _differences(pair: Asymmetry) -> str:
         unit, factor = read_in(k)
         value, sd = factor * pair.difference[k], factor * pair.sd[k]
         digits = decimals(k, sd)
-        parts.append(f"{PARAMETERS[k]} of the right {fixed(value, digits, sign=True)} ± {fixed(sd, digits)} {unit}")
+        parts.append(
+            f"{PARAMETERS[k]} of the right {fixed(value, digits, sign=True)} ± {fixed(sd, digits)} {unit} (sd)"
+        )
     return ", ".join(parts)

@@ -277,7 +277,7 @@ def test_the_form_has_every_entry_of_the_person():
     shown = {field.key: field for field in fields({"subject": {"sex": "f", "age_years": 9.0}})}
     assert set(shown) == set(Subject.model_fields)
     assert (shown["sex"].value, shown["sex"].choices) == ("female", ("male", "female"))
-    assert shown["population"].choices == ("adult", "child", "elderly", "obese")
+    assert shown["population"].choices == ("adult", "child", "elderly", "obese", "other")
     assert shown["age_years"].value == "9.0"
     assert not shown["mass_kg"].choices
 
