@@ -14,6 +14,7 @@ from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.model.torn_segments import torn_segments_trouble
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
 from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, plate_sign_trouble
@@ -30,6 +31,7 @@ from kinertia.trial.marker_faults import (
     straight_doubts,
 )
 from kinertia.trial.marker_quality import axes_trouble, extent_m
+from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import loads_doubts, loads_trouble
 
 
@@ -74,6 +76,7 @@ def trial_doubts(
     own = _worn(markers, marker_set)
     trouble = (
         axes_trouble(extent_m(own))
+        or made_up_frames_trouble(own)
         or spikes_trouble(own)
         or _sides(markers, marker_set)
         or lost_frames_trouble(own)
@@ -90,10 +93,11 @@ def trial_doubts(
             trouble = load_places_trouble(recording, feet)
     if trouble:
         return _refused(trouble)
-    # a stretch that was written by a computer often ends with a jump
-    straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
+    ways = _ways_doubts(own, marker_set)
+    if not ways and marker_set is not None and (torn := torn_segments_trouble(own, marker_set)):
+        return _refused(torn)
     computed = [] if marker_set is None else computed_doubts(own, marker_set)
-    sentences = [*straight, *jump_doubts(own), *computed, *session]
+    sentences = [*ways, *computed, *session]
     if recording.belt is not None and feet is not None:
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
@@ -137,6 +141,16 @@ def warnings_of(name: str, doubts: Sequence[Doubt]) -> list[str]:
         if one.refused:
             raise TrialError(name, one.sentence)
     return [f"{name}: {one.sentence}" for one in doubts]
+
+
+def _ways_doubts(own: Markers, marker_set: MarkerSet | None) -> list[str]:
+    """What speaks against the ways of single markers; where all are rounded or noisy, they only seem to."""
+    if rounded := rounded_trouble(own):
+        return [rounded]
+    if noisy := noisy_doubts(own):
+        return noisy
+    # a stretch that was written by a computer often ends with a jump
+    return [*straight_doubts(own, dict(marker_set.segments) if marker_set else {}), *jump_doubts(own)]
 
 
 def _worn(markers: Markers, marker_set: MarkerSet | None) -> Markers:
