@@ -23,6 +23,7 @@ from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
+from kinertia.trial.mains_hum import hum_doubts, hum_trouble
 from kinertia.trial.marker_faults import (
     exchanged_trouble,
     jump_doubts,
@@ -33,6 +34,7 @@ from kinertia.trial.marker_faults import (
 from kinertia.trial.marker_quality import axes_trouble, extent_m
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+from kinertia.trial.torque_point import torque_point_doubts
 
 
 class Doubt(NamedTuple):
@@ -88,7 +90,7 @@ def trial_doubts(
         trouble = body_trouble(static.markers, markers, marker_set)
         session = [] if trouble else session_doubts(static.markers, markers, marker_set)
     if not trouble and recording.plates is not None:
-        trouble = loads_trouble(recording.plates)
+        trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)
         if not trouble and feet is not None:
             trouble = load_places_trouble(recording, feet)
     if trouble:
@@ -101,7 +103,8 @@ def trial_doubts(
     if recording.belt is not None and feet is not None:
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
-        sentences += loads_doubts(recording.plates)
+        sentences += [*hum_doubts(recording.plates), *loads_doubts(recording.plates)]
+        sentences += torque_point_doubts(recording.plates)
         sentences += [] if feet is None else load_places_doubts(recording, feet)
     return _told(sentences)
 
