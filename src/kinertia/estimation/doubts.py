@@ -35,6 +35,7 @@ from kinertia.trial.marker_quality import axes_trouble, extent_m
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import loads_doubts, loads_trouble
 from kinertia.trial.torque_point import torque_point_doubts
+from kinertia.trial.walkway_slope import walkway_slope_doubts
 
 
 class Doubt(NamedTuple):
@@ -100,6 +101,8 @@ def trial_doubts(
         return _refused(torn)
     computed = [] if marker_set is None else computed_doubts(own, marker_set)
     sentences = [*ways, *computed, *session]
+    if recording.belt is None and feet is not None:
+        sentences += walkway_slope_doubts(markers, feet)
     if recording.belt is not None and feet is not None:
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
