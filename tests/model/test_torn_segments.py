@@ -31,6 +31,16 @@ EXCHANGED = [
 """With what moves by itself then."""
 
 
+CROSSED = [
+    ("gait2354/subject01_walk1.trc", "thigh"),
+    ("gait2354/subject01_walk1.trc", "shank"),
+    ("gait2354/subject01_walk1.trc", "foot"),
+    ("field/rajagopal_run/motion_capture_run.trc", "thigh"),
+    ("field/rajagopal_run/motion_capture_run.trc", "shank"),
+]
+"""Walks whose sets have no markers at the joints."""
+
+
 def read(measured_recording, name):
     markers = measured_recording(name).markers
     marker_set = read_marker_set(OPENCAP) if "subject4" in name else choose_marker_set(markers.labels)
@@ -62,3 +72,14 @@ def test_what_a_marker_goes_with_instead(measured_recording):
     swapped = replace(markers, labels=tuple(other.get(label, label) for label in markers.labels))
     trouble = torn_segments_trouble(swapped, marker_set)
     assert re.search(r"and that from (RTIB to L|LTIB to R)(KNE|ANK) \((thigh|shank)_[rl]\) by \d+ mm", trouble)
+
+
+@pytest.mark.parametrize(("name", "segment"), CROSSED)
+def test_whole_segments_of_the_other_leg(name, segment, measured_recording):
+    markers, marker_set = read(measured_recording, name)
+    right, left = (sorted(marker_set.segments[f"{segment}_{side}"]) for side in "rl")
+    other = {a: b for one in zip(right, left, strict=True) for a, b in (one, one[::-1])}
+    swapped = replace(markers, labels=tuple(other.get(label, label) for label in markers.labels))
+    trouble = torn_segments_trouble(swapped, marker_set)
+    assert "of the other leg" in trouble
+    assert f"{'shank' if segment == 'foot' else segment}s" in trouble

@@ -109,5 +109,7 @@ def test_samples_that_are_held(samples, said):
     force[1200 : 1200 + samples] = force[1200]
     doubts = loads_doubts(replace(plate, force=force))
     assert len(doubts) == said
+    # long ones are refused: they shift where loads begin and end
+    assert bool(loads_trouble(replace(plate, force=force))) == (samples > 100)
     if said:
         assert f"reads exactly the same in all its channels from 1.200 to {1.199 + samples / 1000:.3f} s" in doubts[0]

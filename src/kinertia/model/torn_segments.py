@@ -24,6 +24,11 @@ _MOST_LOWEST = (0.1, 0.9)
 _FEWEST_FRAMES = 11
 _SOFT = ("torso", "head")
 """Shoulders and head move against the trunk."""
+_NEIGHBOURS = (("thigh", "shank"), ("shank", "foot"))
+_SEVERAL = {"thigh": "thighs", "shank": "shanks", "foot": "feet"}
+_CROSSED = 0.7
+"""Distances to the next segment of the other leg change 1.9 times as much and more in sound walks and runs, and alike
+where both legs do the same; exchanged, 0.1 to 0.57 times."""
 _JOINED = (("ankle_lateral", "heel"), ("ankle_lateral", "metatarsal"), ("elbow_lateral", "wrist"))
 
 
@@ -45,7 +50,7 @@ def torn_segments_trouble(markers: Markers, marker_set: MarkerSet) -> str:
     """
     far = [pair for pair in _pairs(markers, marker_set) if pair.change_m > _limit_m(pair)]
     if not far:
-        return ""
+        return _crossed(markers, marker_set)
     worst = max(far)
     usual = "less than 40 mm are usual"
     involved = list(dict.fromkeys(label for pair in sorted(far, reverse=True) for label in (pair.one, pair.other)))
@@ -56,6 +61,35 @@ def torn_segments_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         f"labels are swapped, or the marker set has markers on the wrong segment (look at {shown}): correct the "
         "labels, in the static trial as well, or the marker set"
     )
+
+
+def _crossed(markers: Markers, marker_set: MarkerSet) -> str:
+    """Whole segments that go with those of the other leg: a set without markers at the joints has no other sign."""
+    for upper, lower in _NEIGHBOURS:
+        above, below = _SEVERAL[upper], _SEVERAL[lower]
+        changes = {
+            (a, b): _neighbours_change_m(markers, marker_set, f"{upper}_{a}", f"{lower}_{b}")
+            for a in "rl"
+            for b in "rl"
+        }
+        own = min(changes["r", "r"], changes["l", "l"])
+        crossed = max(changes["r", "l"], changes["l", "r"])
+        if np.isfinite([*changes.values()]).all() and crossed < _CROSSED * own and own > _APART_M:
+            return (
+                f"the markers of the {above} go with the {below} of the other leg: distances to them change by "
+                f"{1e3 * crossed:.0f} mm during the trial, and to those of their own leg by {1e3 * own:.0f} mm; the "
+                f"left and right labels of the {above} or of the {below} are swapped: correct them, in the static "
+                "trial as well, if they are swapped there"
+            )
+    return ""
+
+
+def _neighbours_change_m(markers: Markers, marker_set: MarkerSet, upper: str, lower: str) -> float:
+    """Median over the pairs of a marker of each; NaN where one has none."""
+    here = set(markers.labels)
+    above, below = ([label for label in marker_set.segments.get(name, ()) if label in here] for name in (upper, lower))
+    changes = [_change_m(markers, one, other, np.nan) for one in above for other in below]
+    return float(np.nanmedian(changes)) if np.isfinite(changes).any() else np.nan
 
 
 def _limit_m(pair: _Pair) -> float:

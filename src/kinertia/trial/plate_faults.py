@@ -22,7 +22,7 @@ _NOTHING_N, _FEWEST_CARRIED = 0.5, 10
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes there steeply."""
 _FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
-_HELD_S, _FEWEST_HELD, _LEAP_STEPS = 0.025, 3, 3.0
+_HELD_S, _LONG_HELD_S, _FEWEST_HELD, _LEAP_STEPS = 0.025, 0.1, 3, 3.0
 """Loads of 25 sound trials never stay the same in all channels for more than 2 ms."""
 _ROUNDED = 6.0
 """A peak that is flat for being rounded is at most 4.5 times what it is rounded to above what was as long before."""
@@ -41,6 +41,8 @@ def loads_trouble(plates: PlateLoads) -> str:
         )
     if trouble := _lost_samples(plates) or _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
         return trouble
+    if held := _held_samples(plates, _LONG_HELD_S):
+        return held[0]
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
     arms = np.abs(free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
     arms /= plates.force[..., 1][plates.force[..., 1] > FIRM_LOAD_N]
@@ -142,8 +144,8 @@ def _lasts_at_top(time: FloatArray, values: FloatArray, top: float) -> float:
     return max((float(time[b] - time[a]) for a, b in flat if top - values[max(2 * a - b, 0)] > rise), default=0.0)
 
 
-def _held_samples(plates: PlateLoads) -> list[str]:
-    """Stretches in which a plate that carries somebody reads exactly the same, in all its channels."""
+def _held_samples(plates: PlateLoads, least_s: float = _HELD_S) -> list[str]:
+    """Stretches in which a plate that carries somebody reads exactly the same, in all its channels, for so long."""
     doubts = []
     for p, name in enumerate(plates.names):
         wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
@@ -153,7 +155,7 @@ def _held_samples(plates: PlateLoads) -> list[str]:
         held = [
             (float(plates.time[first]), float(plates.time[last + 1]))
             for first, last in runs(same)
-            if last - first + 1 >= _FEWEST_HELD and plates.time[last + 1] - plates.time[first] >= _HELD_S
+            if last - first + 1 >= _FEWEST_HELD and plates.time[last + 1] - plates.time[first] >= least_s
             if last + 2 < len(wrench) and abs(wrench[last + 2, 1] - wrench[last, 1]) > leap
         ]
         if held:
@@ -161,7 +163,7 @@ def _held_samples(plates: PlateLoads) -> list[str]:
             doubts.append(
                 f"{name} reads exactly the same in all its channels from {start:.3f} to {end:.3f} s, under load: "
                 "samples were lost and the last one was repeated, or a gap was filled with it; export the forces "
-                "again, or use the trial without that time (window_s)"
+                "again, or leave this trial out"
             )
     return doubts
 
