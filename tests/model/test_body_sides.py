@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.model.body_sides import sides_trouble
+from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.trial.data import Markers
 
 SOUND = [
@@ -128,3 +128,11 @@ def test_a_wand_of_the_thigh_and_one_of_the_shank_swapped_in_every_file(recorded
     other = {thigh: shank, shank: thigh}
     swapped = Markers(markers.time, tuple(other.get(label, label) for label in markers.labels), markers.positions)
     assert f"{thigh} of the thigh is" in sides_trouble(swapped, marker_set)
+
+
+def test_who_walks_backwards(recorded):
+    markers, marker_set = recorded
+    assert not walks_backwards(markers, marker_set)
+    backwards = Markers(markers.time, markers.labels, markers.positions[::-1])
+    goes = np.nanmedian(markers.positions[-1] - markers.positions[0], axis=0)[[0, 2]]
+    assert walks_backwards(backwards, marker_set) == (np.linalg.norm(goes) > 0.5)

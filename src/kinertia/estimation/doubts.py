@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from kinertia.errors import TrialError
-from kinertia.model.body_sides import sides_trouble
+from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
@@ -108,7 +108,9 @@ def trial_doubts(
     if recording.plates is not None:
         sentences += [*hum_doubts(recording.plates), *loads_doubts(recording.plates)]
         sentences += torque_point_doubts(recording.plates)
-        sentences += [] if feet is None else load_places_doubts(recording, feet)
+        # what is usual of loads under feet is of people who land on the heel
+        backwards = marker_set is not None and walks_backwards(markers, marker_set)
+        sentences += [] if feet is None or backwards else load_places_doubts(recording, feet)
     return _told(sentences)
 
 

@@ -23,6 +23,7 @@ _OPPOSED = 0.2
 _FLAT = 0.8
 """Cosine of 37 degrees."""
 _BELOW_M = 0.05
+_GOES_M = 0.5
 _BEHIND, _BEYOND = -0.1, 1.1
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
@@ -76,6 +77,17 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         or _outside_trouble(places, right, marker_set)
         or _elbow_trouble(places, right, marker_set)
     )
+
+
+def walks_backwards(markers: Markers, marker_set: MarkerSet) -> bool:
+    """Whether somebody goes where neither feet nor pelvis point; not if nobody goes anywhere."""
+    fronts = _fronts(_landmarks(markers, marker_set))
+    shown = np.asarray(np.isfinite(markers.positions).any(axis=(1, 2)))
+    middle = np.nanmedian(markers.positions[shown], axis=1)
+    if not fronts or len(middle) < 2 or np.linalg.norm(_level(middle[-1] - middle[0])) < _GOES_M:
+        return False
+    way = np.broadcast_to(middle[-1] - middle[0], markers.positions[:, 0].shape)
+    return all(_cosine(front, way) < -_CLEAR for front in fronts.values())
 
 
 def _lying_trouble(places: Mapping[str, FloatArray]) -> str:
