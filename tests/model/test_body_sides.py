@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.model.body_sides import sides_trouble
+from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.trial.data import Markers
 
 SOUND = [
@@ -106,3 +106,33 @@ def test_front_and_back_of_one_side_of_the_pelvis(recorded, side):
         pytest.skip("one marker at the back of the pelvis")
     word = {"r": "right", "l": "left"}[side]
     assert f"front and back of the pelvis look swapped on the {word} side" in sides_trouble(wrong, marker_set)
+
+
+@pytest.mark.parametrize("side", "rl")
+@pytest.mark.parametrize(("other", "where"), [("heel", "behind the heel"), ("metatarsal", "beyond the toes")])
+def test_ankle_and_heel_or_toe_swapped_in_every_file(recorded, side, other, where):
+    markers, marker_set = recorded
+    swapped = exchanged(markers, marker_set, (f"ankle_lateral_{side}", f"{other}_{side}"))
+    if swapped is None:
+        pytest.skip("has no such marker")
+    trouble = sides_trouble(swapped, marker_set)
+    assert "look swapped" in trouble
+    assert where in trouble
+
+
+@pytest.mark.parametrize(("thigh", "shank"), [("RTHI", "RTIB"), ("LTHI", "LTIB"), ("R.TH2", "R.SH2")])
+def test_a_wand_of_the_thigh_and_one_of_the_shank_swapped_in_every_file(recorded, thigh, shank):
+    markers, marker_set = recorded
+    if not {thigh, shank} <= set(markers.labels):
+        pytest.skip("has no such marker")
+    other = {thigh: shank, shank: thigh}
+    swapped = Markers(markers.time, tuple(other.get(label, label) for label in markers.labels), markers.positions)
+    assert f"{thigh} of the thigh is" in sides_trouble(swapped, marker_set)
+
+
+def test_who_walks_backwards(recorded):
+    markers, marker_set = recorded
+    assert not walks_backwards(markers, marker_set)
+    backwards = Markers(markers.time, markers.labels, markers.positions[::-1])
+    goes = np.nanmedian(markers.positions[-1] - markers.positions[0], axis=0)[[0, 2]]
+    assert walks_backwards(backwards, marker_set) == (np.linalg.norm(goes) > 0.5)

@@ -1,5 +1,7 @@
 """A static trial of another person is told by its lengths; the person's own never is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -81,3 +83,13 @@ def test_front_and_back_of_the_pelvis_exchanged_in_one_trial(person):
     assert trouble.count(" and ") >= 3
     assert "look swapped" in trouble
     assert all(label in trouble for label in other)
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.03])
+def test_another_scale_of_the_cameras(person, factor):
+    static, walk, marker_set = person
+    scaled = replace(walk, positions=factor * walk.positions)
+    (doubt,) = session_doubts(static, scaled, marker_set)
+    assert "all alike" in doubt
+    assert "longer" in doubt if factor > 1 else "shorter" in doubt
+    assert float(doubt.partition("segment are ")[2].partition(" %")[0]) == pytest.approx(3.0, abs=1.0)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
@@ -215,3 +216,12 @@ def test_squats_are_not_doubted(measured_recording):
     """The markers' centre goes back where the centre of mass does not: the trunk bends."""
     squats = measured_recording("subject4/squats1.trc", "subject4/squats1_grf.mot")
     assert trouble_of(squats, read_marker_set(Path(__file__).parents[1] / "subject4.toml")) == ""
+
+
+@pytest.mark.parametrize("degrees", [5.0, -4.0])
+def test_plates_that_are_not_level(walk, degrees):
+    """Weight along a horizontal axis looks like its zero: the message says how far from level it would be."""
+    turn = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+    trouble = trouble_of(with_force(walk, lambda force: force @ turn.T))
+    assert "the zero of that axis is wrong" in trouble
+    assert float(trouble.partition("differ by ")[2].partition(" degrees")[0]) == pytest.approx(abs(degrees), abs=1.0)

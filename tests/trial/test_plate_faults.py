@@ -87,3 +87,29 @@ def test_zeros_in_the_middle_of_stance_are_named():
     sentence = loads_trouble(replace(plate, force=force))
     assert sentence.startswith("all plates read zero from 1.200 to 1.299 s, between samples of ")
     assert "samples were lost" in sentence
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_horizontal_amplifier_at_the_end_of_its_range(sign):
+    plate = plates()
+    force = plate.force.copy()
+    loaded = force[:, 0, 1] > 0
+    push = sign * 150.0 * np.sin(2 * np.pi * (TIME - 1) / 0.6)
+    force[loaded, 0, 0] = push[loaded]
+    assert loads_doubts(replace(plate, force=force)) == []
+    force[..., 0] = sign * np.minimum(sign * force[..., 0], 90.0)
+    (sentence,) = loads_doubts(replace(plate, force=force))
+    assert f"the force along X of plate 1 stays at {sign * 90.0:.1f} N" in sentence
+
+
+@pytest.mark.parametrize(("samples", "said"), [(10, 0), (60, 1), (200, 1)])
+def test_samples_that_are_held(samples, said):
+    plate = plates()
+    force = plate.force.copy()
+    force[1200 : 1200 + samples] = force[1200]
+    doubts = loads_doubts(replace(plate, force=force))
+    assert len(doubts) == said
+    # long ones are refused: they shift where loads begin and end
+    assert bool(loads_trouble(replace(plate, force=force))) == (samples > 100)
+    if said:
+        assert f"reads exactly the same in all its channels from 1.200 to {1.199 + samples / 1000:.3f} s" in doubts[0]

@@ -9,11 +9,12 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from kinertia.errors import TrialError
-from kinertia.model.body_sides import sides_trouble
+from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.model.torn_segments import torn_segments_trouble
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
 from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, plate_sign_trouble
@@ -22,6 +23,7 @@ from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
+from kinertia.trial.mains_hum import hum_doubts, hum_trouble
 from kinertia.trial.marker_faults import (
     exchanged_trouble,
     jump_doubts,
@@ -30,7 +32,10 @@ from kinertia.trial.marker_faults import (
     straight_doubts,
 )
 from kinertia.trial.marker_quality import axes_trouble, extent_m
+from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+from kinertia.trial.torque_point import torque_point_doubts
+from kinertia.trial.walkway_slope import walkway_slope_doubts
 
 
 class Doubt(NamedTuple):
@@ -74,6 +79,7 @@ def trial_doubts(
     own = _worn(markers, marker_set)
     trouble = (
         axes_trouble(extent_m(own))
+        or made_up_frames_trouble(own)
         or spikes_trouble(own)
         or _sides(markers, marker_set)
         or lost_frames_trouble(own)
@@ -85,20 +91,26 @@ def trial_doubts(
         trouble = body_trouble(static.markers, markers, marker_set)
         session = [] if trouble else session_doubts(static.markers, markers, marker_set)
     if not trouble and recording.plates is not None:
-        trouble = loads_trouble(recording.plates)
+        trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)
         if not trouble and feet is not None:
             trouble = load_places_trouble(recording, feet)
     if trouble:
         return _refused(trouble)
-    # a stretch that was written by a computer often ends with a jump
-    straight = straight_doubts(own, dict(marker_set.segments) if marker_set else {})
+    ways = _ways_doubts(own, marker_set)
+    if not ways and marker_set is not None and (torn := torn_segments_trouble(own, marker_set)):
+        return _refused(torn)
     computed = [] if marker_set is None else computed_doubts(own, marker_set)
-    sentences = [*straight, *jump_doubts(own), *computed, *session]
+    sentences = [*ways, *computed, *session]
+    if recording.belt is None and feet is not None:
+        sentences += walkway_slope_doubts(markers, feet)
     if recording.belt is not None and feet is not None:
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
-        sentences += loads_doubts(recording.plates)
-        sentences += [] if feet is None else load_places_doubts(recording, feet)
+        sentences += [*hum_doubts(recording.plates), *loads_doubts(recording.plates)]
+        sentences += torque_point_doubts(recording.plates)
+        # what is usual of loads under feet is of people who land on the heel
+        backwards = marker_set is not None and walks_backwards(markers, marker_set)
+        sentences += [] if feet is None or backwards else load_places_doubts(recording, feet)
     return _told(sentences)
 
 
@@ -137,6 +149,16 @@ def warnings_of(name: str, doubts: Sequence[Doubt]) -> list[str]:
         if one.refused:
             raise TrialError(name, one.sentence)
     return [f"{name}: {one.sentence}" for one in doubts]
+
+
+def _ways_doubts(own: Markers, marker_set: MarkerSet | None) -> list[str]:
+    """What speaks against the ways of single markers; where all are rounded or noisy, they only seem to."""
+    if rounded := rounded_trouble(own):
+        return [rounded]
+    if noisy := noisy_doubts(own):
+        return noisy
+    # a stretch that was written by a computer often ends with a jump
+    return [*straight_doubts(own, dict(marker_set.segments) if marker_set else {}), *jump_doubts(own)]
 
 
 def _worn(markers: Markers, marker_set: MarkerSet | None) -> Markers:

@@ -20,6 +20,7 @@ from kinertia.estimation.input_checks import (
 from kinertia.estimation.joint_widths import with_widths
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.repeated_trials import repeated_trials
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.unseen_body import unseen_body
 from kinertia.io.marker_set_file import choose_marker_set
@@ -157,6 +158,7 @@ def prepare(
         raise SettingsError("two-level knows the body only; where something is attached, use the default method")
     recordings = [item.recording for item in inputs]
     subject, warnings = complete_subject(subject, [static, *recordings])
+    warnings += repeated_trials(recordings, [item.window_s for item in inputs])
     if marker_set is None:
         marker_set = choose_marker_set(static.markers.labels)
     else:

@@ -21,6 +21,7 @@ from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
+from kinertia.estimation.repeated_trials import repeated_trials
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
@@ -55,6 +56,7 @@ def prepare_osim(
     """
     settings = settings or Settings()
     subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
+    warnings += repeated_trials([item.recording for item in inputs], [item.window_s for item in inputs])
     if not model.skeleton.markers:
         raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
     feet = _feet(model)

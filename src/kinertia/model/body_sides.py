@@ -23,6 +23,8 @@ _OPPOSED = 0.2
 _FLAT = 0.8
 """Cosine of 37 degrees."""
 _BELOW_M = 0.05
+_GOES_M = 0.5
+_BEHIND, _BEYOND = -0.1, 1.1
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
@@ -70,9 +72,22 @@ def sides_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         )
     return (
         _order_trouble(places, marker_set)
+        or _ankle_trouble(places, marker_set)
+        or _thigh_trouble(markers, marker_set)
         or _outside_trouble(places, right, marker_set)
         or _elbow_trouble(places, right, marker_set)
     )
+
+
+def walks_backwards(markers: Markers, marker_set: MarkerSet) -> bool:
+    """Whether somebody goes where neither feet nor pelvis point; not if nobody goes anywhere."""
+    fronts = _fronts(_landmarks(markers, marker_set))
+    shown = np.asarray(np.isfinite(markers.positions).any(axis=(1, 2)))
+    middle = np.nanmedian(markers.positions[shown], axis=1)
+    if not fronts or len(middle) < 2 or np.linalg.norm(_level(middle[-1] - middle[0])) < _GOES_M:
+        return False
+    way = np.broadcast_to(middle[-1] - middle[0], markers.positions[:, 0].shape)
+    return all(_cosine(front, way) < -_CLEAR for front in fronts.values())
 
 
 def _lying_trouble(places: Mapping[str, FloatArray]) -> str:
@@ -208,6 +223,53 @@ def _order_trouble(places: Mapping[str, FloatArray], marker_set: MarkerSet) -> s
                     f"{_names(marker_set, upper)} is {-1e3 * np.median(known):.0f} mm below "
                     f"{_names(marker_set, lower)}: their labels look swapped; correct them"
                 )
+    return ""
+
+
+def _ankle_trouble(places: Mapping[str, FloatArray], marker_set: MarkerSet) -> str:
+    """Along the line from the heel to the toes ankles are 22 to 48 % of the way (12 people); not behind, nor beyond."""
+    for side in "rl":
+        toe = next((name for name in (f"metatarsal_{side}", f"toe_{side}") if name in places), "")
+        heel, ankle = f"heel_{side}", f"ankle_lateral_{side}"
+        if not toe or not {heel, ankle} <= set(places):
+            continue
+        along = places[toe] - places[heel]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shares = ((places[ankle] - places[heel]) * along).sum(axis=1) / np.square(along).sum(axis=1)
+        shares = shares[np.isfinite(shares)]
+        share = float(np.median(shares)) if shares.size else 0.5
+        if _BEHIND < share < _BEYOND:
+            continue
+        other = heel if share <= _BEHIND else toe
+        where = "behind the heel" if share <= _BEHIND else "beyond the toes"
+        return (
+            f"the labels {_names(marker_set, ankle, other)} look swapped: the {_WORDS[side]} ankle would be {where}, "
+            f"at {100 * share:.0f} % of the way from the heel to the toes (20 to 50 % is usual); correct the labels"
+        )
+    return ""
+
+
+def _thigh_trouble(markers: Markers, marker_set: MarkerSet) -> str:
+    """A marker of the thigh that is below the knee, beside one of the shank that is above it."""
+    joints = {label for name, labels in marker_set.landmarks.items() if "wand" not in name for label in labels}
+    for side in "rl":
+        knee = marker_set.landmarks.get(f"knee_lateral_{side}", ("",))[0]
+        if knee not in markers.labels:
+            continue
+        above = {}
+        for part in ("thigh", "shank"):
+            own = set(marker_set.segments.get(f"{part}_{side}", ())) - joints
+            for label in sorted(own & set(markers.labels)):
+                heights = np.subtract(*markers.select((label, knee)).positions[..., 1].T)
+                heights = heights[np.isfinite(heights)]
+                above[part, label] = float(np.median(heights)) if heights.size else 0.0
+        low = min(((height, label) for (part, label), height in above.items() if part == "thigh"), default=(0.0, ""))
+        high = max(((height, label) for (part, label), height in above.items() if part == "shank"), default=(0.0, ""))
+        if low[0] < -_BELOW_M and high[0] > _BELOW_M:
+            return (
+                f"{low[1]} of the thigh is {-1e3 * low[0]:.0f} mm below the knee ({knee}), and {high[1]} of the shank "
+                f"is {1e3 * high[0]:.0f} mm above it: their labels look swapped; correct them"
+            )
     return ""
 
 

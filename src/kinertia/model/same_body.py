@@ -29,6 +29,8 @@ _ELSEWHERE_M = 0.03
 _SAME_SESSION_M = 0.009
 """RMS difference of the distances: markers put on anew are 5 to 10 mm elsewhere along each axis, which makes 7 to 14.
 """
+_OTHER_SCALE, _LEFT_OF_SCALE = 0.017, 0.75
+"""On eight sound pairs of trials 0.010 at most; markers put on anew by 5 to 10 mm leave 0.8 and more of it."""
 _FRAMES = 60
 
 
@@ -82,6 +84,8 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
         return []
     off = distances.differences()
     typical = float(np.sqrt(np.square(off).mean()))
+    if scaled := _scaled(distances):
+        return [scaled]
     far = np.abs(off) > _ELSEWHERE_M
     # one marker that moved takes all of its distances along
     about = [np.abs(off[(distances.pairs == k).any(axis=1)]) for k in range(len(distances.labels))]
@@ -106,6 +110,24 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
             "with the markers put on anew, or of another person; give the one of this session"
         ]
     return []
+
+
+def _scaled(distances: _Distances) -> str:
+    """All distances are longer, or shorter, by the same share; empty where they are not, or by little."""
+    before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
+    if len(before) < _FEWEST_PAIRS:
+        return ""
+    factor = float(before @ after / (before @ before))
+    left = float(np.sqrt(np.square(after - factor * before).mean() / np.square(after - before).mean()))
+    share = float(np.median(after / before)) - 1.0
+    if min(abs(factor - 1.0), abs(share)) < _OTHER_SCALE or left > _LEFT_OF_SCALE:
+        return ""
+    return (
+        f"distances between markers of one segment are {100 * abs(share):.1f} % {'longer' if share > 0 else 'shorter'} "
+        f"than in the static trial, all alike (median of {len(before)}; scaled by that, {100 * left:.0f} % of their "
+        "differences are left): the cameras were calibrated anew in between, with another length of the wand in the "
+        "software for one of them; correct the scale of that file, or give a static trial of this calibration"
+    )
 
 
 def _swapped(distances: _Distances) -> str:

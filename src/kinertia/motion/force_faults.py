@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.caused_velocity import (
     LEAST_CHANGE_M_S,
     CausedVelocity,
@@ -122,14 +123,19 @@ def _turn(changes: VelocityChanges) -> tuple[float, float]:
 
 def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     """A horizontal force that no motion of the pelvis' markers accounts for; empty where there is none."""
-    agreements = agreement(trial, owners)
+    parts = caused_velocities(trial, owners)
+    agreements = _agreement(parts) if parts else {}
     off = {axis: one.offset_n for axis, one in agreements.items() if abs(one.offset_n) > one.limit_n}
     if not off:
         return ""
     shown = ", ".join(f"{value:+.0f} N along {axis}" for axis, value in off.items())
+    weight_n = GRAVITY_M_S2 * float(np.mean([part.mass_kg for part in parts]))
+    tilt_deg = float(np.degrees(np.arctan(np.linalg.norm(list(off.values())) / weight_n)))
     return (
         f"the plates show {shown} on average that do not accelerate the body; the zero of that axis is wrong: zero the "
-        f"plates without load, or subtract it before export"
+        f"plates without load, or subtract it before export; or, if they read nothing of it while nobody stands on "
+        f"them, the verticals of plates and cameras differ by {tilt_deg:.1f} degrees (weight along that axis): level "
+        "the plates, or calibrate the cameras on a level floor"
     )
 
 

@@ -21,6 +21,9 @@ _NOTHING_N, _FEWEST_CARRIED = 0.5, 10
 """Amplifiers have more noise than this; so many samples under load, at least."""
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes there steeply."""
+_FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
+_HELD_S, _LONG_HELD_S, _FEWEST_HELD, _LEAP_STEPS = 0.025, 0.1, 3, 3.0
+"""Loads of 25 sound trials never stay the same in all channels for more than 2 ms."""
 _ROUNDED = 6.0
 """A peak that is flat for being rounded is at most 4.5 times what it is rounded to above what was as long before."""
 _IDLE_PERCENT = (2.0, 15.0)
@@ -38,6 +41,8 @@ def loads_trouble(plates: PlateLoads) -> str:
         )
     if trouble := _lost_samples(plates) or _far_from_zero(plates) or _never_unloaded(plates) or _hardly_loaded(plates):
         return trouble
+    if held := _held_samples(plates, _LONG_HELD_S):
+        return held[0]
     wrench = np.concatenate((plates.force, plates.moment), axis=2)
     arms = np.abs(free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
     arms /= plates.force[..., 1][plates.force[..., 1] > FIRM_LOAD_N]
@@ -52,7 +57,7 @@ def loads_trouble(plates: PlateLoads) -> str:
 
 def loads_doubts(plates: PlateLoads) -> list[str]:
     """Saturated amplifiers; zeros that are wrong or drift, by what plates read while nobody stands on them."""
-    doubts = _dead_channels(plates) + _saturated(plates)
+    doubts = _dead_channels(plates) + (_held_samples(plates) or _saturated(plates))
     if plates.idle is None:
         return doubts
     for name, idle in zip(plates.names, plates.idle, strict=True):
@@ -108,24 +113,57 @@ def _shows_nothing(values: FloatArray) -> bool:
 
 
 def _saturated(plates: PlateLoads) -> list[str]:
-    """Vertical forces that reach their largest value and stay there, where a foot's would have gone on."""
+    """Forces that reach their largest value along an axis and stay there, where a foot's would have gone on."""
     doubts = []
-    for name, vertical in zip(plates.names, plates.force[..., 1].T, strict=True):
-        top = float(vertical.max(initial=0.0))
-        flat = [
-            (first, last)
-            for first, last in runs(vertical >= top * (1.0 - _SAME))
-            if last - first >= _FEWEST_FLAT and plates.time[last] - plates.time[first] >= _FLAT_S
+    for name, force in zip(plates.names, np.moveaxis(plates.force, 1, 0), strict=True):
+        # upwards a person weighs; sideways a foot pushes as hard one way as the other
+        values = {"vertical force": force[:, 1], "force along X": force[:, 0], "force along Z": force[:, 2]}
+        for what, one in values.items():
+            for signed in (one,) if what == "vertical force" else (one, -one):
+                top = float(signed.max(initial=0.0))
+                lasted = _lasts_at_top(plates.time, signed, top)
+                if top > (_FULL_RANGE_N if what == "vertical force" else _FULL_RANGE_ACROSS_N) and lasted:
+                    doubts.append(
+                        f"the {what} of {name} stays at {one[int(np.argmax(signed))]:.1f} "
+                        f"N, its largest value, for up to {1e3 * lasted:.0f} ms: its amplifier or converter is at the "
+                        "end of its range, and more was there than it shows; choose a larger range and record the "
+                        "trial again, or use one without such a step"
+                    )
+    return doubts
+
+
+def _lasts_at_top(time: FloatArray, values: FloatArray, top: float) -> float:
+    """How long (s) values (k,) stay exactly at their largest, having come there steeply; 0 where they do not."""
+    flat = [
+        (first, last)
+        for first, last in runs(values >= top * (1.0 - _SAME))
+        if last - first >= _FEWEST_FLAT and time[last] - time[first] >= _FLAT_S
+    ]
+    steps = np.diff(np.unique(values))
+    rise = max(_STEEP * top, _ROUNDED * float(steps.min(initial=top)))
+    return max((float(time[b] - time[a]) for a, b in flat if top - values[max(2 * a - b, 0)] > rise), default=0.0)
+
+
+def _held_samples(plates: PlateLoads, least_s: float = _HELD_S) -> list[str]:
+    """Stretches in which a plate that carries somebody reads exactly the same, in all its channels, for so long."""
+    doubts = []
+    for p, name in enumerate(plates.names):
+        wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
+        same = np.equal(np.diff(wrench, axis=0), 0.0).all(axis=1) & (wrench[1:, 1] > FIRM_LOAD_N)
+        # forces that are rounded stay, and go on by one step
+        leap = _LEAP_STEPS * float(np.diff(np.unique(wrench[:, 1])).min(initial=np.inf))
+        held = [
+            (float(plates.time[first]), float(plates.time[last + 1]))
+            for first, last in runs(same)
+            if last - first + 1 >= _FEWEST_HELD and plates.time[last + 1] - plates.time[first] >= least_s
+            if last + 2 < len(wrench) and abs(wrench[last + 2, 1] - wrench[last, 1]) > leap
         ]
-        steps = np.diff(np.unique(vertical))
-        rise = max(_STEEP * top, _ROUNDED * float(steps.min(initial=top)))
-        cut = [(a, b) for a, b in flat if top - vertical[max(2 * a - b, 0)] > rise]
-        if top > _STEP_N and cut:
-            lasted = max(float(plates.time[b] - plates.time[a]) for a, b in cut)
+        if held:
+            start, end = max(held, key=lambda span: span[1] - span[0])
             doubts.append(
-                f"the vertical force of {name} stays at {top:.1f} N, its largest value, for up to "
-                f"{1e3 * lasted:.0f} ms: its amplifier or converter is at the end of its range, and more was there "
-                "than it shows; choose a larger range and record the trial again, or use one without such a step"
+                f"{name} reads exactly the same in all its channels from {start:.3f} to {end:.3f} s, under load: "
+                "samples were lost and the last one was repeated, or a gap was filled with it; export the forces "
+                "again, or leave this trial out"
             )
     return doubts
 

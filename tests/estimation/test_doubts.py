@@ -1,0 +1,29 @@
+"""What is usual of people who walk forwards is not held against those who walk backwards."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.estimation.doubts import trial_doubts
+from kinertia.io.marker_set_file import choose_marker_set
+from recorded_walks import WALKS
+
+
+def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(measured_recording):
+    """Played backwards, a walk obeys the same laws."""
+    walk = measured_recording(*WALKS["plug-in gait b"])
+    plates, markers = walk.plates, walk.markers
+    then = markers.time[0] + markers.time[-1] - plates.time
+    turned = {
+        name: np.stack([np.interp(then, plates.time, one) for one in part.reshape(len(part), -1).T], axis=1).reshape(
+            part.shape
+        )
+        for name, part in (("force", plates.force), ("moment", plates.moment))
+    }
+    backwards = replace(
+        walk, markers=replace(markers, positions=markers.positions[::-1]), plates=replace(plates, **turned)
+    )
+    marker_set = choose_marker_set(markers.labels)
+    feet = {side: [one for one in own if one in markers.labels] for side, own in marker_set.foot_labels().items()}
+    assert trial_doubts(walk, marker_set, None, feet) == []
+    assert trial_doubts(backwards, marker_set, None, feet) == []

@@ -1,0 +1,39 @@
+"""One recording that is listed as two trials is told; two windows of one recording are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.prepare import TrialInput, prepare
+from kinertia.estimation.repeated_trials import repeated_trials
+from kinertia.settings import Subject
+from recorded_walks import WALKS
+
+
+@pytest.fixture(scope="module")
+def walk(measured_recording):
+    return measured_recording(*WALKS["plug-in gait a"])
+
+
+def test_a_recording_that_is_listed_twice(walk):
+    again = replace(walk, name="walk 2")
+    (warning,) = repeated_trials([walk, again], [None, None])
+    assert f"'{walk.name}' and 'walk 2' have the same markers" in warning
+
+
+def test_two_windows_of_a_recording(walk):
+    assert repeated_trials([walk, walk], [(2.7, 3.0), (3.0, 3.4)]) == []
+    assert len(repeated_trials([walk, walk], [(2.7, 3.1), (3.0, 3.4)])) == 1
+
+
+def test_two_recordings(walk):
+    other = replace(walk, markers=replace(walk.markers, positions=np.round(walk.markers.positions, 4)))
+    assert repeated_trials([walk, other], [None, None]) == []
+
+
+def test_the_fit_says_so(walk, measured_recording):
+    static = measured_recording("pig_c3d/subject_a_static.c3d")
+    subject = Subject(name="A", sex="male", mass_kg=41.5, height_m=1.61)
+    ready = prepare(subject, static, [TrialInput(walk), TrialInput(replace(walk, name="walk 2"))])
+    assert any("have the same markers to the last digit" in warning for warning in ready.warnings)

@@ -1,0 +1,69 @@
+"""Frames that were made up, coordinates that were rounded and noisy markers are named; sound recordings never are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
+from recorded_walks import WALKS
+
+OTHERS = {
+    "run": ("field/rajagopal_run/motion_capture_run.trc", None),
+    "run at 60 Hz": ("field/hamner_run/subject02_running.trc", None),
+    "jump": ("field/laiarnold5_jump/DJ1.trc", None),
+    "squats": ("subject4/squats1.trc", None),
+    "OpenCap": ("subject4/walking1.trc", None),
+    "standing": ("gait2354/subject01_static.trc", None),
+    "coordinates of 16 bits": ("c3d_variety/subject_prefixed_labels.c3d", None),
+}
+
+
+def all_of(markers):
+    return [made_up_frames_trouble(markers), rounded_trouble(markers), *noisy_doubts(markers)]
+
+
+@pytest.mark.parametrize("name", [*WALKS, *OTHERS])
+def test_sound_recordings(name, measured_recording):
+    assert not any(all_of(measured_recording(*{**WALKS, **OTHERS}[name]).markers))
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, measured_recording):
+    return measured_recording(*WALKS[request.param]).markers
+
+
+@pytest.mark.parametrize("times", [2, 3, 4])
+def test_frames_that_are_held(walk, times):
+    held = replace(walk, positions=walk.positions[np.arange(len(walk.time)) // times * times])
+    trouble = made_up_frames_trouble(held)
+    assert "repeats the one before it" in trouble
+    assert f"at about {walk.rate_hz / times:.0f} Hz" in trouble
+
+
+def test_frames_that_are_drawn_between_others(walk):
+    kept = np.arange(0, len(walk.time), 4)
+    rows = np.arange(kept[-1] + 1)
+    share = (rows % 4 / 4)[:, None, None]
+    before, after = walk.positions[rows // 4 * 4], walk.positions[np.minimum(rows // 4 * 4 + 4, kept[-1])]
+    drawn = replace(walk, time=walk.time[rows], positions=(1 - share) * before + share * after)
+    assert "straight line between others" in made_up_frames_trouble(drawn)
+
+
+@pytest.mark.parametrize("step_m", [0.002, 0.005, 0.01])
+def test_coordinates_that_were_rounded(walk, step_m):
+    trouble = rounded_trouble(replace(walk, positions=np.round(walk.positions / step_m) * step_m))
+    assert f"multiples of {1e3 * step_m:.3g} mm" in trouble
+
+
+def test_coordinates_in_whole_millimetres(walk):
+    assert rounded_trouble(replace(walk, positions=np.round(walk.positions, 3))) == ""
+
+
+@pytest.mark.parametrize(("sd_m", "said"), [(0.001, 0), (0.004, 1), (0.01, 1)])
+def test_noise(walk, sd_m, said):
+    noise = np.random.default_rng(4).normal(0.0, sd_m, walk.positions.shape)
+    doubts = noisy_doubts(replace(walk, positions=walk.positions + noise))
+    assert len(doubts) == said
+    if said:
+        assert float(doubts[0].partition("by ")[2].partition(" mm")[0]) == pytest.approx(1e3 * sd_m, rel=0.2)

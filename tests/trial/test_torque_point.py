@@ -1,0 +1,43 @@
+"""Vertical moments about a plate's middle in the place of free moments are named; free moments never are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
+from kinertia.trial.torque_point import torque_point_doubts
+from recorded_walks import WALKS
+
+OTHERS = {
+    "OpenCap": ("subject4/walking1.trc", "subject4/walking1_grf.mot"),
+    "OpenCap, squats": ("subject4/squats1.trc", "subject4/squats1_grf.mot"),
+    "run": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
+    "drop jump": ("field/laiarnold5_jump/DJ1.trc", "field/laiarnold5_jump/DJ1_forces.mot"),
+    "treadmill": ("field/hamner_treadmill_run/run200.trc", "field/hamner_treadmill_run/run200_grf.mot"),
+    "AMTI": ("c3d_variety/subject_prefixed_labels.c3d", None),
+}
+MISTAKEN = {**WALKS, "OpenCap": OTHERS["OpenCap"], "run": OTHERS["run"]}
+
+
+@pytest.mark.parametrize("name", [*WALKS, *OTHERS])
+def test_free_moments(name, measured_recording):
+    assert torque_point_doubts(measured_recording(*{**WALKS, **OTHERS}[name]).plates) == []
+
+
+@pytest.mark.parametrize("name", MISTAKEN)
+def test_moments_about_the_middle(name, measured_recording):
+    plates = measured_recording(*MISTAKEN[name]).plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    loaded = plates.force[..., 1] > FIRM_LOAD_N
+    used = np.flatnonzero(loaded.sum(axis=0) > 20)
+    moment, middles = plates.moment.copy(), {}
+    for p in used:
+        on_it = point[loaded[:, p], p].mean(axis=0)
+        middles[plates.names[p]] = middle = on_it if plates.corners is None else plates.corners[p].mean(axis=0)
+        extra = np.cross(point[:, p] - middle, plates.force[:, p])[:, 1]
+        moment[:, p, 1] += np.where(loaded[:, p], extra, 0.0)
+    (doubt,) = torque_point_doubts(replace(plates, moment=moment))
+    named = [plate for plate in middles if f"those of {plate} are" in doubt]
+    assert named
+    assert "free moment" in doubt
