@@ -50,6 +50,18 @@ def test_frames_that_are_drawn_between_others(walk):
     assert "straight line between others" in made_up_frames_trouble(drawn)
 
 
+def test_standing_still_before_the_motion_is_not_made_up(walk):
+    """Filtered markers of a person who sways slowly bend as little as straight lines do, for seconds."""
+    frames = int(0.85 * len(walk.time))
+    sway = 0.005 * np.sin(2 * np.pi * 0.3 * (np.arange(frames) - frames) / walk.rate_hz)
+    standing = walk.positions[0] + sway[:, None, None] * [1.0, 0.0, 0.3]
+    positions = np.concatenate([standing, walk.positions])
+    time = walk.time[0] + np.arange(len(positions)) / walk.rate_hz
+    assert made_up_frames_trouble(replace(walk, time=time, positions=positions)) == ""
+    frozen = np.concatenate([np.repeat(walk.positions[:1], frames, axis=0), walk.positions])
+    assert made_up_frames_trouble(replace(walk, time=time, positions=frozen)) == ""
+
+
 @pytest.mark.parametrize("step_m", [0.002, 0.005, 0.01])
 def test_coordinates_that_were_rounded(walk, step_m):
     trouble = rounded_trouble(replace(walk, positions=np.round(walk.positions / step_m) * step_m))

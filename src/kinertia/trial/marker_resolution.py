@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
 
 _FEWEST_FRAMES = 11
 _REPEATED_SHARE, _BETWEEN_SHARE = 0.25, 0.4
@@ -17,6 +17,8 @@ _REPEATED_SHARE, _BETWEEN_SHARE = 0.25, 0.4
 _ALIKE, _BETWEEN, _LEAST_MOTION_M = 0.9, 0.03, 1e-3
 """Most markers stand still at once, while in other frames they go on; and of how much the quick frames bend, the others
 bend less."""
+_LONGEST_S = 0.15
+"""Between two frames that were measured; who stands still, or is frozen, is so for longer."""
 _COARSE_M, _STEPS = 0.0015, 1e-3
 _NOISY_M, _USUAL_HZ = 0.0025, 60.0
 _THIRD_DIFFERENCE = float(np.sqrt(20.0))
@@ -33,8 +35,8 @@ def made_up_frames_trouble(markers: Markers) -> str:
     place = markers.positions
     if len(place) < _FEWEST_FRAMES:
         return ""
-    repeated = _repeated(place)
-    between = _between(place)
+    repeated = _for_moments(_repeated(place), markers.rate_hz)
+    between = _for_moments(_between(place), markers.rate_hz)
     if repeated.mean() > _REPEATED_SHARE:
         true_hz, what = markers.rate_hz * (1.0 - repeated.mean()), "repeats the one before it, in all markers at once"
         share = repeated.mean()
@@ -86,6 +88,15 @@ def marker_noise_m(markers: Markers) -> float:
     if not seen.any():
         return np.nan
     return float(np.median(np.nanmedian(jerk[:, seen], axis=(0, 2)))) * _GAUSSIAN / _THIRD_DIFFERENCE
+
+
+def _for_moments(mask: BoolArray, rate_hz: float) -> BoolArray:
+    """The mask without its long runs."""
+    kept = mask.copy()
+    for first, last in runs(mask):
+        if last - first + 1 > _LONGEST_S * rate_hz:
+            kept[first : last + 1] = False
+    return kept
 
 
 def _repeated(place: FloatArray) -> BoolArray:
