@@ -113,3 +113,11 @@ def test_samples_that_are_held(samples, said):
     assert bool(loads_trouble(replace(plate, force=force))) == (samples > 100)
     if said:
         assert f"reads exactly the same in all its channels from 1.200 to {1.199 + samples / 1000:.3f} s" in doubts[0]
+
+
+def test_late_forces_that_begin_with_copies_of_the_first_are_not_held():
+    plate, rows = plates(), slice(1200, 1500)
+    force, moment = (values[rows][np.maximum(np.arange(300) - 100, 0)] for values in (plate.force, plate.moment))
+    late = replace(plate, time=plate.time[rows], force=force, moment=moment)
+    assert loads_doubts(late) == []
+    assert loads_trouble(late) == ""

@@ -150,12 +150,12 @@ def _held_samples(plates: PlateLoads, least_s: float = _HELD_S) -> list[str]:
     for p, name in enumerate(plates.names):
         wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
         same = np.equal(np.diff(wrench, axis=0), 0.0).all(axis=1) & (wrench[1:, 1] > FIRM_LOAD_N)
-        # forces that are rounded stay, and go on by one step
+        # forces that are rounded stay, and go on by one step; before late ones a file may be filled up with the first
         leap = _LEAP_STEPS * float(np.diff(np.unique(wrench[:, 1])).min(initial=np.inf))
         held = [
             (float(plates.time[first]), float(plates.time[last + 1]))
             for first, last in runs(same)
-            if last - first + 1 >= _FEWEST_HELD and plates.time[last + 1] - plates.time[first] >= least_s
+            if first > 0 and last - first + 1 >= _FEWEST_HELD and plates.time[last + 1] - plates.time[first] >= least_s
             if last + 2 < len(wrench) and abs(wrench[last + 2, 1] - wrench[last, 1]) > leap
         ]
         if held:
