@@ -51,6 +51,10 @@ Sentences and changes of the joint moments are in `faults.json`.
   markers show in the Plug-in Gait walk of subject A, and 0.8 to 1.05 times (by the markers' centre) on sound trials.
 - A zero of one loaded plate, or a gain by less than 7.5 %, in less than a second of measured steps: its share of so
   short a motion is not told from what pelvis and limbs do against one another.
+- What is told by another cause, or hardly: somebody else's foot on a plate, a step over its edge and cameras that are
+  tilted to the side (gains and places of plates are doubted), free moments that are too large, forces of another trial
+  of the same person (a rate), an origin of the plates 40 mm too deep, and forces that were low-passed at 5 Hz or rounded
+  to 20 N (moments change by 1.2 to 3 deviations, and nothing is said).
 
 ## What is said of sound walks
 
