@@ -53,8 +53,8 @@ Sentences and changes of the joint moments are in `faults.json`.
   short a motion is not told from what pelvis and limbs do against one another.
 - What is told by another cause, or hardly: somebody else's foot on a plate, a step over its edge and cameras that are
   tilted to the side (gains and places of plates are doubted), free moments that are too large, forces of another trial
-  of the same person (a rate), an origin of the plates 40 mm too deep, and forces that were low-passed at 5 Hz or rounded
-  to 20 N (moments change by 1.2 to 3 deviations, and nothing is said).
+  of the same person (a rate). Of an origin of the plates 40 mm too deep, and of forces that were low-passed at 5 Hz or
+  rounded to 20 N nothing is said, and moments change by 1.2 to 3 deviations.
 
 ## What is said of sound walks
 
