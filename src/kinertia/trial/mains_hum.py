@@ -34,18 +34,19 @@ def _sentence(plates: PlateLoads, least_n: float) -> str:
     loudest: tuple[float, str] = (0.0, "")
     for p, name in enumerate(plates.names):
         stretch = _longest_load(plates, p)
-        for axis in range(3) if stretch is not None else ():
-            values, time = plates.force[stretch, p, axis], plates.time[stretch]
-            for mains_hz in _MAINS_HZ:
-                hum = _amplitude(time, values, mains_hz)
-                beside = max(_amplitude(time, values, mains_hz + off) for off in _BESIDE_HZ)
-                if hum > _STANDS_OUT * max(beside, _BESIDE_N):
-                    loudest = max(loudest, (hum, f"{mains_hz:g} Hz ({name}, along {'XYZ'[axis]})"))
-    hum, where = loudest
-    if not hum > least_n:
+        if stretch is None:
+            continue
+        for mains_hz in _MAINS_HZ:
+            frequencies = mains_hz + np.array([0.0, *_BESIDE_HZ])
+            hum, *beside = _amplitudes(plates.time[stretch], plates.force[stretch, p], frequencies)
+            stands_out = hum > _STANDS_OUT * np.max([*beside, np.full(3, _BESIDE_N)], axis=0)
+            for axis in np.flatnonzero(stands_out):
+                loudest = max(loudest, (float(hum[axis]), f"{mains_hz:g} Hz ({name}, along {'XYZ'[axis]})"))
+    hum_n, where = loudest
+    if not hum_n > least_n:
         return ""
     return (
-        f"the forces hum with {hum:.0f} N at {where}: the mains, which a cable or amplifier picks up; find the "
+        f"the forces hum with {hum_n:.0f} N at {where}: the mains, which a cable or amplifier picks up; find the "
         "ground loop or the bare cable, or take that frequency out (a notch filter that does not delay) before export"
     )
 
@@ -62,10 +63,12 @@ def _longest_load(plates: PlateLoads, p: int) -> slice | None:
     return slice(first, last + 1) if (last - first) / rate_hz >= _SHORTEST_S else None
 
 
-def _amplitude(time: FloatArray, values: FloatArray, frequency_hz: float) -> float:
-    """Of one frequency, less what changes slowly."""
+def _amplitudes(time: FloatArray, forces: FloatArray, frequencies_hz: FloatArray) -> FloatArray:
+    """(f, 3) N, of these frequencies in forces (k, 3), less what changes slowly."""
     after = 2.0 * (time - time.mean()) / float(np.ptp(time))
-    rest = values - np.polynomial.Polynomial.fit(after, values, _SLOW_ORDER)(after)
-    weight = np.hanning(len(values))
-    turning = np.exp(-2j * np.pi * frequency_hz * time)
-    return 2.0 * float(np.abs((rest * weight * turning).sum()) / weight.sum())
+    slow = np.polynomial.chebyshev.chebvander(after, _SLOW_ORDER)
+    rest = forces - slow @ np.linalg.lstsq(slow, forces, rcond=None)[0]
+    weight = np.hanning(len(time))
+    turning = np.exp(-2j * np.pi * np.outer(frequencies_hz, time))
+    result: FloatArray = 2.0 * np.abs(turning @ (weight[:, None] * rest)) / weight.sum()
+    return result
