@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.file_names import RESULT_FILES
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
@@ -93,7 +94,7 @@ def _expect_files(folder: Path) -> list[Path]:
     Raises:
         FileError: there are none, or a name that no subject file can hold.
     """
-    files = sorted(folder.iterdir())
+    files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))  # archives of Macs have twins
     for file in files:
         if not _is_utf8(file.name):
             raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
@@ -162,8 +163,11 @@ def _duration_s(file: Path) -> float:
 
 
 def _head(file: Path) -> str:
-    with file.open("rb") as stream:
-        return stream.read(20_000).decode("utf-8", errors="replace")
+    try:
+        with file.open("rb") as stream:
+            return stream.read(20_000).decode("utf-8", errors="replace")
+    except FileNotFoundError:  # a link to what is not there
+        return ""
 
 
 def is_capture(file: Path) -> bool:
@@ -191,14 +195,15 @@ def _has_plates(file: Path) -> bool:
 
 def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], bool]) -> list[Path]:
     """The files of the folder that hold it; where there are none, those of the folders in it and beside it, but for
-    folders with markers of their own: those may be another person's.
+    folders with markers of their own, which may be another person's, and for results of Kinertia.
     """
     holding = [file for file in files if holds(file)]
     if holding:
         return holding
     for other in (*files, *sorted(folder.parent.iterdir())):
         inside = sorted(file for file in other.iterdir() if file.is_file()) if other.is_dir() else []
-        if other != folder and not any(map(is_capture, inside)):
+        results = RESULT_FILES[0] in (file.name for file in inside)
+        if other != folder and not results and not any(map(is_capture, inside)):
             holding += [file for file in inside if holds(file)]
     return holding
 

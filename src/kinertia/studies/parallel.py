@@ -65,7 +65,7 @@ def interrupted_later() -> Iterator[None]:
     let_through: set[int] = set()
     if sys.platform != "win32":  # what threads and processes inherit that are started meanwhile
         resource_tracker.ensure_running()  # which lets Ctrl-C through to whoever starts it
-        let_through = {signal.SIGINT} - set(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}))
+        let_through |= {signal.SIGINT} - signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
