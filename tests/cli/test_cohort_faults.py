@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -45,6 +46,23 @@ def test_killed_at_20_random_moments_and_on_full_disks_all_are_finished_byte_for
         pytest.skip("full disks need a file system of one's own (unshare -rm)")
     assert [status for status, _ in disks] == [2, 1, 2]
     assert all("No space left on device" in words for _, words in disks)
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.parametrize("wait_s", [0.3, 0.8, 1.3])
+def test_interrupted_while_workers_start_it_ends_without_a_traceback(wait_s, tmp_path):
+    """A terminal sends Ctrl-C to all of them: the command, and processes that have not yet learnt to leave it to it."""
+    study = write_study(tmp_path / "study", ("Anna", "Ben"))
+    command = [*COMMAND, str(study), "-o", str(tmp_path / "out")]
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **piped, start_new_session=True) as process:
+        assert process.stderr.readline().strip() == "looking for changes"
+        time.sleep(wait_s)
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert set(errors.split("\n")) <= {"people", ""}
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """`kinertia population`: from people's results to a file that the fits of others start from."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from command_line import run
 from kinertia.estimation.from_files import prepare_subject
 from kinertia.estimation.person_information import information_of
 from kinertia.estimation.prior import literature_prior
-from kinertia.io.provenance import Provenance, recordings
+from kinertia.io.provenance import Provenance, command_line, recordings
 from kinertia.io.subject_file import read_subject
 from kinertia.report.saved_fit import FIT_FILE, write_fit
 
@@ -29,7 +30,8 @@ def cohort(fit, tmp_path):
         person = replace(fit, estimate=bsp, subject=fit.subject.model_copy(update={"name": f"p{k}"}))
         folder = tmp_path / "out" / "people" / f"p{k}"
         folder.mkdir(parents=True)
-        write_fit(person, Provenance("kinertia fit", {"walk.trc": f"hash{k}"}), folder / FIT_FILE)
+        files = {f"p{k}/walk.trc": f"hash{k}", "lab.toml": "marker set", f"p{k}/loads.xml": "loads"}
+        write_fit(person, Provenance("kinertia fit", files), folder / FIT_FILE)
     return tmp_path / "out"
 
 
@@ -63,6 +65,7 @@ def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
     refused = run("fit", with_group, "-o", tmp_path / "fit")
     assert refused.status == 2
     assert "was learnt from these trials, too, which would count twice" in refused.err
+    assert command_line(["--without", "synthetic walker"]) in refused.err
 
 
 @pytest.mark.slow
@@ -79,6 +82,24 @@ def test_what_cannot_be_learnt_is_said(cohort, tmp_path):
         assert words in outcome.err
     (tmp_path / "mine.toml").write_text("[subject]\n", encoding="utf-8")
     assert "not a file that kinertia population wrote" in run("population", cohort, "-o", tmp_path / "mine.toml").err
+
+
+@pytest.mark.slow
+def test_a_group_is_those_whom_the_cohort_lists_by_the_names_it_lists_them_by(cohort, tmp_path):
+    """Results stay of people who have left the study, or are called otherwise there now."""
+    people = cohort / "people"
+    shutil.copytree(people / "p0", people / "=p0")
+    listed = ["person,status", "'=p0,0", *(f"p{k},{k % 2}" for k in range(1, 5)), "p5,2"]
+    (cohort / "people.csv").write_text("\n".join(listed), encoding="utf-8")
+    outcome = run("population", cohort, "-o", tmp_path / "population.toml")
+    assert outcome.status == 0, outcome.err
+    printed = " ".join(outcome.out.split())
+    for name in ("p0", "p5"):
+        assert f"left out: {name}: has no results by people.csv, only older ones" in printed
+    text = (tmp_path / "population.toml").read_text(encoding="utf-8")
+    assert 'people = ["=p0", "p1", "p2", "p3", "p4"]' in text
+    assert "hash5" not in text
+    assert run("population", people / "p5", cohort, "-o", tmp_path / "with.toml").status == 0
 
 
 def test_information_is_what_the_prior_does_not_explain(fit):

@@ -195,6 +195,25 @@ def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path):
         init_subject(person)
 
 
+def test_init_takes_neither_hidden_twins_nor_results_of_kinertia(tmp_path):
+    """Archives of Macs have a hidden twin of every file; results beside recordings hold motion files and loads, too."""
+    folder = tmp_path / "Anna"
+    for place in (folder, tmp_path / "out"):
+        place.mkdir()
+    for name in ("static.trc", "walk.trc", "._walk.trc", "._other.c3d"):
+        (folder / name).touch()
+    for name, content in (
+        ("fit.json", "{}"),
+        ("external_loads.xml", "<ExternalLoads />"),
+        ("ground_reactions.mot", "time\tplate_vx\n"),
+    ):
+        (tmp_path / "out" / name).write_text(content, encoding="utf-8")
+    text = init_subject(folder)
+    assert "._" not in text
+    assert "out/" not in text
+    assert "# No forces were found for walk.trc" in text
+
+
 def test_init_prefers_c3d_to_its_export_and_says_so(tmp_path):
     for name in ("static.trc", "walk.c3d", "walk.trc"):
         (tmp_path / name).touch()

@@ -36,6 +36,41 @@ def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
     assert "one.toml" in two.problem
 
 
+def test_nobody_is_dropped_whose_files_are_one_folder_deeper_or_not_fetched(tmp_path):
+    anna = person(tmp_path / "Anna" / "2026-05-03", "subject.toml").parent
+    person(anna / "2026-06-10", "walk.c3d")
+    person(tmp_path / "__MACOSX" / "Anna", "._walk.c3d")
+    person(tmp_path / "Ben", "._subject.toml", "subject.toml", "._walk.c3d")
+    person(tmp_path / "Clara", "clara.toml", "._clara.toml")
+    person(tmp_path / "lists" / "old", "people.csv")
+    try:
+        person(tmp_path / "Dora").joinpath("walk.c3d").symlink_to("not fetched")
+    except OSError:
+        pytest.skip("this system allows no links")
+    people = {one.name: one for one in people_of(tmp_path, tmp_path / "out")}
+    assert [*people] == ["Anna", "Ben", "Clara", "Dora"]
+    assert people["Anna"].problem.startswith(
+        "no subject file, but there are files in its folders 2026-05-03, 2026-06-10;"
+    )
+    assert people["Ben"].subject == tmp_path / "Ben" / "subject.toml"
+    assert people["Clara"].subject == tmp_path / "Clara" / "clara.toml"
+    assert people["Dora"].problem.startswith("no subject file; kinertia init")
+
+
+def test_a_row_may_name_the_folder_of_a_subject_file(tmp_path):
+    person(tmp_path / "Anna", "subject.toml")
+    person(tmp_path / "Ben", "mine.toml")
+    person(tmp_path / "Clara", "one.toml", "two.toml")
+    table = tmp_path / "people.csv"
+    table.write_text("name;subject\n;Anna\n;Ben/\n;Clara\nDora;Dora\n", encoding="utf-8")
+    anna, ben, clara, dora = people_of(table, tmp_path / "out")
+    assert (anna.name, anna.subject) == ("Anna", tmp_path / "Anna" / "subject.toml")
+    assert (ben.name, ben.subject) == ("Ben", tmp_path / "Ben" / "mine.toml")
+    assert (clara.name, clara.subject) == ("Clara", None)
+    assert "one.toml" in clara.problem
+    assert dora.subject == tmp_path / "Dora"
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_rows_name_subject_files_from_where_the_table_is(separator, tmp_path):
     rows = [
@@ -61,6 +96,9 @@ def test_rows_name_subject_files_from_where_the_table_is(separator, tmp_path):
         ("subject,name\na.toml,A\nb.toml,B\nc.toml,a\n", 4, "'a' is there and so is 'A'"),
         ("subject\nx/s.toml\ny/s.toml\n", 3, "'s' is there twice"),
         ("subject,name\na.toml,a:b\n", 2, "'a:b' cannot be the name of a folder"),
+        ("subject,name\na.toml,.a\n", 2, "'.a' cannot be the name of a folder"),
+        (f"subject,name\na.toml,{'ü' * 101}\n", 2, "üüü' cannot be the name of a folder"),
+        ("name,subject,Subject\nA,a.toml,b.toml\n", 1, "has several columns subject"),
     ],
 )
 def test_a_table_that_cannot_be_says_where(text, line, words, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,8 +19,11 @@ from kinertia.estimation.person_information import PersonInformation, informatio
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.population_file import population_text, read_population
 from kinertia.io.provenance import VERSION
+from kinertia.io.recording import MARKER_FILES
+from kinertia.io.spreadsheet import inert
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.saved_fit import FIT_FILE, read_saved
+from kinertia.report.cohort_tables import fitted_people
+from kinertia.report.saved_fit import FIT_FILE, SavedFit, read_saved
 
 _SHOWN = 12
 
@@ -70,36 +74,52 @@ def _parameters(learnt: LearntPrior) -> list[dict[str, Any]]:
     ]
 
 
-def _folders(results: list[Path]) -> list[Path]:
-    """Every person's results in these folders."""
-    folders = []
+@dataclass(frozen=True)
+class _Results:
+    """Where one person's results are, and what a cohort calls the person; None in results of `kinertia fit`."""
+
+    folder: Path
+    name: str | None = None
+
+
+def _folders(results: list[Path]) -> list[_Results]:
+    """Every person's results in these folders; those that a cohort keeps, and lists no more, are left out, said."""
+    found = []
     for path in results:
         if (path / FIT_FILE).is_file():
-            folders.append(path)
+            found.append(_Results(path))
         elif people := sorted(path.glob(f"people/*/{FIT_FILE}")):
-            folders += [one.parent for one in people]
+            listed = fitted_people(path)
+            for folder in (one.parent for one in people):
+                if listed is None or inert(folder.name) in listed:
+                    found.append(_Results(folder, folder.name))
+                else:
+                    older = "has no results by people.csv, only older ones"
+                    out.print(f"left out: {folder.name}: {older}", soft_wrap=True)
         else:
             raise FileError(path, "holds no results of kinertia cohort or kinertia fit")
-    return folders
+    return found
 
 
-def _read(folders: list[Path], without: set[str]) -> tuple[list[PersonInformation], tuple[str, ...]]:
-    """What each person's recordings say, and the SHA-256 of all files; people without error bars are left out, said."""
+def _read(results: list[_Results], without: set[str]) -> tuple[list[PersonInformation], tuple[str, ...]]:
+    """What each person's recordings say, and their SHA-256; people without error bars are left out, said."""
     people: list[PersonInformation] = []
     files: list[str] = []
     met = set()
     with shown_progress() as progress:
-        for k, folder in enumerate(folders):
-            progress("reading", k / len(folders))
-            saved = read_saved(folder)
-            if names := {saved.fit.subject.name, folder.name} & without:
+        for k, one in enumerate(results):
+            progress("reading", k / len(results))
+            saved = read_saved(one.folder)
+            if names := {saved.fit.subject.name, one.folder.name} & without:
                 met |= names
                 continue
-            own = [] if saved.provenance is None else list(saved.provenance.files.values())
+            own = _recordings(saved)
             if twice := set(own) & set(files):
-                raise PriorError(f"{folder}: {len(twice)} of its files are another person's here, too; give each once")
+                problem = f"{len(twice)} of its files are another person's here, too; give each once"
+                raise PriorError(f"{one.folder}: {problem}")
             try:
-                people.append(information_of(saved.fit))
+                person = information_of(saved.fit)
+                people.append(replace(person, name=one.name or person.name))
             except KinertiaError as error:
                 out.print(f"left out: {error}", soft_wrap=True)
                 continue
@@ -107,6 +127,12 @@ def _read(folders: list[Path], without: set[str]) -> tuple[list[PersonInformatio
     if lost := without - met:
         raise PriorError(f"nobody is called {', '.join(sorted(lost))} here")
     return people, tuple(files)
+
+
+def _recordings(saved: SavedFit) -> list[str]:
+    """SHA-256 of the files of markers that a result is from; marker sets, loads and sessions are many people's."""
+    files = {} if saved.provenance is None else saved.provenance.files
+    return [content for name, content in files.items() if Path(name).suffix.lower() in MARKER_FILES]
 
 
 def _report(learnt: LearntPrior) -> None:

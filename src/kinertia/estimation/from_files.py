@@ -19,7 +19,7 @@ from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.measures_file import BodyMeasures, read_measures
 from kinertia.io.population_file import read_population
-from kinertia.io.provenance import recordings
+from kinertia.io.provenance import command_line, recordings
 from kinertia.io.recording import read_recording
 from kinertia.io.session_file import read_session
 from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
@@ -101,7 +101,7 @@ def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
     if set(recordings(wanted)) & set(file.files):
         raise PriorError(
             f"{path.name} was learnt from these trials, too, which would count twice; write one for this person: "
-            f"kinertia population ... --without {wanted.subject.name}"
+            f"kinertia population ... {command_line(['--without', wanted.subject.name])}"
         )
     return LearntPrior.from_file(file)
 

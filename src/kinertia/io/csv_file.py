@@ -108,6 +108,8 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
     if lacking := [name for name in columns if name not in heading]:
         found = ", ".join(heading)
         raise FileError(path, f"lacks the column {', '.join(lacking)}; found {found}; expected {expected}", first + 1)
+    if several := [name for name in columns if heading.count(name) > 1]:
+        raise FileError(path, f"has several columns {', '.join(several)}; leave one of them", first + 1)
     empty = True
     for cells in table:
         line = first + table.line_num

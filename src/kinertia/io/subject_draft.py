@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
+from kinertia.io.file_names import RESULT_FILES
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
@@ -94,7 +95,7 @@ def _expect_files(folder: Path) -> list[Path]:
     Raises:
         FileError: there are none, or a name that no subject file can hold.
     """
-    files = sorted(folder.iterdir())
+    files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))  # archives of Macs have twins
     for file in files:
         if not _is_utf8(file.name):
             raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
@@ -163,8 +164,11 @@ def _duration_s(file: Path) -> float:
 
 
 def _head(file: Path) -> str:
-    with file.open("rb") as stream:
-        return stream.read(20_000).decode("utf-8", errors="replace")
+    try:
+        with file.open("rb") as stream:
+            return stream.read(20_000).decode("utf-8", errors="replace")
+    except FileNotFoundError:  # a link to what is not there
+        return ""
 
 
 def is_capture(file: Path) -> bool:
@@ -193,14 +197,15 @@ def _has_plates(file: Path) -> bool:
 def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], bool]) -> list[Path]:
     """The files of the folder that hold it; where there are none, those of the folders in it and beside it, else those
     of folders of forces beside the one it is in (OpenCap's `MarkerData/Mocap` and `ForceData`). Folders with markers of
-    their own may be another person's and are left out.
+    their own, which may be another person's, and results of Kinertia are left out.
     """
     holding = [file for file in files if holds(file)]
     of_forces = [one for one in _entries(folder.parent.parent) if _FORCE_FOLDER.search(one.name)]
     for near in ([*files, *_entries(folder.parent)], of_forces):
         for other in near if not holding else ():
             inside = [file for file in _entries(other) if file.is_file()]
-            if other != folder and not any(map(is_capture, inside)):
+            results = RESULT_FILES[0] in (file.name for file in inside)
+            if other != folder and not results and not any(map(is_capture, inside)):
                 holding += [file for file in inside if holds(file)]
     return holding
 

@@ -234,12 +234,12 @@ class SubjectFile(Table):
 
 
 def subject_file_in(folder: Path) -> Path:
-    """The subject file of a folder: `subject.toml`, or the only .toml file there.
+    """The subject file of a folder: `subject.toml`, or the only .toml file there; hidden files are none.
 
     Raises:
         FileError: there is none, or several of which none is called subject.toml.
     """
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml" and path.name[0] != ".")
     named = [path for path in paths if path.name.lower() == "subject.toml"] or paths
     if len(named) == 1:
         return named[0]

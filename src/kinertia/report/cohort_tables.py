@@ -18,12 +18,13 @@ from kinertia.checks.verdict import residual_verdicts, verdict_of_markers, worst
 from kinertia.errors import FileError
 from kinertia.estimation.cycles import cycle_columns
 from kinertia.estimation.result import Fit
+from kinertia.io.csv_file import read_csv
 from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
 from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.files import summary
 from kinertia.studies.cohort_cluster import expect_extra
-from kinertia.studies.cohort_record import Place, Record
+from kinertia.studies.cohort_record import AGAINST, PASSED, Place, Record
 
 if TYPE_CHECKING:
     import pyarrow
@@ -107,6 +108,19 @@ def write_tables(cohort: Path, records: Iterable[Record], with_csv: bool) -> Non
                 folder = Place(cohort, record.person).results
                 for name in OF_A_PERSON:
                     tables[name].add(parquet.read_table(folder / f"{name}.parquet"))
+
+
+def fitted_people(cohort: Path) -> set[str] | None:
+    """Who has results by the list of people, as names stand there; None without one, before a first run's end.
+
+    Raises:
+        FileError: the list is none of ours any more.
+    """
+    path = cohort / "people.csv"
+    if not path.is_file():
+        return None
+    rows = read_csv(path, ["person", "status"], "the people that kinertia cohort lists")
+    return {row.cells["person"] for row in rows if row.number("status") in (PASSED, AGAINST)}
 
 
 def read_cohort(folder: str | Path) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +21,7 @@ from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.provenance import VERSION
 from kinertia.studies.cohort_record import FAILED, Record, Standing, one_line
 from kinertia.studies.cohort_resources import Finished, measured
+from kinertia.studies.parallel import interrupted_later
 
 HOW = "pip install 'kinertia[cohort]'"
 _NEEDED = ("dask", "distributed", "pyarrow")
@@ -122,19 +123,19 @@ def local_cluster(size: ClusterSize) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
-    with (
-        dask.config.set(SCHEDULING),
-        LocalCluster(
-            n_workers=size.workers,
-            threads_per_worker=1,
-            memory_limit=size.memory_bytes,
-            processes=True,
-            dashboard_address=None,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        client.register_plugin(_undisturbed())
+    with dask.config.set(SCHEDULING), ExitStack() as opened:
+        with interrupted_later():
+            cluster = LocalCluster(
+                n_workers=size.workers,
+                threads_per_worker=1,
+                memory_limit=size.memory_bytes,
+                processes=True,
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            )
+            opened.enter_context(cluster)
+            client = opened.enter_context(Client(cluster))
+            client.register_plugin(_undisturbed())
         yield client
 
 

@@ -8,9 +8,12 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.csv_file import read_csv
-from kinertia.io.file_names import fits_everywhere, path_from, same_name_key
+from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, same_name_key
 from kinertia.io.subject_draft import is_capture
 from kinertia.io.subject_file import subject_file_in
+
+_LONGEST_NAME = 200
+"""In bytes: systems end names of files at 255, and some of Kinertia's begin with a person's."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +60,51 @@ def people_of(study: Path, output: Path) -> list[Person]:
 
 
 def _of_folders(study: Path, output: Path) -> Iterator[Person]:
-    """Folders with a subject file, or with recordings that want one; others are nobody's."""
+    """Folders with a subject file, or with recordings that want one, or in whose folders there is either; others are
+    nobody's."""
     for folder in sorted(study.iterdir()):
         if not folder.is_dir() or folder.name.startswith(".") or folder.resolve() == output:
             continue
-        files = [path for path in folder.iterdir() if path.is_file()]
-        if any(path.suffix.lower() == ".toml" for path in files):
-            try:
-                yield Person(folder.name, subject_file_in(folder))
-            except FileError as error:
-                yield Person(folder.name, None, str(error))
-        elif any(is_capture(path) for path in files):
+        if _holds_subject(folder):
+            yield _with_subject_in(folder, folder.name)
+        elif _holds_recordings(folder):
             yield Person(folder.name, None, f"no subject file; kinertia init {folder} drafts one")
+        elif deeper := [each.name for each in _shown(folder) if each.is_dir() and _is_session(each, output)]:
+            problem = (
+                f"no subject file, but there are files in its folder{'s' if deeper[1:] else ''} {', '.join(deeper)}; "
+                f"write one in {folder} that names them, or list people in a CSV file"
+            )
+            yield Person(folder.name, None, problem)
+
+
+def _with_subject_in(folder: Path, name: str) -> Person:
+    try:
+        return Person(name, subject_file_in(folder))
+    except FileError as error:
+        return Person(name, None, str(error))
+
+
+def _is_session(folder: Path, output: Path) -> bool:
+    """Whether somebody's files are there, which results are not."""
+    results = (folder / RESULT_FILES[0]).exists() or folder.resolve() == output
+    return not results and (_holds_subject(folder) or _holds_recordings(folder))
+
+
+def _holds_subject(folder: Path) -> bool:
+    return any(path.suffix.lower() == ".toml" for path in _files(folder))
+
+
+def _holds_recordings(folder: Path) -> bool:
+    return any(is_capture(path) for path in _files(folder))
+
+
+def _files(folder: Path) -> list[Path]:
+    """Links to files that are not there, too: some archives fetch files when they are asked for."""
+    return [path for path in _shown(folder) if not path.is_dir()]
+
+
+def _shown(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
 
 
 def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
@@ -78,7 +114,10 @@ def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
         if not written:
             raise FileError(path, "the column 'subject' is empty; give the path of a subject file", row.line)
         subject = path_from(path.parent, written)
-        yield row.line, Person(row.cells.get("name") or _name_of(subject), subject)
+        if subject.is_dir():
+            yield row.line, _with_subject_in(subject, row.cells.get("name") or subject.resolve().name)
+        else:
+            yield row.line, Person(row.cells.get("name") or _name_of(subject), subject)
 
 
 def _name_of(subject: Path) -> str:
@@ -89,11 +128,12 @@ def _name_of(subject: Path) -> str:
 def _check_names(study: Path, named: Sequence[tuple[int | None, str]]) -> None:
     seen: dict[str, str] = {}
     for line, name in named:
-        if not fits_everywhere(name):
+        if not fits_everywhere(name) or name.startswith(".") or len(name.encode()) > _LONGEST_NAME:
             raise FileError(
                 study,
-                f"'{name}' cannot be the name of a folder on every system (none of < > : \" / \\ | ? *, no dot or "
-                "blank at the end, no device of Windows); give the person another name",
+                f"'{name}' cannot be the name of a folder on every system (none of < > : \" / \\ | ? *, no dot at the "
+                f"start, no dot or blank at the end, no device of Windows, at most {_LONGEST_NAME} bytes); give the "
+                "person another name",
                 line,
             )
         key = same_name_key(name)

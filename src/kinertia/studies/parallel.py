@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from types import FrameType
 from typing import TypeVar
 
@@ -41,7 +41,7 @@ def in_parallel(
     # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
     try:
-        with _interrupted_later():
+        with interrupted_later():
             futures = [pool.submit(task, case) for case in cases]
         for done, future in enumerate(as_completed(futures), start=1):
             future.result()
@@ -52,16 +52,25 @@ def in_parallel(
 
 
 @contextmanager
-def _interrupted_later() -> Iterator[None]:
-    """Ctrl-C waits until processes have what they start from: of its lack they would complain with tracebacks."""
+def interrupted_later() -> Iterator[None]:
+    """Ctrl-C waits until processes have what they start from: of its lack they would complain with tracebacks.
+
+    A terminal sends it to them, too: those of POSIX that are started here never get it.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     caught: list[tuple[int, FrameType | None]] = []
     before = signal.signal(signal.SIGINT, lambda number, frame: caught.append((number, frame)))
+    let_through: set[int] = set()
+    if sys.platform != "win32":  # what threads and processes inherit that are started meanwhile
+        resource_tracker.ensure_running()  # which lets Ctrl-C through to whoever starts it
+        let_through |= {signal.SIGINT} - signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
+        if sys.platform != "win32":
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, let_through)
         signal.signal(signal.SIGINT, before)
     if caught and callable(before):
         before(*caught[0])
