@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -56,7 +57,8 @@ def test_interrupted_while_workers_start_it_ends_without_a_traceback(wait_s, tmp
     study = write_study(tmp_path / "study", ("Anna", "Ben"))
     command = [*COMMAND, str(study), "-o", str(tmp_path / "out")]
     piped = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, **piped, start_new_session=True) as process:
+    handled = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # where the tests themselves run in the background
+    with subprocess.Popen(command, **piped, start_new_session=True, preexec_fn=handled) as process:
         assert process.stderr.readline().strip() == "looking for changes"
         time.sleep(wait_s)
         os.killpg(process.pid, signal.SIGINT)

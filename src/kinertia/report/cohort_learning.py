@@ -94,7 +94,9 @@ def write_second_study(
         everybody.append(_read(cohort, person, notes))
     once = {one.name for one in _others((), everybody)}
     notes += [
-        f"{one.name}: teaches nothing more: has recordings of another" for one in everybody if one.name not in once
+        f"{one.name}: teaches nothing, since recordings of somebody before are among these"
+        for one in everybody
+        if one.name not in once
     ]
     (folder / _DONE).unlink(missing_ok=True)
     for name in ("priors", "sessions", "subjects"):

@@ -32,6 +32,8 @@ RETRIES = 2
 KEPT_MEMORY = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25})
 """Bytes that a worker keeps on Linux, by its environment. Dask's workers give memory back at once, and a fit asks for
 it again, page by page: it took a third longer."""
+ANY_PORT = ":0"
+"""Of the scheduler's web page, which is not shown: a fixed one is taken when two cohorts run, of which Dask warns."""
 SCHEDULING = MappingProxyType(
     {
         "distributed.scheduler.allowed-failures": RETRIES,
@@ -130,7 +132,8 @@ def local_cluster(size: ClusterSize) -> Iterator[Any]:
                 threads_per_worker=1,
                 memory_limit=size.memory_bytes,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address=ANY_PORT,
+                scheduler_kwargs={"dashboard": False},
                 silence_logs=logging.CRITICAL,
             )
             opened.enter_context(cluster)
