@@ -99,6 +99,25 @@ def test_everybody_is_fitted_again_with_what_the_others_teach(study, quick, tmp_
 
 
 @pytest.mark.slow
+def test_recordings_that_two_have_teach_once(study, quick, tmp_path):
+    """One person under two names, with another setting: the priors and the sessions of others count the trials once."""
+    twin = study / "A again"
+    shutil.copytree(study / "A", twin)
+    text = (twin / "subject.toml").read_text(encoding="utf-8").replace('name = "A"', 'name = "A again"')
+    (twin / "subject.toml").write_text(f"{text}\n[settings]\ncutoff_hz = 6.0\n", encoding="utf-8")
+    outcome = run("cohort", study, "-o", tmp_path / "out", "--learn")
+    assert "note: A again: teaches nothing, since recordings" in outcome.out, outcome.err
+    second = {wanted.subject.name: wanted for wanted in quick[7:]}
+    assert [*second] == ["A", "A again", *NAMES[1:]]
+    for name, wanted in second.items():
+        group = read_population(wanted.prior.population)
+        assert len(set(group.files)) == len(group.files)
+        assert {"A", "A again"} & set(group.people) == (set() if name.startswith("A") else {"A"})
+    assert [person.name for person in read_session(second["B"].instruments.session)] == ["A", "B", "C"]
+    assert second["A again"].instruments.session == second["B"].instruments.session
+
+
+@pytest.mark.slow
 def test_where_nothing_can_be_learnt_it_says_why(study, quick, tmp_path):
     for name in NAMES[2:]:
         shutil.rmtree(study / name)

@@ -97,6 +97,20 @@ def test_results_that_stay_of_other_files_are_told(subject, tmp_path):
     assert outcome.sentence.endswith("(results of other files are in people/Anna)")
 
 
+def test_who_is_there_twice_is_fitted_once(subject, tmp_path):
+    """A copied folder has another name by default, and a list may name a file twice; other settings: another fit."""
+    copy = tmp_path / "Anna - Copy" / "subject.toml"
+    shutil.copytree(subject.parent, copy.parent)
+    changed(copy, 'name = "', 'name = "Copy of ')
+    people = [Person("Anna", subject), Person("Anna - Copy", copy), Person("B", subject)]
+    first, *twins = standings(people, tmp_path / "out")
+    assert first.due
+    assert [one.due for one in twins] == [False, False]
+    assert all("the same files and settings as 'Anna'" in one.problem for one in twins)
+    changed(copy, "[model]", "[settings]\ncutoff_hz = 6.0\n[model]")
+    assert [one.due for one in standings(people[:2], tmp_path / "out")] == [True, True]
+
+
 def test_logs_of_people_at_work_in_a_killed_run_are_swept(tmp_path):
     prepare_folder(tmp_path)
     for name in ("Anna.log", "Ben.log", "Ben.json"):

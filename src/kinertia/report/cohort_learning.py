@@ -11,7 +11,7 @@ from __future__ import annotations
 import datetime
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -52,6 +52,7 @@ class _Known:
     Attributes:
         name, subject: of the cohort's list.
         wanted: what the subject file says.
+        recordings: SHA-256 of them.
         body: what the person's trials say of the body; None where that cannot be taken.
         instruments: the same of plates and clock.
         entries: for the subject file of the second fit, by table and key.
@@ -60,6 +61,7 @@ class _Known:
     name: str
     subject: Path
     wanted: SubjectFile
+    recordings: tuple[str, ...]
     body: PersonInformation | None
     instruments: PersonInstruments | None
     entries: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -90,6 +92,9 @@ def write_second_study(
     for k, person in enumerate(people):
         progress("reading results", k / len(people))
         everybody.append(_read(cohort, person, notes))
+    once = {one.name for one in _others((), everybody)}
+    twice = [one.name for one in everybody if one.name not in once]
+    notes += [f"{name}: teaches nothing, since recordings of theirs are another person's here, too" for name in twice]
     (folder / _DONE).unlink(missing_ok=True)
     for name in ("priors", "sessions", "subjects"):
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -131,7 +136,7 @@ def _read(cohort: Path, person: Person, notes: list[str]) -> _Known:
     subject = known(person.subject)
     wanted = read_subject(subject)
     fit = read_saved(Place(cohort, person.name).results).fit
-    of_person = _Known(person.name, subject, wanted, None, None)
+    of_person = _Known(person.name, subject, wanted, recordings(wanted), None, None)
     try:
         if wanted.prior.bsp is not None or wanted.prior.population is not None:
             raise PriorError(f"{person.name}: [prior] names a prior of its own")
@@ -141,7 +146,7 @@ def _read(cohort: Path, person: Person, notes: list[str]) -> _Known:
     try:
         if wanted.instruments.session is None and fit.posterior is not None:
             check_plates(wanted)
-            of_person.instruments = person_instruments(fit, recordings(wanted))
+            of_person.instruments = person_instruments(fit, of_person.recordings)
     except KinertiaError as error:
         notes.append(f"{person.name}: plates and clock are not shared: {error}")
     return of_person
@@ -171,13 +176,18 @@ def _teach_bodies(
 
 
 def _others(part: Sequence[_Known], people: Sequence[_Known]) -> list[_Known]:
-    """Everybody who shares no recording with anybody of the part."""
-    own = {name for one in part for name in recordings(one.wanted)}
-    return [one for one in people if not own & set(recordings(one.wanted))]
+    """Everybody who shares no recording with anybody of the part, nor with somebody before: each counts once."""
+    met = {name for one in part for name in one.recordings}
+    others = []
+    for one in people:
+        if not met & set(one.recordings):
+            others.append(one)
+            met.update(one.recordings)
+    return others
 
 
 def _population(people: Sequence[_Known], learnt: LearntPrior) -> str:
-    files = [name for one in people for name in recordings(one.wanted)]
+    files = [name for one in people for name in one.recordings]
     return population_text(learnt.as_file(VERSION, [one.name for one in people], files))
 
 
@@ -196,11 +206,11 @@ def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str])
     if undated:
         notes.append(f"{undated} people without a date ([instruments] date): their plates and clock are not shared")
     for k, ((day, _), of_day) in enumerate(sorted(days.items(), key=lambda item: item[0])):
-        said = {one.name: one.instruments for one in of_day if one.instruments is not None}
-        sharing = [one for one in of_day if _stood_on_others(said, one.name)]
+        sharing = [one for one in of_day if _plates([one]) & _plates(_others([one], of_day))]
         if not sharing:
             continue
-        session = session_instruments(list(said.values()), of_day[0].wanted.instruments)
+        said = [one.instruments for one in _others((), of_day) if one.instruments is not None]
+        session = session_instruments(said, of_day[0].wanted.instruments)
         notes += [f"{day}: {sentence}" for sentence in session.contradictions]
         path = folder / f"{day}-{k + 1}.toml"
         write_then_rename(path, session_text(VERSION, session.values, session.people))
@@ -213,10 +223,9 @@ def _stated(instruments: InstrumentsFiles) -> str:
     return instruments.model_dump_json(exclude={"session", "date"})
 
 
-def _stood_on_others(said: Mapping[str, PersonInstruments], name: str) -> bool:
-    """Whether somebody else of the day stood on one of this person's plates."""
-    others = {plate for other, one in said.items() if other != name for plate in one.plates}
-    return bool(others & set(said[name].plates))
+def _plates(people: Sequence[_Known]) -> set[str]:
+    """On which they stood."""
+    return {plate for one in people if one.instruments is not None for plate in one.instruments.plates}
 
 
 def _second(folder: Path, one: _Known) -> Person:

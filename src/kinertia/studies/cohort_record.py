@@ -148,11 +148,19 @@ def keep(cohort: Path, record: Record) -> None:
 
 
 def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
-    """Everybody, one after the other: all files are read for their hashes."""
+    """Everybody, one after the other: all files are read for their hashes.
+
+    Who is there a second time, by all that goes into a fit but the name, would count twice in every table, and is not
+    fitted.
+    """
+    met: dict[str, str] = {}
     for person in people:
         try:
             wanted = None if person.subject is None else read_subject(person.subject)
-            inputs = "" if wanted is None else inputs_of(wanted)
+            content = {} if wanted is None else _contents(wanted.model_dump())
+            inputs = "" if wanted is None else _hash(content)
+            if wanted is not None:
+                _expect_new(person.name, content, met)
         except (KinertiaError, OSError) as error:
             yield Standing(person, 0, 0, "", None, one_line(str(error)))
             continue
@@ -167,8 +175,19 @@ def inputs_of(wanted: SubjectFile) -> str:
 
     Where the files are and what they are called changes nothing, nor do comments.
     """
-    content = json.dumps(_contents(wanted.model_dump()), sort_keys=True, default=str)  # a date
-    return hashlib.sha256(content.encode()).hexdigest()
+    return _hash(_contents(wanted.model_dump()))
+
+
+def _expect_new(name: str, content: Mapping[str, Any], met: dict[str, str]) -> None:
+    """Raise KinertiaError if somebody met before has the same in all but the name; of the first it is noted."""
+    nameless = _hash({**content, "subject": {**content["subject"], "name": ""}})
+    if (first := met.setdefault(nameless, name)) != name:
+        raise KinertiaError(f"the same files and settings as '{first}', who would count twice; leave one of them out")
+
+
+def _hash(content: Mapping[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, default=str)  # a date
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _contents(value: Any) -> Any:
