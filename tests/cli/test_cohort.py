@@ -20,6 +20,7 @@ from kinertia.cli.cohort import _LOCK
 from kinertia.estimation.from_files import fit_subject
 from kinertia.io.file_lock import sole_use
 from kinertia.report.files import save_fit
+from kinertia.studies.cohort_cluster import ClusterSize, doubts_of_workers, local_cluster
 
 
 @pytest.fixture
@@ -160,3 +161,30 @@ def test_a_scheduler_that_runs_already_is_used(study, tmp_path):
     assert outcome.status == 1, outcome.err
     assert "not fitted: Clara: trial 'walk': no force plates" in outcome.out
     assert (tmp_path / "out" / "failed" / "Clara.json").is_file()
+    assert "note: " not in outcome.out
+    planned = run("cohort", study, "-o", tmp_path / "out", "--dry-run")
+    assert "as before: trial 'walk': no force plates" in " ".join(planned.out.split())
+
+
+@pytest.mark.slow
+def test_workers_that_are_not_there_or_have_several_threads_are_told():
+    from distributed import Client, LocalCluster
+
+    found = []
+    for workers in (0, 1):
+        with (
+            LocalCluster(n_workers=workers, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+            Client(cluster) as client,
+        ):
+            found += doubts_of_workers(client, "tcp://lab:8786")
+    none, several = found
+    assert none.startswith("no worker has reported to tcp://lab:8786 yet")
+    assert "have up to 2 threads" in several
+
+
+@pytest.mark.slow
+def test_two_runs_on_one_computer_want_no_port_of_each_other(recwarn):
+    size = ClusterSize(1, 2 * 1024**3)
+    with local_cluster(size), local_cluster(size):
+        pass
+    assert not [str(one.message) for one in recwarn if "already in use" in str(one.message)]

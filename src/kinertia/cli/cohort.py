@@ -24,6 +24,7 @@ from kinertia.report.cohort_person import fit_person
 from kinertia.report.cohort_tables import write_tables
 from kinertia.studies.cohort_cluster import (
     Job,
+    doubts_of_workers,
     expect_extra,
     guessed_seconds,
     local_cluster,
@@ -137,7 +138,7 @@ def _planned(one: Standing) -> dict[str, Any]:
         "state": state,
         "trials": one.trials,
         "frames": one.frames,
-        "why": one.problem,
+        "why": one.problem or ("" if one.record is None else one.record.sentence),
     }
 
 
@@ -208,10 +209,14 @@ def _run_again(
     with shown_progress() as shown:
         taught = [person for person in people if person.name in there]
         second, notes = write_second_study(output, taught, lines.with_progress(shown))
+    _say_notes(notes, lines)
+    return _run(second, output / LEARNT, where, csv, lines)
+
+
+def _say_notes(notes: Sequence[str], lines: JsonLines) -> None:
     for note in notes:
         out.print(f"note: {note}", soft_wrap=True)
         lines.say("note", sentence=note)
-    return _run(second, output / LEARNT, where, csv, lines)
 
 
 def _each(records: Sequence[Record], stage: str, progress: Callable[[str, float], None]) -> Iterator[Record]:
@@ -237,6 +242,7 @@ def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: J
     if not jobs:
         return records
     with shown_progress() as shown, where.client(len(jobs)) as client:
+        _say_notes(doubts_of_workers(client, where.scheduler) if where.scheduler else [], lines)
         progress = lines.with_progress(shown)
         progress("people", 0.0)
         for finished in run_jobs(client, fit_person, jobs):
@@ -259,7 +265,8 @@ def _report_plan(everybody: Sequence[Standing], where: _Where) -> None:
     """Who, how much, what is missing, and roughly how long."""
     table = plain_table("person", "", "trials", "frames")
     for one in everybody:
-        state = one.problem or ("to fit" if one.due else "as before")
+        before = "as before" if one.record is None or one.record.fitted else f"as before: {one.record.sentence}"
+        state = one.problem or ("to fit" if one.due else before)
         table.add_row(one.person.name, state, str(one.trials or "–"), str(one.frames or "–"))
     out.print(table)
     _say_due(everybody)

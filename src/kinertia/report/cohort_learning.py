@@ -93,11 +93,8 @@ def write_second_study(
         progress("reading results", k / len(people))
         everybody.append(_read(cohort, person, notes))
     once = {one.name for one in _others((), everybody)}
-    notes += [
-        f"{one.name}: teaches nothing, since recordings of somebody before are among these"
-        for one in everybody
-        if one.name not in once
-    ]
+    twice = [one.name for one in everybody if one.name not in once]
+    notes += [f"{name}: teaches nothing, since recordings of theirs are another person's here, too" for name in twice]
     (folder / _DONE).unlink(missing_ok=True)
     for name in ("priors", "sessions", "subjects"):
         (folder / name).mkdir(parents=True, exist_ok=True)

@@ -32,8 +32,6 @@ RETRIES = 2
 KEPT_MEMORY = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25})
 """Bytes that a worker keeps on Linux, by its environment. Dask's workers give memory back at once, and a fit asks for
 it again, page by page: it took a third longer."""
-ANY_PORT = ":0"
-"""Of the scheduler's web page, which is not shown: a fixed one is taken when two cohorts run, of which Dask warns."""
 SCHEDULING = MappingProxyType(
     {
         "distributed.scheduler.allowed-failures": RETRIES,
@@ -44,6 +42,8 @@ SCHEDULING = MappingProxyType(
     }
 )
 """Settings of Dask for clusters of our own."""
+NO_DASHBOARD = MappingProxyType({"dashboard": False, "dashboard_address": "127.0.0.1:0"})
+"""Of their schedulers, which listen there all the same: at any free port, since another run may have the usual one."""
 _SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
 """Of one processor, for a rough guess before anything was measured: see `docs/long-trials.md`."""
 _LEAST_LIMIT_S, _PATIENCE = 900.0, 50.0
@@ -132,8 +132,8 @@ def local_cluster(size: ClusterSize) -> Iterator[Any]:
                 threads_per_worker=1,
                 memory_limit=size.memory_bytes,
                 processes=True,
-                dashboard_address=ANY_PORT,
-                scheduler_kwargs={"dashboard": False},
+                dashboard_address=None,
+                scheduler_kwargs=dict(NO_DASHBOARD),
                 silence_logs=logging.CRITICAL,
             )
             opened.enter_context(cluster)
@@ -161,6 +161,20 @@ def running_cluster(address: str) -> Iterator[Any]:
         ) from None
     with client:
         yield client
+
+
+def doubts_of_workers(client: Any, address: str) -> list[str]:
+    """What keeps the workers of a scheduler that runs already from fitting as they should, a sentence each."""
+    threads = client.nthreads()
+    start = f"dask worker {address} --nthreads 1"
+    if not threads:
+        return [f"no worker has reported to {address} yet, and the run waits until one does; start some: {start}"]
+    if (most := max(threads.values())) > 1:
+        return [
+            f"workers of {address} have up to {most} threads, and fit as many people in one process, where nobody is "
+            f"given up whose files hang; start them with one thread: {start}"
+        ]
+    return []
 
 
 def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Job]) -> Iterator[Finished]:

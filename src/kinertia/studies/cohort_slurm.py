@@ -11,7 +11,7 @@ from typing import Any
 
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
-from kinertia.studies.cohort_cluster import ANY_PORT, HOW, KEPT_MEMORY, SCHEDULING
+from kinertia.studies.cohort_cluster import HOW, KEPT_MEMORY, NO_DASHBOARD, SCHEDULING
 from kinertia.studies.cohort_slurm_jobs import replaced_jobs
 
 _NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
@@ -50,7 +50,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
             job_script_prologue=[*(f"export {name}={size}" for name, size in KEPT_MEMORY.items()), *wanted.before],
             interface=wanted.interface,
             log_directory=wanted.logs,
-            scheduler_options={"dashboard_address": ANY_PORT, "dashboard": False},
+            scheduler_options=dict(NO_DASHBOARD),
             silence_logs=logging.CRITICAL,
             **({} if wanted.python is None else {"python": wanted.python}),
         ) as cluster,
