@@ -45,20 +45,25 @@ def hashes(folder):
 
 def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk, tmp_path):
     shutil.copytree(measured_walk, lacking / "Clara")
+    shutil.copytree(measured_walk, lacking / "Dora")
+    dora = lacking / "Dora" / "subject.toml"
+    lines = dora.read_text(encoding="utf-8").splitlines()
+    dora.write_text("\n".join(line for line in lines if not line.startswith(("forces", "loads"))), encoding="utf-8")
     outcome = run("cohort", lacking, "-o", tmp_path / "out", "--dry-run")
     assert outcome.status == 1
     printed = " ".join(outcome.out.split())
     assert "no subject file; kinertia init" in printed
     assert "did you mean 'mass_kg'" in printed
     assert "Clara to fit 1" in printed
-    assert "3 people: 1 to fit, 0 as before, 2 without what a fit needs" in printed
+    assert "4 people: 1 to fit, 0 as before, 3 without what a fit needs" in printed
     assert "On this computer, in 1 process, each with one thread" in printed
     assert "very roughly 1 min" in printed
     assert not (tmp_path / "out").exists()
     planned = json.loads(run("cohort", lacking, "-o", tmp_path / "out", "--dry-run", "--json").out)["people"]
-    assert [(one["person"], one["state"], one["trials"]) for one in planned][-1] == ("Clara", "due", 1)
-    assert [one["state"] for one in planned[:2]] == ["lacking", "lacking"]
+    assert [(one["person"], one["state"], one["trials"]) for one in planned][2] == ("Clara", "due", 1)
+    assert [one["state"] for one in planned] == ["lacking", "lacking", "due", "lacking"]
     assert "no subject file" in planned[0]["why"]
+    assert "has no forces; name the force file" in planned[3]["why"]
 
 
 def test_who_cannot_be_fitted_is_in_the_list_of_people(lacking, tmp_path):

@@ -161,6 +161,7 @@ def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
             inputs = "" if wanted is None else _hash(content)
             if wanted is not None:
                 _expect_new(person.name, content, met)
+                _expect_forces(wanted)
         except (KinertiaError, OSError) as error:
             yield Standing(person, 0, 0, "", None, one_line(str(error)))
             continue
@@ -183,6 +184,13 @@ def _expect_new(name: str, content: Mapping[str, Any], met: dict[str, str]) -> N
     nameless = _hash({**content, "subject": {**content["subject"], "name": ""}})
     if (first := met.setdefault(nameless, name)) != name:
         raise KinertiaError(f"the same files and settings as '{first}', who would count twice; leave one of them out")
+
+
+def _expect_forces(wanted: SubjectFile) -> None:
+    """Raise KinertiaError if a trial cannot have any: files of other kinds than .trc may hold them."""
+    for trial in wanted.trials:
+        if trial.markers.suffix.lower() == ".trc" and trial.forces is None and trial.loads is None:
+            raise KinertiaError(f"trial '{trial.name}' has no forces; name the force file: forces = \"...\"")
 
 
 def _hash(content: Mapping[str, Any]) -> str:
