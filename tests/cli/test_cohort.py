@@ -47,8 +47,8 @@ def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk,
     shutil.copytree(measured_walk, lacking / "Clara")
     shutil.copytree(measured_walk, lacking / "Dora")
     dora = lacking / "Dora" / "subject.toml"
-    lines = dora.read_text(encoding="utf-8").splitlines()
-    dora.write_text("\n".join(line for line in lines if not line.startswith(("forces", "loads"))), encoding="utf-8")
+    dora.write_text(dora.read_text(encoding="utf-8").replace("walk.c3d", "walk.trc"), encoding="utf-8")
+    (lacking / "Dora" / "walk.trc").touch()
     outcome = run("cohort", lacking, "-o", tmp_path / "out", "--dry-run")
     assert outcome.status == 1
     printed = " ".join(outcome.out.split())
