@@ -80,11 +80,29 @@ def test_labels_of_nobody(lab):
 
 def test_labels_misspelt_are_guessed(lab, marker_set):
     markers = lab.walk.markers
-    folded = tuple(label.replace(".", "").lower() for label in markers.labels)
-    check = check_recording(replace(lab.walk, markers=replace(markers, labels=folded)))
-    assert check.marker_set.name == marker_set.name
-    assert check.marker_set.missing["R.ASIS"][0] == "rasis"
+    misspelt = tuple(label + "_a" for label in markers.labels)
+    check = check_recording(replace(lab.walk, markers=replace(markers, labels=misspelt)))
+    assert not check.marker_set.fits
+    assert check.marker_set.missing["R.ASIS" if "R.ASIS" in check.marker_set.missing else "RASI"][0] == "R.ASIS_a"
     assert stands_against(check.verdicts)
+
+
+def test_labels_in_other_capitals_and_punctuation_are_known(lab, marker_set):
+    markers = lab.walk.markers
+    folded = tuple(label.replace(".", "_").lower() for label in markers.labels)
+    check = check_recording(replace(lab.walk, markers=replace(markers, labels=folded)))
+    assert check.marker_set.name.startswith(f"{marker_set.name} (r_asis taken as R.ASIS and ")
+    assert {verdict.level for verdict in check.verdicts} == {"pass"}, check.verdicts
+    assert check.windows == check_recording(lab.walk).windows
+
+
+def test_a_trunk_without_markers_is_no_failure_unless_the_static_trial_shows_it(lab, marker_set):
+    torso = marker_set.segments["torso"]
+    walked, static = without(lab.walk, *torso), without(lab.static, *torso)
+    for standing in (None, static):
+        assert not stands_against(check_recording(walked, marker_set, static=standing).verdicts)
+    assert not stands_against(check_recording(static, marker_set).verdicts)
+    assert "no marker of torso" in sentences(check_recording(walked, marker_set, static=lab.static), "fail")
 
 
 @pytest.mark.parametrize(("pelvis_only", "words"), [(False, "no marker of foot_r"), (True, "R.ASIS")])

@@ -28,7 +28,7 @@ def test_each_preset_finds_its_own_files(shared_data, path, name):
 
 def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(shared_data):
     known = read_recording(shared_data / "subject4/static1.trc").markers.labels
-    labels = [label.replace("_", "").lower() for label in known]
+    labels = [f"{label}_1" for label in known]
     with pytest.raises(MarkerSetError, match=r"no marker-set preset fits.*nearest: ") as caught:
         choose_marker_set(labels)
     assert caught.value.missing
@@ -81,6 +81,25 @@ def test_presets_are_symmetric_and_put_every_marker_on_one_segment(name):
             if key.endswith("_r"):
                 assert key[:-2] + "_l" in entries
     assert set(preset.foot_labels()) == {"r", "l"}
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_preset_is_recognised_in_other_capitals_and_punctuation(name):
+    preset = read_marker_set(name)
+    written = {label: label.replace("_", ".").swapcase() for label in preset.labels}
+    chosen = choose_marker_set(list(written.values()))
+    assert chosen.landmarks == {key: tuple(written[one] for one in own) for key, own in preset.landmarks.items()}
+    assert chosen.segments == {key: tuple(written[one] for one in own) for key, own in preset.segments.items()}
+    assert chosen.widths == preset.widths
+    assert chosen.name == preset.name or chosen.name.startswith(f"{preset.name} (")
+
+
+def test_a_spelling_that_could_be_two_labels_is_nobodys():
+    preset = read_marker_set("rajagopal")
+    labels = [label for label in preset.labels if label != "R.Toe"]
+    assert choose_marker_set([*labels, "R_Toe"]).landmarks["toe_r"] == ("R_Toe",)
+    assert choose_marker_set([*labels, "R_Toe", "RTOE"]) == preset
+    assert choose_marker_set([*labels, "R.Toe", "R_Toe"]) == preset
 
 
 def test_nearest_labels_ignore_case_and_punctuation():

@@ -179,6 +179,15 @@ def test_broken_files(write, case):
     assert caught.value.line == line
 
 
+def test_the_subjects_name_before_the_labels_is_taken_off(write):
+    path = write(HEADER.replace("R.Heel", "Anna:R.Heel").replace("L Heel", "Anna:L Heel") + ROWS)
+    recording = read_trc_recording(path)
+    assert recording.markers.labels == ("R.Heel", "L Heel")
+    assert recording.notes == ("x.trc: the prefix 'Anna:' was removed from the labels",)
+    both = read_trc_recording(write(HEADER.replace("R.Heel", "Anna:A").replace("L Heel", "A") + ROWS))
+    assert both.markers.labels == ("Anna:A", "A")
+
+
 def test_lost_frame_in_the_middle(write):
     rows = "".join(f"{k}\t{0.01 * (k + (k > 50)):.2f}\t1\t2\t3\t4\t5\t6\n" for k in range(100))
     with pytest.raises(FileError, match=r"line 57: time goes from 0.5 s to 0.52 s"):

@@ -18,7 +18,8 @@ def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0):
     force = np.outer(vertical, [0.0, 1.0, 0.0]) + np.array(offset) + np.outer(TIME / TIME[-1], [0.0, drift_n, 0.0])
     force = factor * (force + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
     load = without_idle(TIME, force, np.zeros_like(force))
-    each = (load.force[:, None], load.moment[:, None])
+    twist = np.outer(0.01 * load.force[:, 1], [0.0, 1.0, 0.0])
+    each = (load.force[:, None], (load.moment + twist)[:, None])
     return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
 
 
@@ -68,7 +69,7 @@ def test_an_amplifier_at_the_end_of_its_range(top_n, lost):
 def test_rounded_forces_are_not_cut(digits):
     vertical = np.where((TIME > 1) & (TIME < 1.6), 700.0 * np.sin(np.pi * (TIME - 1) / 0.6), 0.0).round(digits)
     force = np.outer(vertical, [0.1, 1.0, 0.02])[:, None]
-    assert loads_doubts(PlateLoads(TIME, ("plate 1",), force, np.zeros_like(force), (None,))) == []
+    assert loads_doubts(PlateLoads(TIME, ("plate 1",), force, 0.01 * force, (None,))) == []
 
 
 @pytest.mark.parametrize(("axis", "name"), [(0, "X"), (2, "Z")])
@@ -78,6 +79,16 @@ def test_a_dead_channel_is_named(axis, name):
     force[..., axis] = 0.0
     (sentence,) = loads_doubts(replace(plate, force=force))
     assert f"shows no force along {name} in any sample: a channel is dead" in sentence
+
+
+def test_torques_that_were_not_exported_are_named():
+    """At any place on the plate, which gives a moment about the origin, but none about the centre of pressure."""
+    plate = plates()
+    moment = np.cross([0.4, 0.02, -0.3], plate.force)
+    (sentence,) = loads_doubts(replace(plate, moment=moment))
+    assert "no free moment (torque about the vertical) is in the loads of plate 1" in sentence
+    moment[..., 1] += 0.002 * plate.force[..., 1]
+    assert loads_doubts(replace(plate, moment=moment)) == []
 
 
 def test_zeros_in_the_middle_of_stance_are_named():
@@ -105,12 +116,14 @@ def test_a_horizontal_amplifier_at_the_end_of_its_range(sign):
 @pytest.mark.parametrize(("samples", "said"), [(10, 0), (60, 1), (200, 1)])
 def test_samples_that_are_held(samples, said):
     plate = plates()
-    force = plate.force.copy()
-    force[1200 : 1200 + samples] = force[1200]
-    doubts = loads_doubts(replace(plate, force=force))
+    force, moment = plate.force.copy(), plate.moment.copy()
+    for values in (force, moment):
+        values[1200 : 1200 + samples] = values[1200]
+    held = replace(plate, force=force, moment=moment)
+    doubts = loads_doubts(held)
     assert len(doubts) == said
     # long ones are refused: they shift where loads begin and end
-    assert bool(loads_trouble(replace(plate, force=force))) == (samples > 100)
+    assert bool(loads_trouble(held)) == (samples > 100)
     if said:
         assert f"reads exactly the same in all its channels from 1.200 to {1.199 + samples / 1000:.3f} s" in doubts[0]
 

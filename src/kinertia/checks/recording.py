@@ -135,7 +135,7 @@ def check_recording(
     standing = moves.kind == "stands still"
     verdicts, feet = judged_labels(match), None
     if used is not None:
-        feet, trouble = _feet(recording.markers.labels, used)
+        feet, trouble = _feet(recording.markers.labels, used, None if static is None else static.markers.labels)
         verdicts += trouble
         if used.landmarks:
             verdicts += _facing(recording.markers, used, moves)
@@ -199,11 +199,18 @@ def _gaps(markers: Markers) -> list[Verdict]:
     return verdicts or [Verdict("pass", f"no marker has a gap longer than {LONGEST_BRIDGE_S:g} s {where}")]
 
 
-def _feet(labels: Sequence[str], marker_set: MarkerSet) -> tuple[FootMarkers | None, list[Verdict]]:
-    """Labels on each foot, None unless both have one; and what else a fit would refuse for want of markers."""
+def _feet(
+    labels: Sequence[str], marker_set: MarkerSet, standing: Sequence[str] | None
+) -> tuple[FootMarkers | None, list[Verdict]]:
+    """Labels on each foot, None unless both have one; and what else a fit would refuse for want of markers.
+
+    A trunk need not be seen, but if the static trial shows it (`standing`: its labels), the motion has to.
+    """
     feet = {side: [label for label in own if label in labels] for side, own in marker_set.foot_labels().items()}
-    arms = ("upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l")
-    needed = set(marker_set.segments) - set(arms) if marker_set.landmarks else {"foot_r", "foot_l"}
+    spare = {"upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l"}
+    if standing is None or not set(marker_set.segments.get("torso", ())) & set(standing):
+        spare.add("torso")
+    needed = set(marker_set.segments) - spare if marker_set.landmarks else {"foot_r", "foot_l"}
     bare = [
         segment
         for segment, own in marker_set.segments.items()

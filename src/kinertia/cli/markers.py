@@ -14,7 +14,7 @@ from kinertia.io.marker_set_draft import draft_marker_set
 from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
-from kinertia.model.marker_set import is_worn, share_worn
+from kinertia.model.marker_set import is_worn, share_worn, spelled_as
 
 _LISTED = 6
 
@@ -39,17 +39,18 @@ def markers(
     labels = read_recording(file).without_empty_markers().markers.labels
     out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
     table = plain_table("preset", "labels present", "absent")
-    shares = {name: share_worn(read_marker_set(name), labels) for name in preset_names()}
+    sets = {name: spelled_as(read_marker_set(name), labels) for name in preset_names()}
+    shares = {name: share_worn(one, labels) for name, one in sets.items()}
     presets = []
     for name in sorted(shares, key=lambda name: -shares[name]):
-        wanted = read_marker_set(name).labels
+        wanted = sets[name].labels
         absent = [label for label in wanted if label not in labels]
         more = f" and {len(absent) - _LISTED} more" if len(absent) > _LISTED else ""
         table.add_row(name, f"{len(wanted) - len(absent)} of {len(wanted)}", ", ".join(absent[:_LISTED]) + more)
         presets.append({"name": name, "labels": len(wanted), "absent": absent})
     out.print(table)
     best = nearest_preset(labels)
-    recognised = next((name for name in shares if is_worn(best, labels) and read_marker_set(name) == best), None)
+    recognised = next((name for name in shares if is_worn(best, labels) and sets[name] == best), None)
     if recognised:
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
     elif output is None:

@@ -21,6 +21,7 @@ from kinertia.io.c3d_structure import doubts_about
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
+from kinertia.io.subject_prefix import without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import FloatArray, Markers, Recording
@@ -197,7 +198,7 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
     outputs = _outputs(file["parameters"], labels)
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
     kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs]
-    names, notes = _without_prefixes(path, [labels[k] for k in kept])
+    names, notes = without_prefixes(path, [labels[k] for k in kept])
     chosen: dict[str, int] = {}
     for k, name in zip(kept, names, strict=True):
         if name not in chosen or (not seen[chosen[name]] and seen[k]):
@@ -230,19 +231,6 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
     lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
     listed = {label for name in lists for label in _continued(parameters, name)}
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}
-
-
-def _without_prefixes(path: Path, labels: list[str]) -> tuple[list[str], list[str]]:
-    """Labels without `subject:`; of several subjects only the one with most labels loses its prefix."""
-    prefixes = Counter(label.split(":", 1)[0] for label in labels if ":" in label)
-    if not prefixes:
-        return labels, []
-    subject = prefixes.most_common(1)[0][0]
-    notes = [f"{path.name}: the prefix '{subject}:' was removed from the labels"]
-    if len(prefixes) > 1:
-        others = ", ".join(name for name in prefixes if name != subject)
-        notes = [f"{path.name}: several subjects; '{subject}:' was removed from the labels, {others} keep theirs"]
-    return [label.removeprefix(subject + ":") for label in labels], notes
 
 
 def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[str]]:

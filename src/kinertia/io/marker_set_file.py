@@ -12,7 +12,16 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.toml_lines import TomlFile, parse_toml, read_toml
-from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, is_worn, mismatch, share_worn
+from kinertia.model.marker_set import (
+    LANDMARKS,
+    SEGMENTS,
+    WIDTHS,
+    MarkerSet,
+    is_worn,
+    mismatch,
+    share_worn,
+    spelled_as,
+)
 
 
 def preset_names() -> list[str]:
@@ -50,22 +59,22 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
 
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
-    """Of the presets that these labels hardly lack anything of, but for trunk and arms, the one that has most of them;
-    else the one that shares most of its labels, be it many or few; if several share as many, the one that does so but
-    for capitals and punctuation; of such that are part of one another, the larger.
+    """Of the presets that these labels hardly lack anything of, but for trunk and arms, the one that has most of them,
+    letter by letter before `spelled_as` they are; else the one that shares most of its labels, be it many or few, in
+    the same order; of such that are part of one another, the larger. It is spelled as the labels are where it fits.
     """
-    letters = {_letters(label) for label in labels}
+    presets = [read_marker_set(name) for name in preset_names()]
+    spelled = [spelled_as(preset, labels) for preset in presets]
 
-    def nearness(preset: MarkerSet) -> tuple[float, float, float, int]:
-        own, share = {_letters(label) for label in preset.labels}, share_worn(preset, labels)
-        worn = len(set(preset.labels) & set(labels)) if is_worn(preset, labels) else 0
-        return worn, share, len(own & letters) / len(own), len(preset.labels)
+    def worn(one: MarkerSet) -> int:
+        return len(set(one.labels) & set(labels)) if is_worn(one, labels) else 0
 
-    return max(map(read_marker_set, preset_names()), key=nearness)
+    def nearness(k: int) -> tuple[float, ...]:
+        both = presets[k], spelled[k]
+        return *(worn(one) for one in both), *(share_worn(one, labels) for one in both), len(presets[k].labels)
 
-
-def _letters(label: str) -> str:
-    return "".join(letter for letter in label if letter.isalnum()).lower()
+    best = max(range(len(presets)), key=nearness)
+    return spelled[best] if is_worn(spelled[best], labels) else presets[best]
 
 
 def _marker_set(document: TomlFile, path: Path) -> MarkerSet:

@@ -12,6 +12,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.io.number_table import read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
+from kinertia.io.subject_prefix import without_prefixes
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -25,8 +26,9 @@ _MOST_DECIMALS = 7
 def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
-    Empty cells, NaN and the triple 0 0 0 are missing markers. Frame times that were rounded when written are
-    put back on the uniform grid they came from. `read_trc_recording` tells when either was needed.
+    Empty cells, NaN and the triple 0 0 0 are missing markers; `subject:` before the labels is taken off. Frame times
+    that were rounded when written are put back on the uniform grid they came from. `read_trc_recording` tells what was
+    needed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
@@ -60,6 +62,9 @@ def read_trc_recording(path: str | Path) -> Recording:
     unit = header["Units"].lower()
     if unit not in METRES_PER_UNIT:
         raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
+    names, prefix_notes = without_prefixes(path, labels)
+    if len(set(names)) == len(names):
+        labels, label_notes = tuple(names), (*label_notes, *prefix_notes)
     markers = Markers(time, labels, positions * METRES_PER_UNIT[unit])
     notes = (*label_notes, *count_notes, *time_notes, *position_notes)
     return Recording(path.stem, markers, notes=notes, length_unit=unit)

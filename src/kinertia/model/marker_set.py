@@ -6,8 +6,9 @@ Only this knows a laboratory's names. Marker sets come from files (`kinertia.io.
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError
 
@@ -75,6 +76,35 @@ class MarkerSet:
     def foot_labels(self) -> dict[str, list[str]]:
         """Labels of the markers on the right ("r") and left ("l") foot."""
         return {side: list(self.segments[f"foot_{side}"]) for side in "rl"}
+
+
+def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
+    """The set with the labels that these lack spelled as these are, where capitals and punctuation alone tell them
+    apart, and one label only comes into question; its name says so.
+
+    Args:
+        marker_set: whose labels somebody may have typed anew, or a program has changed.
+        labels: of a recording.
+    """
+    wanted = [label for label in marker_set.labels if label not in labels]
+    others = [label for label in labels if label not in marker_set.labels]
+    own = Counter(map(folded, others)) + Counter(map(folded, wanted))
+    place = {folded(label): label for label in others}
+    spelled = {label: place[folded(label)] for label in wanted if folded(label) in place and own[folded(label)] == 2}
+    if not spelled:
+        return marker_set
+    label, written = next(iter(spelled.items()))
+    more = f" and {len(spelled) - 1} more alike" if len(spelled) > 1 else ""
+
+    def respelled(entries: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        return {name: tuple(spelled.get(one, one) for one in each) for name, each in entries.items()}
+
+    return replace(
+        marker_set,
+        name=f"{marker_set.name} ({written} taken as {label}{more})",
+        landmarks=respelled(marker_set.landmarks),
+        segments=respelled(marker_set.segments),
+    )
 
 
 def check_marker_set(marker_set: MarkerSet, labels: Sequence[str]) -> None:

@@ -17,7 +17,7 @@ _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 _WEAKEST_N = 0.3
 _CARRIED_SHARE = 0.4
 """Of what plates carry in the middle: a foot that leaves or lands takes some samples to lose or gain so much."""
-_NOTHING_N, _FEWEST_CARRIED = 0.5, 10
+_NOTHING_N, _NOTHING_NM, _FEWEST_CARRIED = 0.5, 0.005, 10
 """Amplifiers have more noise than this; so many samples under load, at least."""
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes there steeply."""
@@ -57,7 +57,7 @@ def loads_trouble(plates: PlateLoads) -> str:
 
 def loads_doubts(plates: PlateLoads) -> list[str]:
     """Saturated amplifiers; zeros that are wrong or drift, by what plates read while nobody stands on them."""
-    doubts = _dead_channels(plates) + (_held_samples(plates) or _saturated(plates))
+    doubts = _dead_channels(plates) + _without_free_moment(plates) + (_held_samples(plates) or _saturated(plates))
     if plates.idle is None:
         return doubts
     for name, idle in zip(plates.names, plates.idle, strict=True):
@@ -90,6 +90,27 @@ def _dead_channels(plates: PlateLoads) -> list[str]:
                 "moments are wrong by tens of N m without"
             )
     return doubts
+
+
+def _without_free_moment(plates: PlateLoads) -> list[str]:
+    """Plates that carry a person and show no moment about the vertical through the centre of pressure."""
+    without = []
+    for k, name in enumerate(plates.names):
+        force = plates.force[:, k]
+        carried = force[:, 1] > FIRM_LOAD_N
+        if np.count_nonzero(carried) < _FEWEST_CARRIED or force[:, 1].max() < _STEP_N:
+            continue
+        free = free_moment(np.concatenate((force[carried], plates.moment[carried, k]), axis=1))
+        if np.abs(free).max() < _NOTHING_NM:
+            without.append(name)
+    if not without:
+        return []
+    return [
+        f"no free moment (torque about the vertical) is in the loads of {', '.join(without)}: it was not exported, or "
+        "not measured, and counts as zero; feet twist against the ground by some N m: moments of hip adduction, of "
+        "rotations and of the subtalar joints, and centres of mass to the side, are off by more than their error bars "
+        "say; export the torques, too"
+    ]
 
 
 def _lost_samples(plates: PlateLoads) -> str:
