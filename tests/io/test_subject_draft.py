@@ -191,7 +191,7 @@ def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path):
     text = init_subject(person / "MarkerData")
     assert "# No forces were found for subject01_walk1.trc" in text
     assert "# forces = " in text
-    with pytest.raises(FileError, match="holds no file of markers, but its folder ID does"):
+    with pytest.raises(FileError, match="holds no file of markers, but its folders ID, MarkerData do"):
         init_subject(person)
 
 
@@ -268,6 +268,33 @@ def test_forces_nearby_are_looked_for_unless_told_not_to(tmp_path):
     (tmp_path / "forces" / "walk.mot").write_text("ground_force_vx ground_force_vy\n")
     assert tomllib.loads(init_subject(folder))["trial"][0]["forces"] == "../forces/walk.mot"
     assert "forces" not in tomllib.loads(init_subject(folder, nearby=False))["trial"][0]
+
+
+FORCES = "forces\nversion=1\nnRows=1\nnColumns=3\ninDegrees=no\nendheader\ntime\tFP1_Fx\tFP1_Fy\tFP1_Fz\n0\t0\t0\t0\n"
+
+
+def test_columns_of_any_name_are_forces_where_external_loads_say_so(tmp_path):
+    trc(tmp_path / "static.trc", 3)
+    trc(tmp_path / "walk.trc", 30)
+    (tmp_path / "walk_grf.mot").write_text(FORCES)
+    (tmp_path / "walk_ik.mot").write_text(FORCES.replace("FP1_F", "pelvis_t"))
+    text = init_subject(tmp_path)
+    assert "walk_grf.mot: no columns like ground_force_vx; rename them, or put the ExternalLoads file" in text
+    assert "walk_ik.mot" not in text
+    loads = "<ExternalLoads><ExternalForce><force_identifier> FP1_F </force_identifier></ExternalForce></ExternalLoads>"
+    (tmp_path / "walk_loads.xml").write_text(loads)
+    text = init_subject(tmp_path)
+    assert 'forces = "walk_grf.mot"' in text
+    assert 'loads = "walk_loads.xml"' in text
+    assert "No forces" not in text
+
+
+def test_folders_that_hold_markers_are_named_however_deep(tmp_path):
+    for folder, name in (("Static", "cal"), ("Walking/trial1", "markers")):
+        (tmp_path / folder).mkdir(parents=True)
+        trc(tmp_path / folder / f"{name}.trc", 3)
+    with pytest.raises(FileError, match="its folders Static, Walking/trial1 do; give that of one person"):
+        init_subject(tmp_path)
 
 
 def test_a_sheet_of_measures_is_taken_up(tmp_path, measured_walk):

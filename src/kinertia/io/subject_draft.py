@@ -23,7 +23,9 @@ FILL_IN = "  # FILL IN: "
 """What is before the words of an entry that stays unknown."""
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
 """What the names of static trials contain."""
-_FORCE_FOLDER = re.compile("force|grf", re.IGNORECASE)
+_FORCE_NAME = re.compile("force|grf", re.IGNORECASE)
+_FORCES = re.compile(r"<force_identifier>\s*(\S+?)\s*</force_identifier>")
+_LISTED = 6
 NO_FORCES = "# No forces were found for"
 """How the line begins that says so of a trial."""
 
@@ -78,7 +80,7 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
             for file in matched_by_name([chosen[trial]], loads).values():
                 text += [_entry(TrialFiles, "loads", _relative(file, folder), note=" (matched by name)")]
         elif trial in alone:
-            text += [f"{NO_FORCES} {trial.name}, here or in the folders in and beside this one."]
+            text += [f"{NO_FORCES} {trial.name}, here or in the folders in and beside this one.{_unread(files)}"]
             text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
     if not trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
@@ -100,9 +102,18 @@ def _expect_files(folder: Path) -> list[Path]:
         if not _is_utf8(file.name):
             raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
     if not any(map(is_capture, files)):
-        inside = [f.name for f in files if f.is_dir() and any(map(is_capture, filter(Path.is_file, f.iterdir())))]
+        inside = [one for file in files for one in (file, *_entries(file)) if any(map(is_capture, _entries(one)))]
+        if len(inside) == 1:
+            raise FileError(
+                folder, f"holds no file of markers, but its folder {_relative(inside[0], folder)} does; give that one"
+            )
         if inside:
-            raise FileError(folder, f"holds no file of markers, but its folder {inside[0]} does; give that one")
+            listed = ", ".join(_relative(one, folder) for one in inside[:_LISTED]) + (", ..." * (len(inside) > _LISTED))
+            raise FileError(
+                folder,
+                f"holds no file of markers, but its folders {listed} do; give that of one person, with the static "
+                "trial in it, or copy the files of one person into one folder",
+            )
         raise FileError(
             folder, f"holds no file of markers ({', '.join(MARKER_FILES)}); give the folder that holds the recordings"
         )
@@ -200,7 +211,7 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
     their own, which may be another person's, and results of Kinertia are left out.
     """
     holding = [file for file in files if holds(file)]
-    of_forces = [one for one in _entries(folder.parent.parent) if _FORCE_FOLDER.search(one.name)]
+    of_forces = [one for one in _entries(folder.parent.parent) if _FORCE_NAME.search(one.name)]
     for near in ([*files, *_entries(folder.parent)], of_forces):
         for other in near if not holding else ():
             inside = [file for file in _entries(other) if file.is_file()]
@@ -234,8 +245,28 @@ def holds_forces(file: Path) -> bool:
 
 
 def has_force_columns(file: Path) -> bool:
-    """Whether it is a motion file with columns `..._vx`, `..._vy`, ..., whichever trial's."""
-    return file.suffix.lower() in (".mot", ".sto") and re.search(r"_v[xyz]\b", _head(file)) is not None
+    """Whether it is a motion file with columns `..._vx`, `..._vy`, ..., or such as the ExternalLoads beside it call
+    forces; whichever trial's.
+    """
+    if file.suffix.lower() not in (".mot", ".sto"):
+        return False
+    columns = _head(file)
+    if re.search(r"_v[xyz]\b", columns):
+        return True
+    named = [name for other in _entries(file.parent) if holds_loads(other) for name in _FORCES.findall(_head(other))]
+    return any(re.search(rf"(?<!\S){re.escape(name)}x(?!\S)", columns) for name in named)
+
+
+def _unread(files: Sequence[Path]) -> str:
+    """Of files that are called forces and have no columns that are known, what to do."""
+    named = [file for file in files if file.suffix.lower() in (".mot", ".sto") and _FORCE_NAME.search(file.stem)]
+    unread = [file.name for file in named if not has_force_columns(file)]
+    if not unread:
+        return ""
+    return (
+        f" {', '.join(unread)}: no columns like ground_force_vx; rename them, or put the ExternalLoads file (.xml) "
+        "beside it that says which column is what."
+    )
 
 
 def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
