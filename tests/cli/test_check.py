@@ -46,6 +46,28 @@ def test_subject_file(lab):
     assert outcome.err.splitlines() == ["reading"]
 
 
+def test_widths_of_joints_may_come_from_elsewhere(tmp_path, measured_recording, shared_data):
+    """Plug-in Gait has no medial markers; TRC files have no widths, the walk's C3D and the subject file may."""
+    static = measured_recording("pig_c3d/subject_b_static.c3d").markers
+    write_trc(tmp_path / "static.trc", static)
+    subject = "[subject]\nsex = 'female'\nmass_kg = 45.0\nheight_m = 1.505\nWIDTHS\n[model]\nstatic = 'static.trc'\n"
+    subject += "[[trial]]\nmarkers = 'walk.c3d'\n"
+    shutil.copy(shared_data / "pig_c3d" / "subject_b_walk.c3d", tmp_path / "walk.c3d")
+    (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", ""))
+    assert "all landmarks that the model needs" in text(run("check", tmp_path))
+    walk = measured_recording("pig_c3d/subject_b_walk.c3d").markers
+    write_trc(tmp_path / "walk.trc", walk)
+    (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", "").replace("c3d", "trc"))
+    outcome = run("check", tmp_path)
+    assert outcome.status == 1
+    assert "the knee_r needs a medial marker or the joint's width" in text(outcome)
+    stated = "\n".join(f"{joint}_width_mm = 80.0" for joint in ("knee", "ankle", "elbow"))
+    (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", stated).replace("c3d", "trc"))
+    outcome = run("check", tmp_path)
+    assert outcome.status == 0, outcome.out
+    assert "all landmarks that the model needs" in text(outcome)
+
+
 def test_a_folder_with_a_subject_file_stands_for_it(lab):
     assert run("check", lab).out == run("check", lab / "subject.toml").out
 

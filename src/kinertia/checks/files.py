@@ -9,6 +9,7 @@ from pathlib import Path
 from kinertia.checks.marker_set_match import common_marker_set
 from kinertia.checks.recording import RecordingCheck, check_recording
 from kinertia.errors import FileError, KinertiaError
+from kinertia.estimation.joint_widths import with_widths
 from kinertia.io.belt_file import read_belt
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
@@ -18,6 +19,7 @@ from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_markers import markers_of_model
+from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
 
@@ -48,6 +50,7 @@ class PersonFiles:
         marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
         mass_kg, height_m: of who walked, where they are known.
         static: which of the recordings is the static trial; if None, the only one in which the person stands still.
+        subject: who walked, with the widths of joints that were stated.
     """
 
     recordings: tuple[RecordingFiles, ...]
@@ -55,6 +58,7 @@ class PersonFiles:
     mass_kg: float | None = None
     height_m: float | None = None
     static: RecordingFiles | None = None
+    subject: Subject | None = None
 
 
 def files_of_subject(subject: SubjectFile) -> PersonFiles:
@@ -71,9 +75,9 @@ def files_of_subject(subject: SubjectFile) -> PersonFiles:
         marker_set = markers_of_model(read_osim(subject.model.osim))
     who = subject.subject
     if subject.model.static is None:
-        return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m)
+        return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m, subject=who)
     static = RecordingFiles(subject.model.static, length_unit=subject.model.length_unit)
-    return PersonFiles((static, *trials), marker_set, who.mass_kg, who.height_m, static)
+    return PersonFiles((static, *trials), marker_set, who.mass_kg, who.height_m, static, who)
 
 
 def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[RecordingFiles, ...]:
@@ -130,7 +134,11 @@ def check_files(
     checks = []
     for one, recording in recordings:
         static = statics[0] if len(statics) == 1 and recording is not statics[0] else None
-        judged = check_recording(recording, marker_set, mass_kg, one.window_s, static, height_m)
+        own_set = marker_set
+        if marker_set is not None and any(recording is each for each in statics):
+            others = [other for _, other in recordings if other is not recording]
+            recording, own_set, _ = with_widths(recording, others, marker_set, wanted.subject or Subject(name="person"))
+        judged = check_recording(recording, own_set, mass_kg, one.window_s, static, height_m)
         checks.append((one.title, judged))
     return checks, mistakes
 
