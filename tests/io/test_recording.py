@@ -8,6 +8,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
 from kinertia.trial.data import Markers
+from kinertia.trial.marker_quality import axes_trouble, extent_m
 
 
 @pytest.fixture
@@ -31,6 +32,57 @@ def test_text_files(files):
     assert recording.markers.labels == ("R.Heel",)
     assert recording.plates.force[0, 0, 1] == 400.0
     assert recording.notes == ("walk_grf.mot: no torque columns for ground_force; the free moment was taken as zero",)
+
+
+@pytest.fixture
+def upright():
+    """A walk along +X with markers from heels to head, arms half out."""
+    places = [
+        (0.0, 0.03, 0.1),
+        (0.2, 0.02, -0.1),
+        (0.0, 0.5, 0.1),
+        (0.1, 0.9, 0.2),
+        (0.0, 1.3, -0.45),
+        (0.0, 1.6, 0.45),
+    ]
+    step = np.outer(np.arange(101) / 100, [1.2, 0.0, 0.0])
+    return Markers(np.arange(101) / 100, tuple("ABCDEF"), np.array(places) + step[:, None])
+
+
+def z_up(vectors):
+    """(x, y, z) of ground axes as (x, -z, y)."""
+    return vectors[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
+
+
+def test_somebody_upright_along_z_in_a_trc_file_is_turned_and_the_forces_with_them(tmp_path, upright):
+    names = [f"ground_{kind}{axis}" for kind in ("force_v", "force_p", "torque_") for axis in "xyz"]
+    load = np.tile([30.0, 700.0, -20.0, 0.3, 0.0, 0.1, 0.0, 4.0, 0.0], (1001, 1))
+    for folder, turn in (("ground", lambda vectors: vectors), ("lab", z_up)):
+        (tmp_path / folder).mkdir()
+        write_trc(tmp_path / folder / "walk.trc", Markers(upright.time, upright.labels, turn(upright.positions)))
+        values = turn(load.reshape(-1, 3, 3)).reshape(-1, 9)
+        table = pd.DataFrame(values, index=np.arange(1001) / 1000, columns=names)
+        write_sto(tmp_path / folder / "walk.mot", table, in_degrees=False, name="grf")
+    ground, lab = (
+        read_recording(tmp_path / one / "walk.trc", tmp_path / one / "walk.mot") for one in ("ground", "lab")
+    )
+    np.testing.assert_allclose(lab.markers.positions, ground.markers.positions, atol=1e-8)
+    np.testing.assert_allclose(lab.plates.force, ground.plates.force)
+    np.testing.assert_allclose(lab.plates.moment, ground.plates.moment, atol=1e-9)
+    assert (ground.vertical, lab.vertical) == ("+Y", "+Z")
+    assert ground.notes == ()
+    assert lab.notes == ("walk.trc: people stand upright along Z; markers, and forces with them, were turned to Y up",)
+    with pytest.raises(FileError, match="in ground_force_vy, along Y, but in the markers people stand along Z"):
+        read_recording(tmp_path / "lab" / "walk.trc", tmp_path / "ground" / "walk.mot")
+
+
+@pytest.mark.parametrize("shift", [0.3, -1.0, 5.0])
+def test_whoever_may_lie_is_not_turned(tmp_path, upright, shift):
+    lying = z_up(upright.positions) + np.array([0.0, 0.0, shift])
+    write_trc(tmp_path / "walk.trc", Markers(upright.time, upright.labels, lying))
+    recording = read_recording(tmp_path / "walk.trc")
+    assert recording.notes == ()
+    assert "which should be up" in axes_trouble(extent_m(recording.markers))
 
 
 def test_statics_need_no_forces(files):

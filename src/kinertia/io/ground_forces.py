@@ -51,9 +51,14 @@ def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = Non
 
 
 def read_forces_with_notes(
-    mot_path: str | Path | None, loads_path: str | Path | None = None
+    mot_path: str | Path | None, loads_path: str | Path | None = None, turn: FloatArray | None = None
 ) -> tuple[PlateLoads, tuple[str, ...]]:
-    """`read_forces` and the assumptions made while reading, one sentence each."""
+    """`read_forces` and the assumptions made while reading, one sentence each.
+
+    Args:
+        mot_path, loads_path: as there.
+        turn: rotation (3, 3) from the axes of the file to ground axes, where they are others.
+    """
     notes: tuple[str, ...] = ()
     if loads_path is None:
         if mot_path is None:
@@ -70,7 +75,7 @@ def read_forces_with_notes(
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
     _expect_steady_time(path, table.time)
-    wrenches = [_wrench(path, table, group) for group in groups]
+    wrenches = [_wrench(path, table, group, np.eye(3) if turn is None else turn) for group in groups]
     loads = PlateLoads(
         table.time,
         tuple(group.name for group in groups),
@@ -98,22 +103,29 @@ def _expect_steady_time(path: Path, time: FloatArray) -> None:
         )
 
 
-def _wrench(path: Path, table: TimeTable, group: _Columns) -> PlateLoad:
+def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> PlateLoad:
     """Force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
-    force = _triple(table, group.force)
+    force = _triple(table, group.force) @ turn.T
     _expect_numbers(path, table, group.force, np.ones(len(force), dtype=bool))
+    up, largest = int(np.argmax(turn[1])), int(np.argmax(np.abs(force @ turn).max(axis=0)))
+    if largest == 1 != up:
+        raise FileError(
+            path,
+            f"the largest forces are in {group.force}y, along Y, but in the markers people stand along {'XYZ'[up]}; "
+            "export markers and forces in the same axes, Y up",
+        )
     if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
         raise FileError(
             path,
-            f"the largest vertical force in {group.force}y is {force[:, 1].min():.0f} N, downward; expected "
-            "Y up and the force on the person, turn the sign or the axes before export",
+            f"the largest vertical force in {group.force}{'xyz'[up]} is {force[:, 1].min():.0f} N, downward; expected "
+            f"{'XYZ'[up]} up and the force on the person, turn the sign or the axes before export",
         )
     loaded = force[:, 1] >= LOAD_THRESHOLD_N
     _expect_numbers(path, table, group.point, loaded)
-    moment = np.cross(_triple(table, group.point), force)
+    moment = np.cross(_triple(table, group.point) @ turn.T, force)
     if group.torque is not None:
         _expect_numbers(path, table, group.torque, loaded)
-        moment = moment + _triple(table, group.torque)
+        moment = moment + _triple(table, group.torque) @ turn.T
     return without_idle(table.time, force, moment)
 
 

@@ -8,7 +8,10 @@ import numpy as np
 
 from kinertia.io.c3d_plates import LabPlates
 from kinertia.trial.data import BoolArray, FloatArray
+from kinertia.trial.marker_quality import UPRIGHT_SHARE
 
+_FEWEST_SEEN = 6
+_ABOVE_FLOOR_M, _LOWEST_TOP_M, _HIGHEST_TOP_M = 0.2, 0.5, 2.5
 _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(3) for sign in ("", "+", "-")}
 
 
@@ -49,6 +52,25 @@ def to_ground(
     if up != "+Y":
         notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
     return _rotation(*data_up), up, notes
+
+
+def upright_along_z(positions: FloatArray) -> FloatArray | None:
+    """The rotation (3, 3) to ground axes where a person stands upright on the floor z = 0; None where that is not sure.
+
+    For files that cannot say which axis is up. In half of the frames or more, markers reach from the floor to above a
+    child's hip along Z, and much less far along Y.
+
+    Args:
+        positions: (n, m, 3) m in the laboratory's axes; NaN where not seen.
+    """
+    seen = positions[_seen(positions).sum(axis=1) >= _FEWEST_SEEN]
+    if not len(seen):
+        return None
+    low, high = (np.median(reach(seen, axis=1), axis=0) for reach in (np.nanmin, np.nanmax))
+    extent = high - low
+    upright = extent[2] == extent.max() and extent[1] < UPRIGHT_SHARE * extent[2]
+    on_floor = abs(low[2]) < _ABOVE_FLOOR_M and _LOWEST_TOP_M < high[2] < _HIGHEST_TOP_M
+    return _rotation(2, 1) if upright and on_floor else None
 
 
 def _seen(positions: FloatArray) -> BoolArray:

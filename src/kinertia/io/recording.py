@@ -9,9 +9,10 @@ import numpy as np
 
 from kinertia.errors import FileError, TrialError
 from kinertia.io.ground_forces import read_forces_with_notes
+from kinertia.io.lab_axes import upright_along_z
 from kinertia.io.number_table import expect_file
 from kinertia.io.trc import read_trc_recording
-from kinertia.trial.data import Recording
+from kinertia.trial.data import FloatArray, Recording
 
 MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
 FORCE_FILES = (".mot", ".sto", ".tsv")
@@ -39,7 +40,8 @@ def read_recording(
         standing: of a .c3d file of poses (Theia), the same person standing upright, as a static trial.
 
     Returns:
-        the recording; its `plates` is None where no file holds usable force plates.
+        the recording; its `plates` is None where no file holds usable force plates. Somebody who stands along Z in a
+        .trc file is turned to Y up, and the forces of a file with them.
 
     Raises:
         FileError: a file is missing, broken, or of a kind that Kinertia does not read.
@@ -49,6 +51,9 @@ def read_recording(
     _expect_kind(markers_path, MARKER_FILES, "markers")
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
     recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit, standing)
+    turn = upright_along_z(recording.markers.positions) if markers_path.suffix.lower() == ".trc" else None
+    if turn is not None:
+        recording = _turned(recording, markers_path, turn)
     if tsv:
         forces_path = None
     if forces_path is not None:
@@ -56,7 +61,7 @@ def read_recording(
     if loads_path is not None:
         _expect_kind(Path(loads_path), (".xml",), "external loads")
     if forces_path is not None or loads_path is not None:
-        plates, notes = read_forces_with_notes(forces_path, loads_path)
+        plates, notes = read_forces_with_notes(forces_path, loads_path, turn)
         if recording.plates is not None:
             notes = (f"{markers_path.name}: its own force plates were not used, the force file was", *notes)
         recording = replace(recording, plates=plates, notes=(*recording.notes, *notes))
@@ -87,6 +92,13 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None, stand
 
         return read_vicon_csv(path)
     return read_trc_recording(path)
+
+
+def _turned(recording: Recording, path: Path, turn: FloatArray) -> Recording:
+    """Markers of a TRC file, which takes Y to be up and has not been written so."""
+    markers = replace(recording.markers, positions=recording.markers.positions @ turn.T)
+    note = f"{path.name}: people stand upright along Z; markers, and forces with them, were turned to Y up"
+    return replace(recording, markers=markers, vertical="+Z", notes=(*recording.notes, note))
 
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:

@@ -12,7 +12,7 @@ STANDING_RANGE_M = 0.03
 """In a standing trial the median marker stays within this (5th to 95th percentile)."""
 _LEAST_WALK_M = 0.5
 """Less way than this is no net travel."""
-_UPRIGHT_SHARE = 0.7
+UPRIGHT_SHARE = 0.7
 _PLAUSIBLE_EXTENT_M = (0.3, 2.8)
 
 
@@ -114,7 +114,7 @@ def axes_trouble(extent: FloatArray) -> str:
             f"the markers of one frame reach {largest:.3g} m, which no person does; the file's unit of length must be "
             f"wrong, correct it"
         )
-    if extent[1] < _UPRIGHT_SHARE * largest:
+    if extent[1] < UPRIGHT_SHARE * largest:
         axis = "XYZ"[int(np.argmax(extent))]
         return (
             f"the markers reach {largest:.2f} m along {axis} and {extent[1]:.2f} m along Y, which should be up; turn "
