@@ -179,6 +179,13 @@ def test_no_forces_and_no_measured_frame(lab, marker_set):
     assert check.mass is None
 
 
+def test_loads_that_are_nowhere_near_the_feet_are_not_said_to_be_on_the_wrong_feet(lab, marker_set):
+    plates = lab.walk.plates
+    spoilt = replace(lab.walk, plates=replace(plates, moment=1000.0 * plates.moment, corners=None))
+    (sentence,) = [one.sentence for one in check_recording(spoilt, marker_set).verdicts if one.level == "fail"]
+    assert "in N mm" in sentence
+
+
 def test_window_of_the_user(lab, marker_set):
     (start, end), *_ = check_recording(lab.walk, marker_set).windows
     middle = (start + end) / 2

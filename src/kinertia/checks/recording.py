@@ -152,10 +152,12 @@ def check_recording(
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)
     scale = recording.mass_kg if mass_kg is None else mass_kg
+    refused = any(one.refused for one in doubts)
+    # what contacts fail for follows from what was refused: a foot on the wrong plate from its points in mm
+    trial_verdicts = [one for one in trial_verdicts if not (refused and one.level == "fail")]
     verdicts += [*_never(seen), *_gaps(within), *trial_verdicts, *_pressure(plates)]
     if trial is not None and used is not None:
         verdicts += _turning(trial, used)
-        refused = any(one.refused for one in doubts)
         verdicts += [] if refused else _verdicts(motion_doubts(recording, trial, used))
     verdicts += _weight(mass, scale)
     telling = None if used is None else _telling(recording.markers, used)
