@@ -1,8 +1,9 @@
-"""What is usual of people who walk forwards is not held against those who walk backwards."""
+"""What is not held against sound recordings: walking backwards, feet without a marker at heel or toes."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from kinertia.estimation.doubts import trial_doubts
 from kinertia.io.marker_set_file import choose_marker_set
@@ -27,3 +28,14 @@ def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(measure
     feet = {side: [one for one in own if one in markers.labels] for side, own in marker_set.foot_labels().items()}
     assert trial_doubts(walk, marker_set, None, feet) == []
     assert trial_doubts(backwards, marker_set, None, feet) == []
+
+
+@pytest.mark.parametrize("lost", ["Toe", "Heel"])
+def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(measured_recording, lost):
+    """Seen from the rest of the markers, loads begin or end off the foot; the plates are where they were."""
+    walk = measured_recording(*WALKS["gait2354"])
+    marker_set = choose_marker_set(walk.markers.labels)
+    kept = [label for label in walk.markers.labels if lost not in label]
+    assert len(kept) < len(walk.markers.labels)
+    feet = {side: [one for one in own if one in kept] for side, own in marker_set.foot_labels().items()}
+    assert trial_doubts(replace(walk, markers=walk.markers.select(kept)), marker_set, None, feet) == []

@@ -54,6 +54,31 @@ def test_a_late_clock_over_many_contacts(run, late_s):
     assert "rate" not in trouble
 
 
+@pytest.mark.parametrize("share", [0.05, 0.2])
+def test_markers_that_flicker_do_not_change_how_long_feet_stand(walk, share):
+    markers = walk.markers
+    positions = markers.positions.copy()
+    positions[np.random.default_rng(5).random(positions.shape[:2]) < share] = np.nan
+    assert said_of(replace(walk, markers=replace(markers, positions=positions))) == ""
+
+
+@pytest.mark.parametrize("side", ["r", "l"])
+def test_a_foot_that_is_hidden_while_it_stands(walk, side):
+    """For a third of a second in the middle of its longest load, with all its markers."""
+    markers, plates = walk.markers, walk.plates
+    own = [
+        markers.labels.index(label)
+        for label in choose_marker_set(markers.labels).foot_labels()[side]
+        if label in markers.labels
+    ]
+    for vertical in plates.force[..., 1].T:
+        middle = float(np.average(plates.time, weights=vertical > 200.0))
+        positions = markers.positions.copy()
+        hidden = np.abs(markers.time - middle) < 0.17
+        positions[np.ix_(hidden, own)] = np.nan
+        assert "speed" not in said_of(replace(walk, markers=replace(markers, positions=positions)))
+
+
 def test_two_contacts_do_not_tell_a_rate_from_a_clock(walk):
     """Both are named."""
     trouble = said_of(walk, 1.05)

@@ -110,7 +110,8 @@ def trial_doubts(
         sentences += torque_point_doubts(recording.plates)
         # what is usual of loads under feet is of people who land on the heel
         backwards = marker_set is not None and walks_backwards(markers, marker_set)
-        sentences += [] if feet is None or backwards else load_places_doubts(recording, feet)
+        judged = feet is not None and not backwards and _shows_whole_feet(markers, marker_set)
+        sentences += load_places_doubts(recording, feet) if judged and feet is not None else []
     return _told(sentences)
 
 
@@ -165,6 +166,19 @@ def _worn(markers: Markers, marker_set: MarkerSet | None) -> Markers:
     if marker_set is None:
         return markers
     return markers.select([label for label in marker_set.labels if label in markers.labels])
+
+
+def _shows_whole_feet(markers: Markers, marker_set: MarkerSet | None) -> bool:
+    """Whether heel and forefoot of both feet are seen: between other markers is no place to expect a load."""
+    if marker_set is None or not marker_set.landmarks:
+        return True
+    shown = {label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any()}
+    ends = [
+        [marker_set.landmarks[f"{name}_{side}"] for name in names if f"{name}_{side}" in marker_set.landmarks]
+        for side in "rl"
+        for names in (("heel",), ("metatarsal", "toe"))
+    ]
+    return all(any(shown & set(labels) for labels in end) for end in ends if end)
 
 
 def _sides(markers: Markers, marker_set: MarkerSet | None) -> str:

@@ -24,7 +24,7 @@ _NOISE_M_S, _FARTHEST_S = 0.15, 0.05
 """A speed known to the former needs no frames farther apart; frames the latter apart still show landing and leaving."""
 _THIRD_DIFFERENCE = 0.6745 * np.sqrt(20.0)
 """Median size of third differences of white noise with a deviation of one."""
-_SHORTEST_S = 0.1
+_SHORTEST_S, _MOSTLY = 0.1, 0.5
 _LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
 """Shares of the line between a foot's outermost markers."""
 _LANDING_S = 0.05
@@ -95,6 +95,7 @@ def foot_ways(
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
     if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
         return None
+    places = [_short_gaps_filled(markers.time, place) for place in places]
     ways = []
     for place, velocity in zip(places, _velocities(markers, places, belt), strict=True):
         back, front = _ends(markers.time, place)
@@ -189,15 +190,37 @@ def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> Flo
     return np.median(every, axis=0) * np.array([1.0, 0.0, 1.0]) if len(every) else np.zeros(3)
 
 
+def _short_gaps_filled(time: FloatArray, place: FloatArray) -> FloatArray:
+    """Places (n, m, 3) with gaps up to `_SHORTEST_S` bridged by a line: markers that flicker do not end a stand."""
+    filled = place.copy()
+    for marker, seen in enumerate(_seen(place).T):
+        frames = np.flatnonzero(seen)
+        for first, last in runs(~seen):
+            inside = len(frames) > 0 and frames[0] < first and last < frames[-1]
+            if inside and time[last + 1] - time[first - 1] <= _SHORTEST_S + 1e-9:
+                for axis in range(3):
+                    ends = place[[first - 1, last + 1], marker, axis]
+                    gap = slice(first, last + 1)
+                    filled[gap, marker, axis] = np.interp(time[gap], time[[first - 1, last + 1]], ends)
+    return filled
+
+
 def _stands(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:
+    """Where a foot stands whose markers have these speeds (n, m); those not seen may hide where it begins or ends."""
     slowest = np.nan_to_num(speed, nan=np.inf).min(axis=1)
     known = slowest[np.isfinite(slowest)]
     fast = float(np.quantile(known, 0.95)) if known.size else 0.0
     if fast < _LEAST_SWING_M_S:
         return ()
+    seen = np.isfinite(speed)
+    hidden = np.asarray(~seen[:, seen.mean(axis=0) > _MOSTLY].all(axis=1))
+
+    def whole(first: int, last: int) -> bool:
+        return first > 0 and last < len(time) - 1 and not bool(hidden[[first - 1, first, last, last + 1]].any())
+
     stands = bridged(time, slowest < np.clip(_SLOW * fast, *_SLOW_M_S))
     return tuple(
-        (float(time[first]), float(time[last]), bool(first > 0 and last < len(time) - 1))
+        (float(time[first]), float(time[last]), whole(first, last))
         for first, last in runs(stands)
         if time[last] - time[first] >= _SHORTEST_S
     )
