@@ -274,16 +274,18 @@ FORCES = "forces\nversion=1\nnRows=1\nnColumns=3\ninDegrees=no\nendheader\ntime\
 
 
 def test_columns_of_any_name_are_forces_where_external_loads_say_so(tmp_path):
-    trc(tmp_path / "static.trc", 3)
-    trc(tmp_path / "walk.trc", 30)
-    (tmp_path / "walk_grf.mot").write_text(FORCES)
-    (tmp_path / "walk_ik.mot").write_text(FORCES.replace("FP1_F", "pelvis_t"))
-    text = init_subject(tmp_path)
+    folder = tmp_path / "study" / "person"
+    folder.mkdir(parents=True)
+    trc(folder / "static.trc", 3)
+    trc(folder / "walk.trc", 30)
+    (folder / "walk_grf.mot").write_text(FORCES)
+    (folder / "walk_ik.mot").write_text(FORCES.replace("FP1_F", "pelvis_t"))
+    text = init_subject(folder)
     assert "walk_grf.mot: no columns like ground_force_vx; rename them, or put the ExternalLoads file" in text
     assert "walk_ik.mot" not in text
     loads = "<ExternalLoads><ExternalForce><force_identifier> FP1_F </force_identifier></ExternalForce></ExternalLoads>"
-    (tmp_path / "walk_loads.xml").write_text(loads)
-    text = init_subject(tmp_path)
+    (folder / "walk_loads.xml").write_text(loads)
+    text = init_subject(folder)
     assert 'forces = "walk_grf.mot"' in text
     assert 'loads = "walk_loads.xml"' in text
     assert "No forces" not in text
