@@ -115,8 +115,8 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
             said.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
         if unlike := sorted({segment_name(one.segment) for one in differences(first, other) if not one.same}):
             said.append(
-                f"{name} and {other_name} are of different models: origin and extent differ of {', '.join(unlike)}, which "
-                "have other joints or neighbours, so that nothing tells whether their parameters changed"
+                f"{name} and {other_name} are of different models: origin and extent differ of {', '.join(unlike)}, "
+                "which have other joints or neighbours, so that nothing tells whether their parameters changed"
             )
         said += [
             sentence for joint in _MOMENTS if (sentence := _sign_remark(joint, (name, first), (other_name, other)))
