@@ -88,7 +88,9 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
     moments = {
         trace["name"]: trace["y"] for trace in panel_of(moments_figure({"a": fit, "b": own}), "Right knee moment")
     }
-    theirs = {trace["name"]: trace["y"] for trace in panel_of(moments_figure({"b": own}), "Right knee angle moment")}
+    theirs = {
+        trace["name"]: trace["y"] for trace in panel_of(moments_figure({"b": own}), "Right knee moment, extension +")
+    }
     np.testing.assert_allclose(moments["b"], -np.asarray(theirs["b"]), rtol=1e-5)
 
 

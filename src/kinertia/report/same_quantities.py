@@ -37,12 +37,16 @@ def same_sign(name: str, side: str, one: Skeleton, other: Skeleton) -> int:
     """1 where a leg's coordinate turns the foot in the same direction in both, -1 where in opposite ones; 0 where it
     turns about another axis, or one has no such coordinate.
     """
-    first, second = (_turning(name, side, skeleton) for skeleton in (one, other))
-    cosine = float(first @ second)
+    return sign_along(turning(name, side, one), turning(name, side, other))
+
+
+def sign_along(one: np.ndarray, other: np.ndarray) -> int:
+    """1 for unit vectors (3,) that point the same way, -1 for opposite ones, 0 for others."""
+    cosine = float(one @ other)
     return int(np.sign(cosine)) if abs(cosine) > _ALIKE else 0
 
 
-def _turning(name: str, side: str, skeleton: Skeleton) -> np.ndarray:
+def turning(name: str, side: str, skeleton: Skeleton) -> np.ndarray:
     """(3,) unit vector about which the foot turns with the coordinate, where all are zero; zero if it does not."""
     column = by_side(skeleton.coordinates).get(name, {}).get(side)
     if column is None:
