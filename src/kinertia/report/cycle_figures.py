@@ -113,7 +113,7 @@ class _Drawn:
                 yield from _estimate(curves, word, colour)
             if usual:
                 line = {"color": colour, "dash": "dot", "width": 1.6}
-                yield {**mean_line(mean_curve(usual)), "name": f"{word}, {usual_name}", "line": line}
+                yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", "line": line}
 
     def _toe_offs(self) -> list[dict[str, Any]]:
         """A vertical line per side at its mean toe off."""
@@ -174,6 +174,17 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
     """(101,) of the strides that were measured there; NaN where none was."""
     return _over_strides(np.nanmean, np.array([one.value for one in curves]))
+
+
+def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
+    """(101,) of the strides that the estimate's mean is of there, so that they differ by the method alone; where that has
+    a gap, of all.
+    """
+    known = {(one.trial, one.stride.number): np.isfinite(one.value) for one in estimate}
+    nowhere = np.zeros(len(PERCENT), dtype=bool)
+    same = np.array([known.get((one.trial, one.stride.number), nowhere) for one in usual])
+    values = np.array([one.value for one in usual])
+    return _over_strides(np.nanmean, np.where(same | ~same.any(axis=0), values, np.nan))
 
 
 def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
