@@ -135,7 +135,7 @@ def test_figures_draw_the_mean_of_the_strides(fit, cycles):
 
 
 def test_the_usual_pipeline_is_of_the_strides_that_the_estimate_is_of(fit):
-    """Inverse kinematics knows strides that no plate measured: of them the two means would differ without any method."""
+    """Inverse kinematics knows strides that no plate measured: their mean would be another without any method."""
     one = next(cycle_curves(fit.trials[0], fit.mass_kg))
     flat = [replace(one, stride=replace(one.stride, number=k), value=np.full(101, 10.0 * k)) for k in (1, 2, 3)]
     known = [np.arange(101) < 40, np.arange(101) < 80]

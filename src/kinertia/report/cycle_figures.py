@@ -177,8 +177,8 @@ def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
 
 
 def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
-    """(101,) of the strides that the estimate's mean is of there, so that they differ by the method alone; where that has
-    a gap, of all.
+    """(101,) of the strides that the estimate's mean is of there, so that they differ by the method alone; of all
+    where that has a gap.
     """
     known = {(one.trial, one.stride.number): np.isfinite(one.value) for one in estimate}
     nowhere = np.zeros(len(PERCENT), dtype=bool)
