@@ -40,7 +40,7 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
     assert {one.changed for one in differences(fit, two_level)} == {None}
     assert set(comparison_columns({"a": fit, "b": two_level})["changed"]) == {None}
     page = render_comparison({"a": fit, "b": two_level})
-    assert '<p class="headline">No error bars: differences only.</p>' in page, "neither pass nor caution"
+    assert '<p class="headline">No error bars, differences only.</p>' in page, "neither pass nor caution"
     assert "<td>no</td>" not in page
     assert "<td>no</td>" in render_comparison({"a": fit, "again": fit})
 
@@ -82,7 +82,7 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
         ("torso", False, None),
     }
     assert (
-        "No segment is the same in both models: differences only."
+        "No segment is the same in both models, differences only."
         in Elements(render_comparison({"a": fit, "b": own})).text
     )
     moments = {

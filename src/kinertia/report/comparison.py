@@ -94,7 +94,7 @@ def outcome_of(compared: Sequence[Difference]) -> str:
     told = judged(compared)
     if not told:
         without = "no error bars" if any(one.same for one in compared) else "no segment is the same in both models"
-        return f"{without}: differences only"
+        return f"{without}, differences only"
     changed = sum(bool(one.changed) for one in told)
     return f"{changed or 'none'} of {len(told)} parameters changed beyond {'their' if changed else 'its'} error bars"
 
