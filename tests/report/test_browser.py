@@ -279,6 +279,30 @@ def test_figures_are_saved_by_a_button(demo, fit, form):
         assert_same_moments(pd.read_csv(path), fit.cycles())
 
 
+def numbers_of(page, figure):
+    with page.expect_download() as saving:
+        page.locator(f'.save[data-of="{figure}"] button[data-form="csv"]').click()
+    return pd.read_csv(saving.value.path())
+
+
+def test_saved_numbers_of_error_bars_and_of_the_map_are_those_of_the_fit(demo, fit):
+    changes = numbers_of(demo.page, "bsp-change")
+    masses = changes[(changes.panel == "mass (kg)") & changes.curve.str.startswith("estimate")].set_index("y")
+    ours = fit.bsp[fit.bsp.parameter == "mass"].set_index("segment")
+    for segment, words in (("thigh_r", "thigh, right"), ("torso", "torso")):
+        row = ours.loc[segment]
+        assert masses.x[words] == pytest.approx(row.estimate - row.literature, rel=1e-5)
+        assert masses.plus_minus[words] == pytest.approx(1.96 * row.sd, rel=1e-5)
+    told = numbers_of(demo.page, "bsp-information").set_index(["y", "x"]).value
+    assert len(told) == 120
+    information = fit.bsp.set_index(["segment", "parameter"]).information
+    assert told["thigh, right", "mass"] == round(100 * information["thigh_r", "mass"])
+    assert told["shank, left", "CoM upward"] == round(100 * information["shank_l", "com_y"])
+    assert "value" not in changes, "only where there is one"
+    over_time = numbers_of(demo.page, "trial1-moments")
+    assert over_time.curve.notna().all()
+
+
 def assert_same_moments(table, cycles):
     """What is in the figure's CSV is what `fit.cycles` says, in single precision."""
     for side, word in (("r", "right"), ("l", "left")):

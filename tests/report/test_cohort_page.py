@@ -1,12 +1,16 @@
 """The page of a cohort: outcomes and reasons counted, people far from the others linked, mean curves."""
 
+import json
 import re
+from dataclasses import asdict
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from kinertia.report.cohort_instruments import drift
-from kinertia.report.cohort_page import PAGE, write_cohort_page
+from kinertia.report.cohort_outcomes import lead, outcome_parts, outcomes_of, reason_of
+from kinertia.report.cohort_page import PAGE, _curves, _outliers, write_cohort_page
 from kinertia.report.cohort_tables import write_tables
 from study_results import person_record, write_cohort
 
@@ -27,8 +31,87 @@ def test_the_page_says_who_passed_and_who_is_far(cohort):
     assert re.search(r"walk: residual force # N is beyond # N\s+1\s+Ben", text)
     links = re.findall(r'<a href="(people/[^"]+)">([^<]+)</a>: ([^<]+)', page)
     assert [link[:2] for link in links] == [("people/Zo%C3%AB%20%26/report.html", "Zoë &amp;")]
-    assert links[0][2].startswith("mass of thigh r, ")
+    assert links[0][2].startswith("mass of thigh, right, ")
     assert "knee moment (N m/kg)" in page
+
+
+def test_whose_results_are_usable_with_care_has_not_passed_everything(tmp_path):
+    """As the person's own report has it; a person with a warning in two trials is one person."""
+    people = [person_record(name, 0, "") for name in ("Anna", "Ben & Co", "Zoë")] + [
+        person_record("Eve", 1, "walk7: residual force 12 N is beyond 10 N"),
+        person_record(
+            "lost", 2, "/data/lost/subject.toml, line 3: forces = 'a.mot': no such file in /data/lost; did you mean"
+        ),
+    ]
+    sound = {
+        "trials": [{"name": "walk1"}, {"name": "walk2"}],
+        "verdicts": [{"level": "pass", "sentence": "s"}],
+        "warnings": [],
+    }
+    doubted = {
+        **sound,
+        "warnings": ["walk1: 3 labels jump; look", "walk2: 4 labels jump; look", "plate 1: gain: +3.9 %"],
+    }
+    careful = {**sound, "verdicts": [{"level": "caution", "sentence": "walk2: marginal (8.5 N); so"}]}
+    failed = {**sound, "verdicts": [{"level": "fail", "sentence": "walk1: residual force 12 N is beyond 10 N"}]}
+    for name, result in (("Anna", sound), ("Ben & Co", doubted), ("Zoë", careful), ("Eve", failed)):
+        (tmp_path / "people" / name).mkdir(parents=True)
+        (tmp_path / "people" / name / "fit.json").write_text(json.dumps(result), encoding="utf-8")
+    outcomes = outcomes_of(tmp_path, pd.DataFrame([asdict(record) for record in people]))
+    assert lead(outcomes).startswith("5 people; 1 passed every check, 2 are usable with care.")
+    passed, doubts = outcome_parts(outcomes)
+    assert [trace["name"] for trace in passed.figure.data] == [
+        "passed (1)",
+        "with care (2)",
+        "not fitted (1)",
+        "a check failed (1)",
+    ]
+    assert [(row[0], row[1], re.sub("<[^>]+>", "", row[2])) for row in passed.rows] == [
+        ("residual force # N is beyond # N", "1", "Eve"),
+        ("forces = ...: no such file in ...", "1", "lost"),
+    ]
+    assert [row[:2] for row in doubts.rows] == [
+        ("# labels jump", "1"),
+        ("plate #: gain: # %", "1"),
+        ("marginal (# N)", "1"),
+    ]
+    assert doubts.rows[0][2] == '<a href="people/Ben%20%26%20Co/report.html">Ben &amp; Co</a>'
+
+
+@pytest.mark.parametrize(
+    ("sentence", "reason"),
+    [
+        ("residual at the motion's bandwidth (10 Hz): within OpenSim's guideline", None),
+        ("plate 2: x: -7.3 mm, free moment: +4.1 N m/kN (expected within 0.73 N m/kN); check", None),
+        ("C:\\lab\\x.toml, line 3: no such file 'a b.mot'; did", "no such file ..."),
+        ("no file walks/a.c3d in D:\\lab; did", "no file ... in ..."),
+    ],
+)
+def test_reasons_lose_paths_and_names_but_no_apostrophes_and_units(sentence, reason):
+    expected = re.sub(r"[-+]?[\d.]+", "#", sentence.split(";")[0]) if reason is None else reason
+    assert reason_of(sentence) == expected
+
+
+def rows_of(changes, sd):
+    """A table of one parameter: change and error bar per person."""
+    of = {"segment": "thigh_r", "parameter": "mass", "literature": 8.0, "sd": sd}
+    return pd.DataFrame([{"person": f"p{k}", "estimate": 8.0 + change, **of} for k, change in enumerate(changes)])
+
+
+def test_few_people_who_are_close_together_by_chance_make_no_outlier():
+    changes = [0.0, 0.001, -0.001, 0.002, 0.3]
+    assert not _outliers(rows_of(changes, 0.5)).listed, "less than its error bar"
+    assert len(_outliers(rows_of(changes, 0.01)).listed) == 1
+    assert len(_outliers(rows_of(changes, np.nan)).listed) == 1, "two-level has no error bars"
+
+
+def test_where_nobody_was_measured_mean_curves_have_a_gap():
+    every = np.tile([2.0, 4.0, 8.5], (101, 1))
+    every[40:60] = 0.0
+    spread, line = _curves({"knee_angle_moment": every}).data
+    assert np.isnan(np.asarray(line["y"], dtype=float)[40:60]).all()
+    assert np.asarray(line["y"])[:40] == pytest.approx(2.0)
+    assert not set(range(40, 60)) & set(np.asarray(spread["x"])[np.isfinite(spread["y"])].tolist())
 
 
 @pytest.mark.slow

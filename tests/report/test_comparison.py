@@ -11,6 +11,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import comparison_columns, differences, moments_figure, remarks, render_comparison
 from kinertia.report.files import save_fit
 from kinertia.report.headline import words
+from kinertia.report.same_quantities import same_segment, same_sign
 from report_page import Elements
 
 
@@ -39,7 +40,7 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
     assert {one.changed for one in differences(fit, two_level)} == {None}
     assert set(comparison_columns({"a": fit, "b": two_level})["changed"]) == {None}
     page = render_comparison({"a": fit, "b": two_level})
-    assert '<p class="headline">No error bars: differences only.</p>' in page, "neither pass nor caution"
+    assert '<p class="headline">No error bars, differences only.</p>' in page, "neither pass nor caution"
     assert "<td>no</td>" not in page
     assert "<td>no</td>" in render_comparison({"a": fit, "again": fit})
 
@@ -74,15 +75,68 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
     said = " ".join(remarks({"a": fit, "b": own}))
     assert "different models" in said
     assert "do not share these segments" in said
-    assert differences(fit, own)  # of those that both have
-    assert moments_figure({"a": fit, "b": own}) is not None
+    assert "knee_angle of b is positive the other way: its moments are drawn with the sign of a" in said
+    compared = differences(fit, own)  # of those that both have
+    assert {(one.segment, one.same, one.changed) for one in compared} == {
+        ("pelvis", False, None),
+        ("torso", False, None),
+    }
+    assert (
+        "No segment is the same in both models, differences only."
+        in Elements(render_comparison({"a": fit, "b": own})).text
+    )
+    moments = {
+        trace["name"]: trace["y"] for trace in panel_of(moments_figure({"a": fit, "b": own}), "Right knee moment")
+    }
+    theirs = {
+        trace["name"]: trace["y"] for trace in panel_of(moments_figure({"b": own}), "Right knee moment, extension +")
+    }
+    np.testing.assert_allclose(moments["b"], -np.asarray(theirs["b"]), rtol=1e-5)
+
+
+def panel_of(figure, title):
+    """The traces of the panel whose title begins so."""
+    titles = [note["text"] for note in figure.layout["annotations"]]
+    panel = next(k for k, one in enumerate(titles) if one.startswith(f"<b>{title}"))
+    return [trace for trace in figure.data if trace["xaxis"] == (f"x{panel + 1}" if panel else "x")]
+
+
+def test_a_segment_is_the_same_where_its_joints_and_neighbours_are(fit):
+    ours = fit.skeleton
+    assert all(same_segment(segment, ours, ours) for segment in ours.segments)
+    armless = replace(ours, joints=tuple(joint for joint in ours.joints if "arm" not in joint.child))
+    shared = [segment for segment in armless.segments if same_segment(segment, ours, armless)]
+    assert set(armless.segments) - set(shared) == {"torso"}
+    pack = replace(ours.joints[-1], child="pack", parent="torso", axes=())
+    carrying = replace(ours, joints=(*ours.joints, pack))
+    assert all(same_segment(segment, ours, carrying) for segment in ours.segments)
+
+
+@pytest.mark.parametrize(("turned_deg", "sign"), [(0, 1), (30, 1), (180, -1), (150, -1), (90, 0)])
+def test_signs_of_a_coordinate_are_told_by_what_it_turns(fit, turned_deg, sign):
+    ours = fit.skeleton
+
+    def about_another_axis(axis):
+        if axis.coordinate != "knee_angle_r":
+            return axis
+        angle = np.radians(turned_deg)
+        x, y, z = axis.direction
+        return replace(
+            axis, direction=np.array([x * np.cos(angle) - z * np.sin(angle), y, x * np.sin(angle) + z * np.cos(angle)])
+        )
+
+    other = replace(
+        ours,
+        joints=tuple(replace(joint, axes=tuple(map(about_another_axis, joint.axes))) for joint in ours.joints),
+    )
+    assert same_sign("knee_angle", "r", ours, other) == sign
+    assert same_sign("knee_angle", "l", ours, other) == 1
+    assert same_sign("wing_angle", "r", ours, other) == 0
 
 
 def test_moments_are_those_of_cycles(fit):
     figure = moments_figure({"a": fit, "b": fit})
-    titles = [note["text"] for note in figure.layout["annotations"]]
-    panel = next(k for k, title in enumerate(titles) if title.startswith("<b>Right knee moment, flexion +"))
-    traces = [trace for trace in figure.data if trace["xaxis"] == (f"x{panel + 1}" if panel else "x")]
+    traces = panel_of(figure, "Right knee moment, flexion + (N m/kg)")
     assert [trace["name"] for trace in traces] == ["a", "b"]
     cycles = fit.cycles()
     knee = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == "r")]

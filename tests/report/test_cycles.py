@@ -13,7 +13,7 @@ from kinertia.io.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.smoothing import smooth
-from kinertia.report.cycle_figures import cycle_figure, cycle_figures
+from kinertia.report.cycle_figures import cycle_figure, cycle_figures, mean_curve, usual_mean
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.files import save_fit
 from kinertia.report.page import render
@@ -132,6 +132,22 @@ def test_figures_draw_the_mean_of_the_strides(fit, cycles):
         np.testing.assert_allclose(values, rows.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
     usual = lines_of(figure, "Knee moment", ", literature values")
     assert set(usual) == {"right", "left"}
+
+
+def test_the_usual_pipeline_is_of_the_strides_that_the_estimate_is_of(fit):
+    """Inverse kinematics knows strides that no plate measured: their mean would be another without any method."""
+    one = next(cycle_curves(fit.trials[0], fit.mass_kg))
+    flat = [replace(one, stride=replace(one.stride, number=k), value=np.full(101, 10.0 * k)) for k in (1, 2, 3)]
+    known = [np.arange(101) < 40, np.arange(101) < 80]
+    estimate = [
+        replace(curve, value=np.where(where, curve.value + 1.0, np.nan))
+        for curve, where in zip(flat, known, strict=False)
+    ]
+    expected = np.repeat([15.0, 20.0, 20.0], [40, 40, 21])
+    np.testing.assert_allclose(usual_mean(flat, estimate), expected)
+    np.testing.assert_allclose(usual_mean(flat, []), 20.0)
+    apart = (mean_curve(estimate) - usual_mean(flat, estimate))[:80]
+    np.testing.assert_allclose(apart, 1.0)
 
 
 def test_dotted_curves_are_called_what_they_are(fit):

@@ -82,11 +82,10 @@ def test_coordinates_are_drawn_in_degrees_by_side(fit):
     titles = [note["text"] for note in figure["layout"]["annotations"]]
     knee = titles.index("<b>Knee flexion + (degrees)</b>")
     panel = [trace for trace in figure["data"] if trace["xaxis"] == f"x{knee + 1}"]
-    drawn = {trace["name"]: numbers(trace["y"]) for trace in panel if "name" in trace}
-    lows = [numbers(trace["y"]) for trace in panel if "name" not in trace]
-    for low, side, word in zip(lows, "rl", ("right", "left"), strict=True):
+    drawn = {trace["name"]: numbers(trace["y"]) for trace in panel}
+    for side, word in (("r", "right"), ("l", "left")):
         column = fit.skeleton.coordinates.index(f"knee_angle_{side}")
-        width = drawn[f"{word} 95 % band"] - low
+        width = drawn[f"{word} 95 % band"] - drawn[f"{word} 95 % band, lower edge"]
         sd = trial.coordinate_sd[f"knee_angle_{side}"][::BAND_EVERY]
         np.testing.assert_allclose(width, 2 * 1.96 * np.degrees(sd), rtol=1e-3)
         np.testing.assert_allclose(drawn[f"{word}, estimate"], np.degrees(trial.motion.q[:, column]), atol=1e-4)

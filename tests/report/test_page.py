@@ -358,3 +358,8 @@ def test_three_trials_with_strides_stay_below_3_mb(fit):
     made = render(replace(fit, trials=fit.trials * 3, posterior=posterior))
     assert 'id="cycle"' in made
     assert len(made.encode()) < 3_000_000
+
+
+def test_the_printed_moments_over_time_say_whose_trial_they_are(fit, page):
+    """The summary on paper shows those of class "first" alone."""
+    assert f"<h3 class=first>{fit.trials[0].name}</h3>" in page

@@ -286,7 +286,7 @@ def _report(outcomes: Sequence[Record], output: Path) -> None:
         out.print(f"... and {len(noted) - _MOST_SHOWN} more, in people.csv")
     fitted = sum(record.fitted for record in outcomes)
     passed = len(outcomes) - len(noted)
-    out.print(f"{len(outcomes)} people: {fitted} fitted, {passed} of them with all checks passed")
+    out.print(f"{len(outcomes)} people: {fitted} fitted, {passed} of them without a failed check")
     out.print(
         f"results in {output}: cohort.html, cohort.parquet, trials.parquet, cycles.parquet, instruments.parquet, "
         "people.csv, people",

@@ -17,7 +17,7 @@ from kinertia.report.comparison import (
     comparison_columns,
     comparison_summary,
     differences,
-    judged,
+    outcome_of,
     remarks,
     render_comparison,
 )
@@ -56,11 +56,9 @@ def compare(
     for name, other in others:
         compared = differences(first, other)
         changed = [f"{one.parameter} of {one.segment}" for one in compared if one.changed]
-        told = f"{len(changed)} of {len(compared)} parameters changed beyond their error bars"
+        told = outcome_of(compared)
         if changed:
             told += f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})"
-        if not judged(compared):
-            told = "no error bars, differences only"
         out.print(f"{name} against {first_name}: {told}")
     out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
     return Outcome(comparison_summary(fits))

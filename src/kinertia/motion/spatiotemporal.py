@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,11 @@ from kinertia.motion.gait_cycle import FeetUnderPelvis, Stride
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET
 
-_FOOT_FLAT = (10.0, 30.0)
-"""% of the cycle in which the foot lies flat on the ground, until the heel rises."""
+_TOES_STAND = (0.3, 0.5)
+"""Of stance: the toes are on the ground already, and not leaving it yet, whether somebody walks or runs. The heel of a
+runner rises before."""
+_USUAL_STANCE = 0.6
+"""Of a stride, where toe off was not found."""
 _BELT_M_S = 0.2
 """A standing foot slides by less than this; a belt is faster."""
 
@@ -26,9 +29,10 @@ class Spatiotemporal:
         speed_m_s: stride length over stride time.
         cadence_steps_min: 120 over stride time.
         stride_length_m: of the heel from heel strike to heel strike; on a treadmill against the belt.
-        step_length_m: heel ahead of the other heel at the heel strike that ends the stride, along the stride.
+        step_length_m: from where the other heel landed to where the own one lands at the end of the stride, along the
+            stride; on a treadmill against the belt. The steps of both sides add up to the stride.
         step_time_s: from the other foot's heel strike to that one.
-        step_width_m: between the heels then, across the stride.
+        step_width_m: between these places, across the stride.
         stance_percent: of the cycle, until toe off.
         double_support_percent: of the cycle, both feet on the ground; 0 in running.
 
@@ -52,7 +56,8 @@ def spatiotemporal(
     feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None = None
 ) -> tuple[Spatiotemporal, ...]:
     """The measures of each of these strides."""
-    return tuple(_measures(feet, *pair) for pair in zip(strides, travelled(feet, strides, belt), strict=True))
+    ground = _Ground.of(feet, strides, belt)
+    return tuple(_measures(feet, ground, stride) for stride in strides)
 
 
 def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None = None) -> np.ndarray:
@@ -60,32 +65,57 @@ def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | Non
 
     Standing feet tell its speed where it is not stated, and always its direction.
     """
-    by_side = _belt_velocities(feet, strides)
-    paths = []
-    for stride in strides:
-        by_feet = by_side[stride.side]
-        start, end = (_at(feet, feet.heel[stride.side], time) for time in (stride.start_s, stride.end_s))
-        under = by_feet * (stride.end_s - stride.start_s)
-        if belt is not None:
-            along = by_feet / max(float(np.linalg.norm(by_feet)), 1e-9)
-            under = along * belt.under(FEET.index(stride.side)).way_m(stride.start_s, stride.end_s)
-        paths.append((end - start - under) * [1.0, 0.0, 1.0])
-    return np.array(paths).reshape(-1, 3)
+    ground = _Ground.of(feet, strides, belt)
+    return np.array([_path(feet, ground, stride) for stride in strides]).reshape(-1, 3)
 
 
-def _measures(feet: FeetUnderPelvis, stride: Stride, path: np.ndarray) -> Spatiotemporal:
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """A floor or belts.
+
+    Attributes:
+        velocity: per side (3,) m/s, of standing feet; zero on a floor.
+        belt: whose speed is stated, if it is.
+    """
+
+    velocity: Mapping[str, np.ndarray]
+    belt: Belt | None
+
+    @classmethod
+    def of(cls, feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None) -> _Ground:
+        """As standing feet tell it."""
+        return cls(_belt_velocities(feet, strides), belt)
+
+    def way(self, side: str, start_s: float, end_s: float) -> np.ndarray:
+        """(3,) m: how far it carries a standing foot."""
+        velocity = self.velocity[side]
+        if self.belt is None:
+            return velocity * (end_s - start_s)
+        along = velocity / max(float(np.linalg.norm(velocity)), 1e-9)
+        return along * self.belt.under(FEET.index(side)).way_m(start_s, end_s)
+
+
+def _path(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> np.ndarray:
+    start, end = (_at(feet, feet.heel[stride.side], time) for time in (stride.start_s, stride.end_s))
+    return np.asarray((end - start - ground.way(stride.side, stride.start_s, stride.end_s)) * [1.0, 0.0, 1.0])
+
+
+def _measures(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> Spatiotemporal:
     other = "l" if stride.side == "r" else "r"
+    path = _path(feet, ground, stride)
     lasted, length = stride.end_s - stride.start_s, float(np.linalg.norm(path))
     heading = path / max(length, 1e-9)
     rightward = np.array([-heading[2], 0.0, heading[0]])
-    own, others = (_at(feet, feet.heel[side], stride.end_s) for side in (stride.side, other))
-    width = float((own - others) @ rightward)
+    landed = _at(feet, feet.heel[other], stride.opposite_strike_s)
+    step = _at(feet, feet.heel[stride.side], stride.end_s) - landed
+    step -= ground.way(other, stride.opposite_strike_s, stride.end_s)
+    width = float(step @ rightward)
     return Spatiotemporal(
         stride_time_s=lasted,
         speed_m_s=length / lasted,
         cadence_steps_min=120.0 / lasted,
         stride_length_m=length,
-        step_length_m=float((own - others) @ heading),
+        step_length_m=float(step @ heading),
         step_time_s=stride.end_s - stride.opposite_strike_s,
         step_width_m=width if stride.side == "r" else -width,
         stance_percent=stride.percent(stride.toe_off_s),
@@ -115,11 +145,14 @@ def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> dict[s
 
 
 def _belt_velocity(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
-    """(3,) m/s, horizontal: how fast standing feet go; zero on a floor."""
+    """(3,) m/s, horizontal: how fast the toes of standing feet go; zero on a floor."""
     velocities = []
     for stride in strides:
-        first, last = (stride.start_s + share / 100 * (stride.end_s - stride.start_s) for share in _FOOT_FLAT)
-        heel = feet.heel[stride.side]
-        velocities.append((_at(feet, heel, last) - _at(feet, heel, first)) / (last - first))
+        stance = stride.toe_off_s - stride.start_s
+        if np.isnan(stance):
+            stance = _USUAL_STANCE * (stride.end_s - stride.start_s)
+        first, last = (stride.start_s + share * stance for share in _TOES_STAND)
+        toe = feet.toe[stride.side]
+        velocities.append((_at(feet, toe, last) - _at(feet, toe, first)) / (last - first))
     velocity = np.median(velocities, axis=0) * [1.0, 0.0, 1.0] if velocities else np.zeros(3)
     return velocity if np.linalg.norm(velocity) > _BELT_M_S else np.zeros(3)

@@ -5,24 +5,24 @@ Made from the cohort's tables: of ten thousand people, curves are summed up piec
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote
 
 import numpy as np
-from markupsafe import Markup, escape
 
 from kinertia.io.output_folder import write_then_rename
+from kinertia.model.bsp import PARAMETERS
 from kinertia.report import style
+from kinertia.report.bsp_figures import NAMES, segment_name
 from kinertia.report.cohort_instruments import COLUMNS, drift
+from kinertia.report.cohort_outcomes import lead, linked, outcome_parts, outcomes_of
+from kinertia.report.cycle_figures import band, mean_line
 from kinertia.report.figure import Figure
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.result_page import Part, render_parts
-from kinertia.report.row_figures import bar_figure, dot_figure
-from kinertia.studies.cohort_record import AGAINST, PASSED
+from kinertia.report.row_figures import dot_figure
+from kinertia.studies.cohort_record import AGAINST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,21 +40,20 @@ _CURVES = {
 }
 _NORMAL = 1.4826
 """Standard deviation over median distance from the median, of normal values."""
-_MOST_REASONS, _MOST_OUTLIERS, _FAR = 12, 20, 6.0
+_MOST_OUTLIERS, _FAR = 20, 6.0
 _SIZES = {"force (N)": "force_rms_N", "moment (N m)": "moment_rms_Nm"}
 
 
 def write_cohort_page(folder: Path) -> None:
     """Write the page beside the tables that `write_tables` has written into the folder."""
     people = _read(folder, "people", ("person", "status", "sentence"))
-    parts = [_outcomes(people)]
+    outcomes = outcomes_of(folder, people)
+    parts = outcome_parts(outcomes)
     if (people["status"] <= AGAINST).any():
         bsp = _read(folder, "cohort", ("person", "segment", "parameter", "literature", "estimate", "sd"))
         parts += [*_changes(bsp), _residuals(folder), _outliers(bsp), *_mean_curves(folder)]
         parts += drift(_read(folder, "instruments", COLUMNS))
-    passed = int((people["status"] == PASSED).sum())
-    lead = f"{len(people)} people; {passed} passed every check. Each one's report is in people/NAME/report.html."
-    write_then_rename(folder / PAGE, render_parts("Cohort", lead, parts))
+    write_then_rename(folder / PAGE, render_parts("Cohort", lead(outcomes), parts))
 
 
 def _read(folder: Path, table: str, columns: Sequence[str]) -> pd.DataFrame:
@@ -67,39 +66,6 @@ def _read(folder: Path, table: str, columns: Sequence[str]) -> pd.DataFrame:
     return frame
 
 
-def _outcomes(people: pd.DataFrame) -> Part:
-    """How many passed, and the reasons of the others, counted: numbers in a sentence do not make another reason."""
-    words = {"passed": people["status"] == PASSED, "a check failed": people["status"] == AGAINST}
-    counts = {word: int(of.sum()) for word, of in words.items()}
-    counts["not fitted"] = len(people) - sum(counts.values())
-    bars = bar_figure(
-        ["people"],
-        {f"{word} ({count})": [count] for word, count in counts.items()},
-        ", ".join(f"{count} {word}" for word, count in counts.items()),
-        "people",
-    )
-    others = people[people["status"] != PASSED]
-    reasons: Counter[str] = Counter()
-    names: dict[str, list[str]] = {}
-    for person, sentence in zip(others["person"], others["sentence"], strict=True):
-        reason = _reason(sentence)
-        reasons[reason] += 1
-        names.setdefault(reason, []).append(person)
-    rows = [
-        (reason, str(count), ", ".join(names[reason][:5]) + (", ..." if count > 5 else ""))
-        for reason, count in reasons.most_common(_MOST_REASONS)
-    ]
-    return Part("Who passed", figure=bars, headings=("why not", "people", "who"), rows=rows)
-
-
-def _reason(sentence: str) -> str:
-    """The first clause without names of trials and numbers."""
-    text = re.sub(r"^[^ ]*[/\\][^:]*?(, line \d+)?: ", "", sentence)
-    text = re.sub(r"'[^']*'|\"[^\"]*\"|\S*[/\\]\S*", "...", text)
-    text = re.sub(r"[-+]?\d+(\.\d+)?", "#", text)
-    return re.split(r"; |\. ", text, maxsplit=1)[0] or "no reason given"
-
-
 def _changes(bsp: pd.DataFrame) -> Iterator[Part]:
     """Estimate minus literature, segment by segment, over people."""
     change = bsp["estimate"] - bsp["literature"]
@@ -110,7 +76,7 @@ def _changes(bsp: pd.DataFrame) -> Iterator[Part]:
         grouped = (factor * change[chosen]).groupby(bsp["segment"][chosen], observed=True)
         panels[title] = {word: grouped.quantile(share)[segments].tolist() for word, share in _QUANTILES.items()}
     figure = dot_figure(
-        [segment.replace("_", " ") for segment in segments], panels, "Change by the estimate, by segment, over people."
+        [segment_name(segment) for segment in segments], panels, "Change by the estimate, by segment, over people."
     )
     caption = "Estimate minus literature. Every number: cohort.parquet (kinertia cohort --csv: cohort.csv)."
     yield Part("What the estimates changed", figure=figure, caption=caption)
@@ -133,22 +99,24 @@ def _residuals(folder: Path) -> Part:
 
 
 def _outliers(bsp: pd.DataFrame) -> Part:
-    """People with a parameter far from the others', in the spread of the others; each linked to the report."""
+    """People with a parameter far from the others', in the others' spread or, where that is larger, in error bars: few
+    people may be close together by chance. Each is linked to the report.
+    """
     parameter = [bsp["segment"], bsp["parameter"]]
     change = bsp["estimate"] - bsp["literature"]
     away = (change - change.groupby(parameter, observed=True).transform("median")).abs()
     spread = _NORMAL * away.groupby(parameter, observed=True).transform("median")
-    score = (away / spread.where(spread > 0)).fillna(0.0)
+    unit = spread.where(~(spread < bsp["sd"]), bsp["sd"])
+    score = (away / unit.where(unit > 0)).fillna(0.0)
     worst = bsp.loc[score.groupby(bsp["person"], observed=True).idxmax(), ["person", "segment", "parameter"]]
     rows = zip(score[worst.index], *(worst[name].astype(str) for name in worst), strict=True)
     far = sorted((row for row in rows if row[0] > _FAR), reverse=True)
     listed = [
-        Markup('<a href="people/{}/report.html">{}</a>: {}, {:.1f} spreads from the others').format(
-            quote(person), escape(person), f"{name} of {segment.replace('_', ' ')}", value
-        )
+        linked(person)
+        + f": {NAMES[PARAMETERS.index(name)]} of {segment_name(segment)}, {value:.1f} spreads from the others"
         for value, person, segment, name in far[:_MOST_OUTLIERS]
     ]
-    text = "Whose change of a parameter is more than six spreads (by the median) from the median of all."
+    text = "Whose change of a parameter is more than six spreads (by the median, or error bars) from the median of all."
     return Part("Far from the others", (text if listed else f"Nobody: {text[0].lower()}{text[1:]}",), listed=listed)
 
 
@@ -176,20 +144,10 @@ def _mean_curves(folder: Path) -> Iterator[Part]:
 def _curves(sums: Mapping[str, np.ndarray]) -> Figure:
     panels = []
     for quantity, every in sums.items():
-        measured = np.flatnonzero(every[:, 0])
-        percent, total = measured.tolist(), every[measured]
+        total = np.where(every[:, :1] > 0, every, np.nan)  # gaps where nobody was measured
         mean = total[:, 1] / total[:, 0]
         sd = np.sqrt(np.maximum(total[:, 2] / total[:, 0] - mean**2, 0.0))
-        band = {
-            "type": "scatter",
-            "x": percent + percent[::-1],
-            "y": [*(mean + sd).tolist(), *(mean - sd)[::-1].tolist()],
-            "fill": "toself",
-            "fillcolor": style.faded(style.BLUE, 0.2),
-            "line": {"width": 0},
-            "name": "mean ± SD",
-            "hoverinfo": "skip",
-        }
-        line = {"type": "scatter", "x": percent, "y": mean.tolist(), "line": {"color": style.BLUE}, "name": "mean"}
-        panels.append(Panel(_CURVES[quantity], [band, line]))
+        spread = {**band(mean - sd, mean + sd, style.faded(style.BLUE, 0.2)), "name": "mean ± SD"}
+        line = {**mean_line(mean), "name": "mean", "line": {"color": style.BLUE}}
+        panels.append(Panel(_CURVES[quantity], [spread, line]))
     return small_multiples(panels, "Mean curves over the gait cycle.", {"range": [0, 100]})

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.checks.verdict import verdicts
+from kinertia.estimation.cycles import UNITS as UNITS_OF_CURVES
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report import style
@@ -24,6 +25,7 @@ from kinertia.report.figure import Figure, written
 from kinertia.report.headline import level_of
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
+from kinertia.report.same_quantities import same_segment, same_sign
 from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
 from kinertia.trial.data import FEET
 
@@ -42,7 +44,8 @@ class Difference:
         segment, parameter, unit: which; SI units.
         first, other: their values.
         sd: of the difference, from both error bars as if they were independent. They are not: both lean on the same
-            prior, which makes the true one smaller. NaN where a result has no error bars.
+            prior, which makes the true one smaller. NaN where a result has no error bars, and where `same` is false.
+        same: whether both models mean the same by the segment (`same_segment`).
     """
 
     segment: str
@@ -51,6 +54,7 @@ class Difference:
     first: float
     other: float
     sd: float
+    same: bool
 
     @property
     def change(self) -> float:
@@ -59,7 +63,7 @@ class Difference:
 
     @property
     def changed(self) -> bool | None:
-        """Whether they differ beyond the error bars; None without them."""
+        """Whether they differ beyond the error bars; None without them, and between different segments."""
         return None if np.isnan(self.sd) else bool(self.sd > 0 and abs(self.change) > CHANGED_SD * self.sd)
 
 
@@ -72,15 +76,27 @@ def differences(first: Fit, other: Fit) -> list[Difference]:
         rows = [fit.estimate.segments.index(segment) for fit in (first, other)]
         values = [fit.estimate.table()[row] for fit, row in zip((first, other), rows, strict=True)]
         sds = [_sd(fit)[row] for fit, row in zip((first, other), rows, strict=True)]
+        same = same_segment(segment, first.skeleton, other.skeleton)
         for k, parameter in enumerate(PARAMETERS):
-            sd = float(np.hypot(sds[0][k], sds[1][k]))
-            compared.append(Difference(segment, parameter, UNITS[k], float(values[0][k]), float(values[1][k]), sd))
+            sd = float(np.hypot(sds[0][k], sds[1][k])) if same else np.nan
+            pair = float(values[0][k]), float(values[1][k])
+            compared.append(Difference(segment, parameter, UNITS[k], *pair, sd, same))
     return compared
 
 
-def judged(compared: Sequence[Difference]) -> bool:
-    """Whether there are error bars to tell a change by."""
-    return any(one.changed is not None for one in compared)
+def judged(compared: Sequence[Difference]) -> list[Difference]:
+    """Those with error bars to tell a change by."""
+    return [one for one in compared if one.changed is not None]
+
+
+def outcome_of(compared: Sequence[Difference]) -> str:
+    """How many parameters changed, in words."""
+    told = judged(compared)
+    if not told:
+        without = "no error bars" if any(one.same for one in compared) else "no segment is the same in both models"
+        return f"{without}, differences only"
+    changed = sum(bool(one.changed) for one in told)
+    return f"{changed or 'none'} of {len(told)} parameters changed beyond {'their' if changed else 'its'} error bars"
 
 
 def _sd(fit: Fit) -> np.ndarray:
@@ -97,13 +113,35 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
         lacking = sorted(set(first.estimate.segments) ^ set(other.estimate.segments))
         if lacking:
             said.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
-        if first.skeleton.name != other.skeleton.name:
-            said.append(f"{name} and {other_name} are of different models: their joint axes and segments differ")
+        if unlike := sorted({segment_name(one.segment) for one in differences(first, other) if not one.same}):
+            said.append(
+                f"{name} and {other_name} are of different models: origin and extent differ of {', '.join(unlike)}, "
+                "which have other joints or neighbours, so that nothing tells whether their parameters changed"
+            )
+        said += [
+            sentence for joint in _MOMENTS if (sentence := _sign_remark(joint, (name, first), (other_name, other)))
+        ]
     without = [one for one, fit in fits.items() if fit.posterior is None]
     if without:
         whom = f"{name}, which all are compared with" if name in without else ", ".join(without)
         said.append(f"the two-level method gives no error bars, so nothing tells a change from chance: {whom}")
     return said
+
+
+def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> str:
+    """What a moment of the other result is drawn as, where the models do not mean the same by it."""
+    (name, fit), (other_name, other_fit) = first, other
+    both = [f"{joint}_{side}" for side in FEET]
+    if not all(set(both) & set(one.skeleton.coordinates) for one in (fit, other_fit)):
+        return ""
+    signs = {same_sign(joint, side, fit.skeleton, other_fit.skeleton) for side in FEET}
+    if -1 in signs:
+        return f"{joint} of {other_name} is positive the other way: its moments are drawn with the sign of {name}"
+    return (
+        f"{joint} of {other_name} turns about another axis than in {name}: its moments are not drawn"
+        if 0 in signs
+        else ""
+    )
 
 
 def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
@@ -148,9 +186,9 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
         pairs=[
             {
                 "name": other,
-                "count": len(compared),
-                "changed": sum(bool(one.changed) for one in compared),
-                "judged": judged(compared),
+                "outcome": outcome_of(compared),
+                "changed": any(one.changed for one in compared),
+                "judged": bool(judged(compared)),
                 "rows": [_row(one) for one in compared],
             }
             for other, compared in pairs
@@ -197,23 +235,27 @@ def _row(one: Difference) -> dict[str, Any]:
 
 
 def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
-    """Mean joint moments of the legs over the gait cycle, a colour per result; None where none has strides."""
+    """Mean joint moments of the legs over the gait cycle, a colour per result, with the signs of the first; None where
+    none has strides.
+    """
     walked = {name: fit for name, fit in fits.items() if _strides(fit)}
     if not walked:
         return None
     curves = {name: curves_of(fit, "estimate") for name, fit in walked.items()}
-    first = next(iter(walked.values()))
-    titles = {one.name: load_title(one, "moment") for one in panels_of(first.skeleton) if one.name in _MOMENTS}
+    first = next(iter(fits.values())).skeleton
+    titles = {one.name: load_title(one, "moment") for one in panels_of(first) if one.name in _MOMENTS}
     panels = []
     for joint, title in titles.items():
         for side in FEET:
             traces = [
-                {**mean_line(mean_curve(own_curves)), "name": plain(name), "line": {"color": colour, "width": 2}}
+                {**mean_line(sign * mean_curve(own_curves)), "name": plain(name), "line": {"color": colour, "width": 2}}
                 for (name, own), colour in zip(curves.items(), _COLOURS, strict=False)
                 if (own_curves := own.get((f"{joint}_moment", side)))
+                and (sign := same_sign(joint, side, first, walked[name].skeleton))
             ]
             if traces:
-                panels.append(Panel(f"{style.SIDES[side][0].capitalize()} {title[0].lower()}{title[1:]}", traces))
+                side_word = style.SIDES[side][0].capitalize()
+                panels.append(Panel(f"{side_word} {title[0].lower()}{title[1:]} ({UNITS_OF_CURVES['moment']})", traces))
     if not panels:
         return None
     axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}

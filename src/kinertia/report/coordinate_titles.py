@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from kinertia.model.sides import by_side
 from kinertia.model.skeleton import Skeleton
+from kinertia.report.same_quantities import sign_along, turning
+from kinertia.trial.data import FEET
 
 _GAIT27 = {
     "pelvis_tx": "Pelvis forward",
@@ -28,7 +32,17 @@ _GAIT27 = {
     "arm_add": "Shoulder adduction +",
     "elbow_flex": "Elbow flexion +",
 }
-"""Signs as in `kinertia.model.gait27`; other models may have others, so their coordinates keep their names."""
+"""Signs as in `kinertia.model.gait27`; other models may have others."""
+_MIRRORED = np.array([-1.0, -1.0, 1.0])
+_OF_LEGS = {
+    "hip_flexion": ((0.0, 0.0, 1.0), "Hip extension +"),
+    "hip_adduction": ((1.0, 0.0, 0.0), "Hip abduction +"),
+    "hip_rotation": ((0.0, 1.0, 0.0), "Hip external rotation +"),
+    "knee_angle": ((0.0, 0.0, -1.0), "Knee extension +"),
+    "ankle_angle": ((-0.1, -0.17, 0.98), "Ankle plantarflexion +"),
+    "subtalar_angle": ((0.79, 0.6, -0.12), "Subtalar eversion +"),
+}
+"""About what the right foot turns in the directions of `_GAIT27`, and what the opposite ones are called."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +56,37 @@ class Coordinate:
 
 
 def panels_of(skeleton: Skeleton) -> list[Coordinate]:
-    """The coordinates of a skeleton in their order, left and right together."""
+    """The coordinates of a skeleton in their order, left and right together.
+
+    Of an OpenSim model those of the legs are called by what they do, whichever sign they have, and the others by their
+    names.
+    """
     sides = by_side(skeleton.coordinates)
-    known = _GAIT27 if skeleton.name == "gait27" else {}
+    ours = skeleton.name == "gait27"
     return [
         Coordinate(
-            base, known.get(base, base.replace("_", " ")), columns, bool(skeleton.rotational[min(columns.values())])
+            base,
+            _GAIT27.get(base, _plain(base)) if ours else _imported_title(base, sorted(columns), skeleton),
+            columns,
+            bool(skeleton.rotational[min(columns.values())]),
         )
         for base, columns in sides.items()
     ]
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _imported_title(name: str, sides: Sequence[str], skeleton: Skeleton) -> str:
+    if name not in _OF_LEGS or not set(sides) <= set(FEET):
+        return _plain(name)
+    axis, opposite = _OF_LEGS[name]
+    right = np.array(axis)
+    along = {"r": right, "l": _MIRRORED * right}
+    signs = {sign_along(turning(name, side, skeleton), along[side]) for side in sides}
+    named = {1: _GAIT27[name], -1: opposite}
+    return named.get(signs.pop(), _plain(name)) if len(signs) == 1 else _plain(name)
 
 
 def title_of(skeleton: Skeleton, column: int) -> str:

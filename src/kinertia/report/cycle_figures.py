@@ -113,7 +113,7 @@ class _Drawn:
                 yield from _estimate(curves, word, colour)
             if usual:
                 line = {"color": colour, "dash": "dot", "width": 1.6}
-                yield {**mean_line(mean_curve(usual)), "name": f"{word}, {usual_name}", "line": line}
+                yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", "line": line}
 
     def _toe_offs(self) -> list[dict[str, Any]]:
         """A vertical line per side at its mean toe off."""
@@ -157,12 +157,12 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
     """Bands below, strides, and their mean on top."""
     mean, spread = mean_curve(curves), _spread(curves)
     if spread is not None:
-        yield {**_band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
+        yield {**band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
     sds = [one.sd for one in curves if np.isfinite(one.sd).any()]
     if sds:
         half = INTERVAL_SD * _over_strides(np.nanmean, np.array(sds))
         name = f"{word}, 95 % of the estimate"
-        yield {**_band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
+        yield {**band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
     if spread is not None:
         shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
         line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
@@ -174,6 +174,17 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
     """(101,) of the strides that were measured there; NaN where none was."""
     return _over_strides(np.nanmean, np.array([one.value for one in curves]))
+
+
+def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
+    """(101,) of the strides that the estimate's mean is of there, so that they differ by the method alone; of all
+    where that has a gap.
+    """
+    known = {(one.trial, one.stride.number): np.isfinite(one.value) for one in estimate}
+    nowhere = np.zeros(len(PERCENT), dtype=bool)
+    same = np.array([known.get((one.trial, one.stride.number), nowhere) for one in usual])
+    values = np.array([one.value for one in usual])
+    return _over_strides(np.nanmean, np.where(same | ~same.any(axis=0), values, np.nan))
 
 
 def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
@@ -214,10 +225,10 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     return {"type": "scatter", "mode": "lines", "x": x, "y": compact(y), "hovertemplate": hover}
 
 
-def _band(low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
+def band(low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
     """Around every stretch without a gap; whole percents in one byte each."""
-    band = _outline(PERCENT, low, high, colour)
-    return {**band, "x": np.asarray(band["x"]).astype(np.uint8)}
+    outline = _outline(PERCENT, low, high, colour)
+    return {**outline, "x": np.asarray(outline["x"]).astype(np.uint8)}
 
 
 def _outline(percent: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:

@@ -62,9 +62,9 @@ def bar_figure(names: Sequence[str], series: Mapping[str, Sequence[float]], alt:
     ]
     layout = base_layout(alt)
     layout |= {
-        "legend": {**layout["legend"], "traceorder": "normal"},
-        "height": 110 + _ROW_PX * len(names),
-        "margin": {"t": 44, "b": 48, "l": _LEFT_PX, "r": 14},
+        "legend": {**layout["legend"], "traceorder": "normal", "xref": "container"},
+        "height": 136 + _ROW_PX * len(names),
+        "margin": {"t": 70, "b": 48, "l": _LEFT_PX, "r": 14},
         "barmode": "stack",
         "xaxis": {"title": {"text": title, "standoff": 4, "font": {"size": 11}}, "gridcolor": "#EFEFEF"},
         "yaxis": _rows(names),

@@ -157,8 +157,10 @@ def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray
         word, colour = style.SIDES[side]
         middle, half = values[:, column], INTERVAL_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
-        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": f"{word} 95 % band".strip()}
-        traces.append({**_curve(time, middle - half, thin), **edge, "showlegend": False})
+        name = f"{word} 95 % band".strip()
+        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": name}
+        lower = {"name": f"{name}, lower edge", "showlegend": False}
+        traces.append({**_curve(time, middle - half, thin), **edge, **lower})
         traces.append({**_curve(time, middle + half, thin), **edge, **fill})
     return traces
 

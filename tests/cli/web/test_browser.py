@@ -164,6 +164,40 @@ def test_a_walk_with_a_model_to_the_verdict(tab, shared_data):
     tab.quiet()
 
 
+def test_what_was_entered_is_kept_when_files_come_or_go_and_on_other_pages(tab, tmp_path):
+    folder = tmp_path / "Anna"
+    folder.mkdir()
+    for name in ("static.c3d", "walk.c3d"):
+        shutil.copyfile(FILES / name, folder / name)
+    (folder / "list.csv").write_text("a,b\n1,2\n")
+    tab.drop(folder).arrived()
+    tab.fill(sex="male", mass="41,5")
+    tab.page.get_by_role("button", name="Remove list.csv").click()
+    playwright.expect(tab.page.get_by_text("list.csv")).to_have_count(0)
+    sex, mass = tab.page.get_by_label("Sex"), tab.page.get_by_label("Body mass (kg)")
+    playwright.expect(sex).to_have_value("male")
+    playwright.expect(mass).to_have_value("41.5")
+    mass.fill("42")
+    tab.page.get_by_text("Add files").click()
+    tab.page.get_by_label("Choose files").set_input_files(
+        {"name": "other.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"}
+    )
+    playwright.expect(tab.page.get_by_role("button", name="Remove other.csv")).to_be_visible()
+    playwright.expect(mass).to_have_value("42.0")
+    mass.fill("43")
+    tab.page.get_by_role("link", name="Markers", exact=True).click()
+    tab.page.wait_for_url("**/markers")
+    tab.page.go_back()
+    tab.page.reload()
+    playwright.expect(mass).to_have_value("43.0")
+    mass.fill("heavy")
+    tab.page.get_by_role("button", name="Remove other.csv").click()
+    playwright.expect(tab.page.locator(".message.fail")).to_contain_text("heavy")
+    playwright.expect(mass).to_have_value("heavy")
+    playwright.expect(tab.page.get_by_role("button", name="Remove other.csv")).to_be_visible()
+    tab.quiet()
+
+
 def test_a_wrong_mass_is_said_in_place(tab):
     tab.drop(FILES / "walk.c3d", FILES / "static.c3d").arrived().fill(sex="male", mass="4150", height="1.61").check()
     assert "mass_kg = 4150" in tab.message()

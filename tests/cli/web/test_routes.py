@@ -129,6 +129,34 @@ def test_estimate_takes_what_is_in_the_form(app, measured_walk, monkeypatch):
     assert added == ["fit", "fit"]
 
 
+def test_text_that_cannot_be_read_is_shown_again(app):
+    """Who mistypes a bracket does not type the rest again."""
+    person = app.library.add("Anna")
+    person.subject.write_text('[subject]\nsex = "male"\n')
+    (person.folder / "walk.c3d").write_bytes(b"")
+    typed = "[subject]\nmass_kg = 70  # long thought about\n[["
+    answer = app.post("/people/Anna/text", f"text={quote(typed)}")
+    assert answer.status == 422
+    assert "not valid TOML" in answer.text
+    assert "mass_kg = 70  # long thought about" in answer.text
+    assert "mass_kg" not in person.subject.read_text()
+
+
+def test_entries_are_kept_before_something_else_takes_their_place(app, measured_walk):
+    person = app.library.add("Anna")
+    for name in ("static.c3d", "walk.c3d"):
+        shutil.copyfile(measured_walk / name, person.folder / name)
+    assert app.post("/people/Anna/keep", "sex=male").status == 200
+    assert not person.subject.exists(), "nothing was recognised yet"
+    app.post("/people/Anna/recognise")
+    assert app.post("/people/Anna/keep", "sex=male&mass_kg=72%2C5").status == 200
+    subject = read_subject(person.subject).subject
+    assert (subject.sex, subject.mass_kg) == ("male", 72.5)
+    assert not person.notes().get("saved"), "nor checked"
+    answer = app.post("/people/Anna/keep", "mass_kg=heavy", accept="application/json")
+    assert (answer.status, "Body mass (kg)" in answer.text) == (422, True)
+
+
 def test_what_cannot_be_fitted_does_not_wait(app):
     person = app.library.add("Anna")
     assert app.post("/people/Anna/fit").status == 303

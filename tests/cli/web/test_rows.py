@@ -1,5 +1,7 @@
 """Measured segments and what is attached, as rows of the form and entries of the subject file."""
 
+import re
+
 import pytest
 
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
@@ -7,6 +9,7 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 from kinertia.cli.web.entries import entries, recognise, trouble, write_form
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.rows import rows, with_rows
+from kinertia.errors import SettingsError
 from kinertia.io.subject_file import read_subject
 
 CONTENT = {
@@ -38,6 +41,28 @@ def test_a_row_without_its_name_goes():
     changed = with_rows(CONTENT, form)
     assert list(changed["segment"]) == ["shank_l"]
     assert "attached" not in changed
+
+
+@pytest.mark.parametrize(
+    ("form", "sentence"),
+    [
+        ({"segment:2:mass_kg": "8,9 +- 0,4"}, "measured: a row with Mass (kg) '8,9 +- 0,4' has no segment; say which"),
+        ({"attached:2:segment": "torso"}, "carried: a row with Segment 'torso' has no name; say which it is"),
+        ({"segment:2:segment": "thigh_r", "segment:2:mass_kg": "9"}, "measured: thigh_r has two rows; give all its"),
+    ],
+)
+def test_what_was_typed_in_a_new_row_is_not_dropped(form, sentence):
+    typed = form_of(CONTENT) | form
+    with pytest.raises(SettingsError, match=re.escape(sentence)):
+        with_rows(CONTENT, typed)
+    shown = {field.key: field.value for each in rows(CONTENT, typed) for row in each.rows for field in row}
+    assert {key: shown[key] for key in form} == form
+
+
+def test_a_row_that_was_left_out_between_others_keeps_its_place_until_it_is_saved():
+    typed = {"segment:1:segment": "thigh_r", "segment:1:mass_kg": "9 +- 1"}
+    assert rows({}, typed)[0].rows[1][0].value == "thigh_r"
+    assert with_rows({}, typed) == {"segment": {"thigh_r": {"mass_kg": "9 +- 1"}}}
 
 
 @pytest.mark.parametrize(

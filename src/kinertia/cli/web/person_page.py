@@ -92,6 +92,7 @@ def person_page(
     problem: str = "",
     typed: Mapping[str, str] | None = None,
     said: str = "",
+    text_typed: str = "",
 ) -> HTMLResponse:
     """The page.
 
@@ -102,6 +103,7 @@ def person_page(
         problem: of what was just typed, which is shown again.
         typed: the form's fields.
         said: what was just done.
+        text_typed: of the subject file.
     """
     content: Mapping[str, Any] = {}
     broken = ""
@@ -126,8 +128,10 @@ def person_page(
         more={each.kind: each for each in rows_of(dict(content), typed)},
         segments=SEGMENTS,
         text=person.subject.read_text(encoding="utf-8", errors="replace") if person.subject.is_file() else "",
+        text_typed=text_typed,
         broken=broken,
         problem=problem,
+        typed=bool(typed),
         trouble=found,
         told=told(person, found),
         draft=notes.get("draft", "") if person.files() else "",

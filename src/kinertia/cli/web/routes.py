@@ -31,7 +31,7 @@ from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
 _STATIC = Path(__file__).with_name("static")
-_FORMS = ("files", "recognise", "remove", "entries", "text", "delete", "copy", "rename", *KINDS)
+_FORMS = ("files", "recognise", "remove", "entries", "keep", "text", "delete", "copy", "rename", *KINDS)
 """Addresses below a person's that forms are sent to."""
 _SECTIONS = {"check": "check", "fit": "results"}
 """Where on a person's page it is seen how far a check or a fit is."""
@@ -55,6 +55,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
         Route("/people/{name}/recognise", actions.recognised, methods=["POST"]),
         Route("/people/{name}/remove", actions.remove, methods=["POST"]),
         Route("/people/{name}/entries", actions.entries, methods=["POST"]),
+        Route("/people/{name}/keep", actions.keep, methods=["POST"]),
         Route("/people/{name}/text", actions.text, methods=["POST"]),
         Route("/people/{name}/rename", actions.rename, methods=["POST"]),
         Route("/people/{name}/delete", actions.delete, methods=["POST"]),
@@ -155,13 +156,21 @@ class _Actions:
             return await run_in_threadpool(person_page, request, person, self._jobs, str(error), given)
         return self._checked(request, person)
 
+    async def keep(self, request: Request) -> Response:
+        """Save the form before something else takes its place, such as the page without a file that is removed."""
+        person = self._idle(request)
+        if person.subject.is_file():
+            write_form(person, await form(request))
+        return JSONResponse({})
+
     async def text(self, request: Request) -> Response:
         """Save the subject file as it was typed, and check the files if nothing is wrong with it."""
         person = self._idle(request)
+        typed = (await form(request)).get("text", "")
         try:
-            write_text(person, (await form(request)).get("text", ""))
+            write_text(person, typed)
         except KinertiaError as error:
-            return await run_in_threadpool(person_page, request, person, self._jobs, str(error))
+            return await run_in_threadpool(person_page, request, person, self._jobs, str(error), text_typed=typed)
         return self._checked(request, person)
 
     async def start(self, request: Request) -> Response:

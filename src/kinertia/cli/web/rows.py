@@ -6,12 +6,13 @@ What stands in a row is written as it was typed, numbers as numbers; what is wro
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from kinertia.cli.web.field import Field
 from kinertia.cli.web.file_table import Content
+from kinertia.errors import SettingsError
 from kinertia.settings import Attached, KnownSegment, Table, number_of
 
 _SEGMENT = "segment"
@@ -34,6 +35,8 @@ _LABELS = {
     "com_sd_mm": "CoM known to (mm)",
     "size_mm": "Depth, height, width (mm)",
 }
+_TITLES = {"segment": "Segments that were measured", "attached": "What is worn or carried"}
+_LONGEST_NUMBER = 4
 _THREE = ("com_mm", "size_mm")
 _BETWEEN = re.compile(r"\s*;\s*|,?\s+")
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
@@ -52,6 +55,11 @@ class Rows:
     rows: tuple[tuple[Field, ...], ...]
 
     @property
+    def title(self) -> str:
+        """What they are, in the form."""
+        return _TITLES[self.kind]
+
+    @property
     def written(self) -> int:
         """How many there are but for the empty one."""
         return len(self.rows) - 1
@@ -67,12 +75,17 @@ def rows(content: Content, typed: Mapping[str, str] | None = None) -> list[Rows]
 
 
 def with_rows(content: Content, form: Mapping[str, str]) -> Content:
-    """The entries with those of the form; a row without its segment or name goes, and kinds without a row stay."""
+    """The entries with those of the form; a written row without its segment or name goes, kinds without a row stay.
+
+    Raises:
+        SettingsError: a new row lacks its segment or name, or a segment has two rows.
+    """
     changed = dict(content)
     for kind in _TABLES:
         if not any(key.startswith(f"{kind}:") for key in form):
             continue
-        entries = [{key: _value(key, text) for key, text in row.items()} for row in _typed(kind, form)]
+        typed = _with_heads(kind, _typed(kind, form), len(_written(kind, content)))
+        entries = [{key: _value(key, text) for key, text in row.items()} for row in typed]
         if kind == _SEGMENT:
             given: Any = {str(row.pop(_SEGMENT)): row for row in entries}
         else:
@@ -111,14 +124,36 @@ def _written(kind: str, content: Content) -> list[dict[str, str]]:
 
 
 def _typed(kind: str, form: Mapping[str, str]) -> list[dict[str, str]]:
-    """Rows of the form that are not empty where they must not be."""
+    """Rows of the form up to the last that is not empty."""
     found: dict[int, dict[str, str]] = {}
     for name, text in form.items():
         what, _, rest = name.partition(":")
         number, _, key = rest.partition(":")
-        if what == kind and number.isdecimal() and key in _keys(kind) and text.strip():
+        if (
+            what == kind
+            and number.isdecimal()
+            and len(number) < _LONGEST_NUMBER
+            and key in _keys(kind)
+            and text.strip()
+        ):
             found.setdefault(int(number), {})[key] = text.strip()
-    return [row for _, row in sorted(found.items()) if _keys(kind)[0] in row]
+    return [found.get(number, {}) for number in range(max(found, default=-1) + 1)]
+
+
+def _with_heads(kind: str, typed: Sequence[Mapping[str, str]], written: int) -> list[dict[str, str]]:
+    """Rows with their segment or name; of those that are written, whoever empties it removes the row."""
+    head, title = _keys(kind)[0], _TITLES[kind]
+    kept: list[dict[str, str]] = []
+    for number, row in enumerate(typed):
+        if head not in row:
+            if row and number >= written:
+                key, text = next(iter(row.items()))
+                raise SettingsError(f"{title}: a row with {_LABELS[key]} '{text}' has no {head}; say which it is")
+            continue
+        if kind == _SEGMENT and any(one[head] == row[head] for one in kept):
+            raise SettingsError(f"{title}: {row[head]} has two rows; give all its values in one")
+        kept.append(dict(row))
+    return kept
 
 
 def _shown(value: object) -> str:

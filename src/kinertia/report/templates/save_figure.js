@@ -24,20 +24,30 @@
     return at < 0 ? String(value) : quoted(plain(axis.ticktext[at]));
   }
 
+  // half the length of the error bar of every point
+  const bars = (trace) => trace.error_x?.array ?? trace.error_y?.array;
+
   function table(spec) {
-    const rows = ["panel,curve,x,y"];
+    // tiles of a map stand on a base; their numbers are their texts
+    const more = [["plus_minus", spec.data.some(bars)], ["value", spec.data.some((trace) => trace.base)]];
+    const rows = [["panel", "curve", "x", "y", ...more.filter(([, any]) => any).map(([name]) => name)].join(",")];
     for (const trace of spec.data) {
       const suffix = (trace.xaxis ?? "x").slice(1);
       const titles = spec.layout.annotations ?? [];
       const panel = quoted(plain(titles[suffix ? Number(suffix) - 1 : 0]?.text));
       const axes = ["x", "y"].map((name) => spec.layout[`${name}axis${suffix}`]);
       const y = numbers(trace.y, trace.y0, trace.dy, 0);
-      const x = numbers(trace.x, trace.x0, trace.dx, y.length);
+      const lengths = numbers(trace.x, trace.x0, trace.dx, y.length);
+      const x = trace.base ? lengths.map((length, k) => trace.base[k] + length / 2) : lengths;
+      const half = bars(trace) && numbers(bars(trace));
       const name = quoted(plain(trace.name));
       y.forEach((value, k) => {
         const gap = typeof value === "number" && !Number.isFinite(value);
         if (trace.fill === "toself" && gap) return; // between two outlines
-        rows.push([panel, name, worded(x[k], axes[0]), worded(value, axes[1])].join(","));
+        const cells = [panel, name, worded(x[k], axes[0]), worded(value, axes[1])];
+        if (more[0][1]) cells.push(half ? worded(half[k]) : "");
+        if (more[1][1]) cells.push(trace.base ? worded(trace.text[k]) : "");
+        rows.push(cells.join(","));
       });
     }
     return rows.join("\n") + "\n";

@@ -15,6 +15,48 @@
     }
   }
 
+  // the form of a person: what was entered is kept before something else takes its place
+  class Entries {
+    constructor(form) {
+      this.form = form;
+      this.saved = form.hasAttribute("data-unsaved") ? "" : this.now();
+      document.querySelectorAll("[data-keeps]").forEach((one) =>
+        one.addEventListener(one.tagName === "FORM" ? "submit" : "click", (event) => this.before(event, one)));
+    }
+
+    now() {
+      return new URLSearchParams(new FormData(this.form)).toString();
+    }
+
+    // what is wrong with it; empty if nothing is
+    async keep() {
+      const now = this.now();
+      if (now === this.saved || !now) return "";
+      try {
+        const answer = await fetch(this.form.dataset.keepAt, { method: "POST", body: new URLSearchParams(now), headers: { accept: "application/json" } });
+        if (!answer.ok) return (await answer.json()).problem;
+      } catch {
+        return ""; // nobody is there to keep it: what comes next says so
+      }
+      this.saved = now;
+      return "";
+    }
+
+    async before(event, one) {
+      if (this.now() === this.saved || event.ctrlKey || event.metaKey || event.shiftKey) return;
+      event.preventDefault();
+      // a file that goes is used as nothing
+      const use = one.closest("tr")?.querySelector("select");
+      if (use) use.value = [...use.options].at(-1).value;
+      if (await this.keep()) this.form.requestSubmit(); // and is told what is wrong, with all that was entered
+      else if (one.tagName === "FORM") one.submit();
+      else location.assign(one.href);
+    }
+  }
+
+  const form = document.getElementById("entries");
+  const entries = form && new Entries(form);
+
   class Drop {
     constructor(root) {
       this.root = root;
@@ -46,6 +88,8 @@
       const chosen = files.filter((file) => !file.name.startsWith("."));
       if (!chosen.length) return this.problem("No files in it.");
       try {
+        const wrong = entries && (await entries.keep());
+        if (wrong) return this.problem(wrong);
         const person = this.root.dataset.person || (await this.newPerson(folder || nameIn(chosen)));
         const address = `${this.root.dataset.root}/people/${encodeURIComponent(person)}`;
         const taken = await this.send(chosen, address);
