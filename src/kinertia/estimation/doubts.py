@@ -22,6 +22,7 @@ from kinertia.motion.over_smoothed import over_smoothed_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
+from kinertia.trial.force_resolution import ringing_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from kinertia.trial.mains_hum import hum_doubts, hum_trouble
 from kinertia.trial.marker_faults import (
@@ -90,17 +91,19 @@ def trial_doubts(
     if not trouble and static is not None and marker_set is not None and not _sides(static.markers, marker_set):
         trouble = body_trouble(static.markers, markers, marker_set)
         session = [] if trouble else session_doubts(static.markers, markers, marker_set)
+    smeared = [] if recording.plates is None else ringing_doubts(recording.plates)
     if not trouble and recording.plates is not None:
         trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)
-        if not trouble and feet is not None:
-            trouble = load_places_trouble(recording, feet)
+        if not trouble and feet is not None and (trouble := load_places_trouble(recording, feet)):
+            # loads that are smeared last too long
+            trouble = "; ".join([*smeared, trouble])
     if trouble:
         return _refused(trouble)
     ways = _ways_doubts(own, marker_set)
     if not ways and marker_set is not None and (torn := torn_segments_trouble(own, marker_set)):
         return _refused(torn)
     computed = [] if marker_set is None else computed_doubts(own, marker_set)
-    sentences = [*ways, *computed, *session]
+    sentences = [*ways, *computed, *session, *smeared]
     if recording.belt is None and feet is not None:
         sentences += walkway_slope_doubts(markers, feet)
     if recording.belt is not None and feet is not None:
