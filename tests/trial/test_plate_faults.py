@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.idle_plate import without_idle
-from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+from kinertia.trial.plate_faults import free_moment_doubts, loads_doubts, loads_trouble
 
 TIME = np.arange(3000) / 1000
 
@@ -79,6 +79,15 @@ def test_a_dead_channel_is_named(axis, name):
     force[..., axis] = 0.0
     (sentence,) = loads_doubts(replace(plate, force=force))
     assert f"shows no force along {name} in any sample: a channel is dead" in sentence
+
+
+def test_a_plate_without_free_moments_is_named():
+    plate = plates()
+    (sentence,) = free_moment_doubts(plate)
+    assert sentence.startswith("plate 1: no free moment")
+    turning = plate.moment + 0.005 * plate.force[..., 1:2] * np.array([0.0, 1.0, 0.0])
+    assert free_moment_doubts(replace(plate, moment=turning)) == []
+    assert free_moment_doubts(plates(factor=1e-9)) == []
 
 
 def test_zeros_in_the_middle_of_stance_are_named():

@@ -34,7 +34,7 @@ from kinertia.trial.marker_faults import (
 )
 from kinertia.trial.marker_quality import axes_trouble, extent_m
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
-from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+from kinertia.trial.plate_faults import free_moment_doubts, loads_doubts, loads_trouble
 from kinertia.trial.torque_point import torque_point_doubts
 from kinertia.trial.walkway_slope import walkway_slope_doubts
 
@@ -110,7 +110,7 @@ def trial_doubts(
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
         sentences += [*hum_doubts(recording.plates), *loads_doubts(recording.plates)]
-        sentences += torque_point_doubts(recording.plates)
+        sentences += [*torque_point_doubts(recording.plates), *free_moment_doubts(recording.plates)]
         # what is usual of loads under feet is of people who land on the heel
         backwards = marker_set is not None and walks_backwards(markers, marker_set)
         sentences += [] if feet is None or backwards else load_places_doubts(recording, feet)

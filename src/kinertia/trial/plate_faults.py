@@ -18,7 +18,7 @@ _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 _WEAKEST_N = 0.3
 _CARRIED_SHARE = 0.4
 """Of what plates carry in the middle: a foot that leaves or lands takes some samples to lose or gain so much."""
-_NOTHING_N, _FEWEST_CARRIED = 0.5, 10
+_NOTHING_N, _NOTHING_NM, _FEWEST_CARRIED = 0.5, 1e-3, 10
 """Amplifiers have more noise than this; so many samples under load, at least."""
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes and goes steeply."""
@@ -74,6 +74,23 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
         if off:
             doubts.append(_wrong_zero(name, off))
     return doubts
+
+
+def free_moment_doubts(plates: PlateLoads) -> list[str]:
+    """Plates that carry a person and show no free moment at all."""
+    still = []
+    for p, name in enumerate(plates.names):
+        wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
+        carried = wrench[wrench[:, 1] > FIRM_LOAD_N]
+        if len(carried) >= _FEWEST_CARRIED and np.abs(free_moment(carried)).max() < _NOTHING_NM:
+            still.append(name)
+    if not still:
+        return []
+    return [
+        f"{' and '.join(still)}: no free moment (about the vertical through the centre of pressure) in any sample; it "
+        "was not exported: feet turn on the ground by some N m, and moments about the long axes of the legs are wrong "
+        "by that without; export the torque about the vertical, too"
+    ]
 
 
 def _dead_channels(plates: PlateLoads) -> list[str]:
