@@ -130,7 +130,8 @@ def check_files(
     checks = []
     for one, recording in recordings:
         static = statics[0] if len(statics) == 1 and recording is not statics[0] else None
-        judged = check_recording(recording, marker_set, mass_kg, one.window_s, static, height_m)
+        is_static = one is wanted.static
+        judged = check_recording(recording, marker_set, mass_kg, one.window_s, static, height_m, is_static)
         checks.append((one.title, judged))
     return checks, mistakes
 

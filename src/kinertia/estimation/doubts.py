@@ -32,7 +32,7 @@ from kinertia.trial.marker_faults import (
     spikes_trouble,
     straight_doubts,
 )
-from kinertia.trial.marker_quality import axes_trouble, extent_m
+from kinertia.trial.marker_quality import axes_trouble, extent_m, travel
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import free_moment_doubts, loads_doubts, loads_trouble
 from kinertia.trial.torque_point import torque_point_doubts
@@ -58,6 +58,8 @@ def static_doubts(static: Recording, marker_set: MarkerSet | None, height_m: flo
     doubts = _refused(axes_trouble(extent_m(own)) or spikes_trouble(own) or _sides(static.markers, marker_set))
     if doubts or marker_set is None or not marker_set.landmarks:
         return doubts
+    if (moves := travel(own)).kind == "walks":
+        return _told([_walked(moves.distance_m)])
     stature = [] if height_m is None else stature_doubts(static, marker_set, height_m)
     return _told([*floor_doubts(static.markers, marker_set), *stature])
 
@@ -162,6 +164,14 @@ def _ways_doubts(own: Markers, marker_set: MarkerSet | None) -> list[str]:
         return noisy
     # a stretch that was written by a computer often ends with a jump
     return [*straight_doubts(own, dict(marker_set.segments) if marker_set else {}), *jump_doubts(own)]
+
+
+def _walked(distance_m: float) -> str:
+    return (
+        f"the person walks in the static trial, by {distance_m:.1f} m: the file of a motion was given in its place; "
+        "joint centres and the axes of the feet, which should stand flat on the floor, are wrong by that: give the "
+        "trial in which the person stands"
+    )
 
 
 def _worn(markers: Markers, marker_set: MarkerSet | None) -> Markers:
