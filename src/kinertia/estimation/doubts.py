@@ -13,7 +13,7 @@ from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
-from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.model.torn_segments import torn_segments_trouble
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
@@ -61,7 +61,8 @@ def static_doubts(static: Recording, marker_set: MarkerSet | None, height_m: flo
     if (moves := travel(own)).kind == "walks":
         return _told([_walked(moves.distance_m)])
     stature = [] if height_m is None else stature_doubts(static, marker_set, height_m)
-    return _told([*floor_doubts(static.markers, marker_set), *stature])
+    feet = floor_doubts(static.markers, marker_set) or flat_feet_doubts(static.markers, marker_set)
+    return _told([*feet, *stature])
 
 
 def trial_doubts(
