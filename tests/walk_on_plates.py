@@ -6,6 +6,8 @@ from kinertia.trial.data import Markers, PlateLoads, Recording
 
 FEET = {"r": ["R.Heel", "R.Toe"], "l": ["L.Heel", "L.Toe"]}
 STRIDE_S, STRIDE_M, RATE_HZ, LOAD_RATE_HZ = 1.0, 1.2, 100, 1000
+ROLL_M = 0.1
+"""By which the centre of pressure goes forwards under a foot."""
 
 
 def foot_path(time, first_contact_s, stance_s, stride_m=STRIDE_M, rise_m=0.0):
@@ -41,6 +43,7 @@ def walk(measured_steps, stance_s=0.6, stride_m=STRIDE_M, duration_s=3.0, belt_m
         force[loaded, p] = (10.0, 700.0, -5.0)
         place = np.zeros((len(load_time), 3))
         place[:, 0] = foot_path(load_time, starts[side], stance_s, stride_m)[0] - belt_m_s * load_time
+        place[:, 0] += ROLL_M * (np.clip((load_time - begin) / stance_s, 0, 1) - 0.5)
         place[:, 2] = 0.1 if side == "r" else -0.1
         place[:, 1] = step_m * (2 * number + (side == "l"))
         moment[:, p] = np.cross(place, force[:, p])

@@ -219,6 +219,36 @@ def test_loads_file_trouble(write, write_xml, case):
     assert words in str(caught.value)
 
 
+CROSSED = {
+    "same force": (("fB_v", "fA_v"), "the force of A and the force of B are the same columns, fA_vx"),
+    "same point": (("fB_p", "fA_p"), "the point of A and the point of B are the same columns"),
+    "force as torque": (("fB_m", "fB_v"), "the torque of B and the force of B are the same columns"),
+    "point as torque": (("fA_m", "fA_p"), "the torque of A and the point of A are the same columns"),
+    "torque of the other": (
+        ("fB_m", "fA_m"),
+        "B takes its force from fB_v and its torque from fA_m, which by its name",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CROSSED)
+def test_identifiers_of_another_load(write, write_xml, case):
+    replace, words = CROSSED[case]
+    force_file = write(named("A"), named("B"))
+    assert read_forces(force_file, write_xml("A", "B")).names == ("A", "B")
+    with pytest.raises(FileError) as caught:
+        read_forces(force_file, write_xml("A", "B", replace=replace))
+    assert caught.value.path.name == "loads.xml"
+    assert words in str(caught.value)
+
+
+def test_torques_that_nobody_measured_may_be_one_column(write, write_xml):
+    still = {f"none_{axis}": np.zeros(100) for axis in "xyz"}
+    xml = write_xml("A", "B", replace=("fA_m", "none_"))
+    xml.write_text(xml.read_text().replace("fB_m", "none_"))
+    assert read_forces(write(named("A"), named("B"), still), xml).names == ("A", "B")
+
+
 def test_missing_column_lists_those_that_exist(write, write_xml):
     with pytest.raises(FileError, match="the columns are fB_vx, fB_vy") as caught:
         read_forces(write(named("B")), write_xml("A"))

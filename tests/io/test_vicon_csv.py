@@ -1,5 +1,6 @@
 """ASCII exports of Vicon Nexus, written to their documented format: markers and plates come back."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +53,18 @@ BAD = {
     "another table": (lambda text: "a,b\n1,2\n3,4\n5,6\n7,8\n9,10\n", "no section of an ASCII export"),
     "a frame left out": (lambda text: text.replace("\n21,0,", "\n22,0,", 2), "frame 22 follows frame 20"),
     "a word": (lambda text: text.replace("\n7,0,", "\n7,0,none", 2), "'none.*' is not a number"),
+    "an infinite number": (
+        lambda text: text.replace("\n7,0,0.000000,", "\n7,0,1e400,", 1),
+        "infinite value in column 3",
+    ),
+    "no frame": (
+        lambda text: text.replace("\n7,3,", "\n,3,", 1),
+        "line 69: the sample of frame nan, sub frame 3, is not",
+    ),
+    "a sample lost": (
+        lambda text: re.sub("\n7,3,[^\n]*", "", text, count=1),
+        "line 69: the sample of frame 7, sub frame 4",
+    ),
     "odd units": (lambda text: text.replace("N.mm", "lbf.in"), "moments in 'lbf.in'"),
 }
 

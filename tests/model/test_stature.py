@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.trial.data import Markers
 
 PEOPLE = {
@@ -28,6 +28,7 @@ def test_the_own_stature_and_floor(person):
     static, marker_set, height_m = person
     assert stature_doubts(static, marker_set, height_m) == []
     assert floor_doubts(static.markers, marker_set) == []
+    assert flat_feet_doubts(static.markers, marker_set) == []
 
 
 @pytest.mark.parametrize("off_m", [-0.2, 0.2])
@@ -51,3 +52,15 @@ def test_feet_that_are_not_marked_enough(person):
     static, marker_set, _ = person
     without = replace(marker_set, landmarks={k: v for k, v in marker_set.landmarks.items() if "heel" not in k})
     assert floor_doubts(static.markers, without) == []
+
+
+@pytest.mark.parametrize(("landmark", "rise_m"), [("heel_r", 0.06), ("metatarsal_l", 0.06), ("heel_l", 0.02)])
+def test_a_foot_that_does_not_stand_flat(person, landmark, rise_m):
+    static, marker_set, _ = person
+    markers = static.markers
+    positions = markers.positions.copy()
+    positions[:, markers.labels.index(marker_set.landmarks[landmark][0]), 1] += rise_m
+    doubts = flat_feet_doubts(Markers(markers.time, markers.labels, positions), marker_set)
+    name, side = landmark.split("_")
+    where = f"the {name} of the {'right' if side == 'r' else 'left'} foot is "
+    assert [where in doubt for doubt in doubts] == [True] * (rise_m > 0.04)

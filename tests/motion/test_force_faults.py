@@ -66,6 +66,19 @@ def test_the_sign_of_one_plate(walk, axis, plate):
     assert one_plate_trouble(with_force(walk, lambda force: force * np.prod(signs, axis=0))) == ""
 
 
+@pytest.mark.parametrize("axis", ["X", "Z"])
+@pytest.mark.parametrize("plate", [0, 1])
+def test_the_sign_of_one_plate_in_a_run(measured_recording, plate, axis):
+    """Limbs swing so that the pelvis does not move as the centre of mass."""
+    folder = "field/rajagopal_run"
+    run = measured_recording(f"{folder}/motion_capture_run.trc", f"{folder}/grf_run.mot")
+    assert one_plate_trouble(run) == ""
+    signs = np.ones((2, 3))
+    signs[plate, "XYZ".index(axis)] = -1.0
+    trouble = one_plate_trouble(with_force(run, lambda force: force * signs))
+    assert trouble.startswith(f"the horizontal force of {run.plates.names[plate]} along {axis} has the wrong sign")
+
+
 @pytest.mark.parametrize(
     ("plates", "axis", "newton"),
     [([0], 2, 50.0), ([0], 2, -50.0), ([1], 2, 50.0), ([1], 2, -50.0), ([0, 1], 2, 50.0), ([0, 1], 0, -50.0)],

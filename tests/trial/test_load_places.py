@@ -8,7 +8,7 @@ import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import Markers, PlateLoads
+from kinertia.trial.data import Markers, PlateLoads, runs
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from recorded_walks import WALKS
 from walk_on_plates import ALL_STEPS
@@ -192,3 +192,22 @@ def test_a_foot_that_swings_is_on_no_plate(measured_recording):
     doubts = load_places_doubts(moved(run, (0.0, 0.0, 0.13)), feet)
     assert doubts
     assert not any("both feet are on it" in doubt for doubt in doubts)
+
+
+def along(recording, plate, share):
+    """The centre of pressure of one plate this many times as far from where it is on average under each step."""
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    for first, last in runs(plates.force[:, plate, 1] > 0):
+        step = point[first : last + 1, plate]
+        point[first : last + 1, plate] = step.mean(axis=0) + share * (step - step.mean(axis=0))
+    return replace(recording, plates=replace(plates, moment=np.cross(point, plates.force)))
+
+
+@pytest.mark.parametrize(("share", "said"), [(-1.5, "goes from toe to heel, by "), (0.0, "never moves while somebody")])
+def test_a_load_that_does_not_travel(share, said):
+    recording = simple_walk([("r", 0), ("l", 0)])
+    (doubt,) = load_places_doubts(along(recording, 1, share), SIMPLE_FEET)
+    assert doubt.startswith("the centre of pressure of plate 2 ")
+    assert said in doubt
+    assert not any("toe to heel" in one for one in load_places_doubts(along(recording, 1, 0.3), SIMPLE_FEET))

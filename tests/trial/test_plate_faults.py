@@ -69,7 +69,8 @@ def test_an_amplifier_at_the_end_of_its_range(top_n, lost):
 def test_rounded_forces_are_not_cut(digits):
     vertical = np.where((TIME > 1) & (TIME < 1.6), 700.0 * np.sin(np.pi * (TIME - 1) / 0.6), 0.0).round(digits)
     force = np.outer(vertical, [0.1, 1.0, 0.02])[:, None]
-    assert loads_doubts(PlateLoads(TIME, ("plate 1",), force, 0.01 * force, (None,))) == []
+    doubts = loads_doubts(PlateLoads(TIME, ("plate 1",), force, 0.01 * force, (None,)))
+    assert [one for one in doubts if "stays at" in one] == []
 
 
 @pytest.mark.parametrize(("axis", "name"), [(0, "X"), (2, "Z")])

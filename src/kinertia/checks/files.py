@@ -134,11 +134,11 @@ def check_files(
     checks = []
     for one, recording in recordings:
         static = statics[0] if len(statics) == 1 and recording is not statics[0] else None
-        own_set = marker_set
+        own_set, is_static = marker_set, one is wanted.static
         if marker_set is not None and any(recording is each for each in statics):
             others = [other for _, other in recordings if other is not recording]
             recording, own_set, _ = with_widths(recording, others, marker_set, wanted.subject or Subject(name="person"))
-        judged = check_recording(recording, own_set, mass_kg, one.window_s, static, height_m)
+        judged = check_recording(recording, own_set, mass_kg, one.window_s, static, height_m, is_static)
         checks.append((one.title, judged))
     return checks, mistakes
 

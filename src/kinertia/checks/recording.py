@@ -116,6 +116,7 @@ def check_recording(
     window_s: tuple[float, float] | None = None,
     static: Recording | None = None,
     height_m: float | None = None,
+    is_static: bool = False,
 ) -> RecordingCheck:
     """Look at one recording as a fit would, up to the first model.
 
@@ -126,6 +127,7 @@ def check_recording(
         window_s: the stretch that the user vouches for.
         static: the static trial that goes with it, if there is one.
         height_m: stature; the file's own if None.
+        is_static: it is given as the static trial; otherwise it is one if the person stands still.
     """
     match, used = match_labels(recording.markers.labels, marker_set)
     own = recording.markers
@@ -142,12 +144,12 @@ def check_recording(
             verdicts += _static(recording, used) if standing else []
     doubts = (
         static_doubts(recording, used, recording.height_m if height_m is None else height_m)
-        if standing
+        if is_static or standing
         else trial_doubts(recording, used, static, feet)
     )
     verdicts = [*_verdicts(doubts), *verdicts]
     plates = check_plates(recording, feet)
-    trial, notes, trial_verdicts = _trial(recording, feet, window_s, standing)
+    trial, notes, trial_verdicts = _trial(recording, feet, window_s, is_static or standing)
     windows = () if trial is None else tuple(trial.windows())
     within = own.cut(*windows[0]) if windows else own
     mass = None if trial is None else mass_by_strides(trial, standing)

@@ -13,7 +13,7 @@ from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.same_body import body_trouble, session_doubts
-from kinertia.model.stature import floor_doubts, stature_doubts
+from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.model.torn_segments import torn_segments_trouble
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
@@ -22,6 +22,7 @@ from kinertia.motion.over_smoothed import over_smoothed_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.foot_ways import belt_doubts
+from kinertia.trial.force_resolution import ringing_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from kinertia.trial.mains_hum import hum_doubts, hum_trouble
 from kinertia.trial.marker_faults import (
@@ -31,7 +32,7 @@ from kinertia.trial.marker_faults import (
     spikes_trouble,
     straight_doubts,
 )
-from kinertia.trial.marker_quality import axes_trouble, extent_m
+from kinertia.trial.marker_quality import axes_trouble, extent_m, travel
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import loads_doubts, loads_trouble
 from kinertia.trial.torque_point import torque_point_doubts
@@ -57,8 +58,11 @@ def static_doubts(static: Recording, marker_set: MarkerSet | None, height_m: flo
     doubts = _refused(axes_trouble(extent_m(own)) or spikes_trouble(own) or _sides(static.markers, marker_set))
     if doubts or marker_set is None or not marker_set.landmarks:
         return doubts
+    if (moves := travel(own)).kind == "walks":
+        return _told([_walked(moves.distance_m)])
     stature = [] if height_m is None else stature_doubts(static, marker_set, height_m)
-    return _told([*floor_doubts(static.markers, marker_set), *stature])
+    feet = floor_doubts(static.markers, marker_set) or flat_feet_doubts(static.markers, marker_set)
+    return _told([*feet, *stature])
 
 
 def trial_doubts(
@@ -90,17 +94,19 @@ def trial_doubts(
     if not trouble and static is not None and marker_set is not None and not _sides(static.markers, marker_set):
         trouble = body_trouble(static.markers, markers, marker_set)
         session = [] if trouble else session_doubts(static.markers, markers, marker_set)
+    smeared = [] if recording.plates is None else ringing_doubts(recording.plates)
     if not trouble and recording.plates is not None:
         trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)
-        if not trouble and feet is not None:
-            trouble = load_places_trouble(recording, feet)
+        if not trouble and feet is not None and (trouble := load_places_trouble(recording, feet)):
+            # loads that are smeared last too long
+            trouble = "; ".join([*smeared, trouble])
     if trouble:
         return _refused(trouble)
     ways = _ways_doubts(own, marker_set)
     if not ways and marker_set is not None and (torn := torn_segments_trouble(own, marker_set)):
         return _refused(torn)
     computed = [] if marker_set is None else computed_doubts(own, marker_set)
-    sentences = [*ways, *computed, *session]
+    sentences = [*ways, *computed, *session, *smeared]
     if recording.belt is None and feet is not None:
         sentences += walkway_slope_doubts(markers, feet)
     if recording.belt is not None and feet is not None:
@@ -160,6 +166,14 @@ def _ways_doubts(own: Markers, marker_set: MarkerSet | None) -> list[str]:
         return noisy
     # a stretch that was written by a computer often ends with a jump
     return [*straight_doubts(own, dict(marker_set.segments) if marker_set else {}), *jump_doubts(own)]
+
+
+def _walked(distance_m: float) -> str:
+    return (
+        f"the person walks in the static trial, by {distance_m:.1f} m: the file of a motion was given in its place; "
+        "joint centres and the axes of the feet, which should stand flat on the floor, are wrong by that: give the "
+        "trial in which the person stands"
+    )
 
 
 def _worn(markers: Markers, marker_set: MarkerSet | None) -> Markers:

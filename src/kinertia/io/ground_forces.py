@@ -244,7 +244,41 @@ def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_
         )
     if not groups:
         raise FileError(path, "all its external forces are disabled; expected at least one that applies")
+    _expect_own_columns(groups, path)
     return groups, tuple(notes)
+
+
+def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
+    """Raise FileError where loads share columns, or one takes what another's name is on."""
+    forces: dict[tuple[str, ...], str] = {}
+    taken: dict[str, str] = {}
+    for group in groups:
+        forces.setdefault(_plate_name(group.force), group.force)
+        # torques that nobody measured may be one column of zeros for all
+        for what, identifier in (("force", group.force), ("point", group.point)):
+            mine = f"the {what} of {group.name}"
+            if taken.setdefault(identifier, mine) != mine or identifier == group.torque:
+                other = f"the torque of {group.name}" if identifier == group.torque else taken[identifier]
+                raise FileError(
+                    path,
+                    f"{other} and {mine} are the same columns, {identifier}x, {identifier}y and {identifier}z; "
+                    "expected columns of its own for each: correct the identifier",
+                )
+    for group in groups:
+        for what, named in (("point", group.point), ("torque", group.torque or "")):
+            owner = forces.get(_plate_name(named), group.force)
+            if owner != group.force and _plate_name(owner) != _plate_name(group.force):
+                raise FileError(
+                    path,
+                    f"{group.name} takes its force from {group.force} and its {what} from {named}, which by its name "
+                    f"goes with {owner}: correct the identifier",
+                )
+
+
+def _plate_name(identifier: str) -> tuple[str, ...]:
+    """What tells the plate in the name of a column: "r", "1"."""
+    words = re.sub("force|torque|moment|point|cop", "_", identifier.lower())
+    return tuple(word for word in re.split(r"[_\W]+", words) if word not in ("", "v", "p", "m", "t"))
 
 
 def _text(element: ElementTree.Element, tag: str) -> str:

@@ -26,6 +26,7 @@ from kinertia.io.trc import METRES_PER_UNIT, seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _HEADER_LINES = 5
+_HALF_A_SAMPLE = 0.5
 _FASTEST_HZ = 1e6
 _NEWTON_METRES = {"N.m": 1.0, "Nm": 1.0, "N.mm": 1e-3, "Nmm": 1e-3, "mm.N": 1e-3, "m.N": 1.0}
 _MUCH_BETTER = 0.2
@@ -137,6 +138,9 @@ def _numbers(path: Path, line: int, row: Sequence[str], width: int) -> list[floa
             values.append(float(cell) if cell else np.nan)
         except ValueError:
             raise FileError(path, f"'{cell}' is not a number; repair or export it again", line) from None
+    if np.isinf(values).any():
+        column = int(np.argmax(np.isinf(values))) + 1
+        raise FileError(path, f"infinite value in column {column}; expected a number, export it again", line)
     return values
 
 
@@ -168,6 +172,7 @@ def _plates(path: Path, section: _Section | None, camera_hz: float) -> tuple[Lab
     if section is None:
         return None, np.zeros(0), []
     time = (section.rows[:, 0] - 1.0) / camera_hz + section.rows[:, 1] / section.rate_hz
+    _expect_every_sample(path, section, time)
     names, forces, moments, notes = [], [], [], []
     for owner in dict.fromkeys(section.owners):
         name, dash, what = owner.rpartition(" - ")
@@ -192,6 +197,20 @@ def _plates(path: Path, section: _Section | None, camera_hz: float) -> tuple[Lab
     if not names:
         return None, time, notes
     return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), None), time, notes
+
+
+def _expect_every_sample(path: Path, section: _Section, time: FloatArray) -> None:
+    """Raise FileError unless frames and sub frames count up at the section's rate."""
+    steps = section.rate_hz * np.diff(time, prepend=time[:1] - 1.0 / section.rate_hz)
+    odd = np.flatnonzero(~(np.abs(steps - 1.0) < _HALF_A_SAMPLE))
+    if odd.size:
+        frame, sub_frame = section.rows[odd[0], :2]
+        raise FileError(
+            path,
+            f"the sample of frame {frame:g}, sub frame {sub_frame:g}, is not the one after that before it; expected "
+            f"every sample at {section.rate_hz:g} Hz: export the section Devices again",
+            section.first_line + int(odd[0]),
+        )
 
 
 _GROUPS = (("Force", ("Fx", "Fy", "Fz")), ("Moment", ("Mx", "My", "Mz")), ("CoP", ("Cx", "Cy", "Cz")))

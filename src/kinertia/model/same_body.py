@@ -115,7 +115,7 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
 def _scaled(distances: _Distances) -> str:
     """All distances are longer, or shorter, by the same share; empty where they are not, or by little."""
     before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
-    if len(before) < _FEWEST_PAIRS:
+    if len(before) < _FEWEST_PAIRS or np.array_equal(before, after):
         return ""
     factor = float(before @ after / (before @ before))
     left = float(np.sqrt(np.square(after - factor * before).mean() / np.square(after - before).mean()))

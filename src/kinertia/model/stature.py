@@ -17,6 +17,8 @@ _PARTS = (("ankle_lateral", "knee_lateral"), ("knee_lateral", "asis"), ("asis", 
 _USUAL, _OFF = 0.815, 0.055
 _LOWEST_M = (0.008, 0.050)
 """A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low."""
+_FLAT_M = 0.04
+"""Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
 
 
 def stature_doubts(static: Recording, marker_set: MarkerSet, height_m: float) -> list[str]:
@@ -67,4 +69,26 @@ def floor_doubts(static: Markers, marker_set: MarkerSet) -> list[str]:
         f"the lowest marker of the feet, {labels[lowest]}, is {1e3 * height_m:.0f} mm above the floor while the person "
         f"stands; usual are 20 to 45 mm: the floor of the cameras is not that of the plates, or there are thick soles; "
         f"calibrate the cameras' origin on the floor, or shift the markers"
+    ]
+
+
+def flat_feet_doubts(static: Markers, marker_set: MarkerSet) -> list[str]:
+    """A foot that is not on the floor as the other is: the axes of a foot are those of one that stands flat."""
+    apart = {}
+    for name in ("heel", "metatarsal"):
+        places = [static.arranged(marker_set.landmarks.get(f"{name}_{side}", ())[:1])[..., 1] for side in "rl"]
+        if all(np.isfinite(each).any() for each in places):
+            right_m, left_m = (float(np.nanmedian(each)) for each in places)
+            apart[name] = right_m - left_m
+    if not apart:
+        return []
+    name, higher_m = max(apart.items(), key=lambda one: abs(one[1]))
+    if abs(higher_m) < _FLAT_M:
+        return []
+    side, other = ("right", "left") if higher_m > 0 else ("left", "right")
+    return [
+        f"in the static trial the {name} of the {side} foot is {1e3 * abs(higher_m):.0f} mm higher than that of the "
+        f"{other} one: that foot does not stand flat on the floor (a bent knee, a raised heel, a step), and the axes "
+        "of foot and ankle are turned by that; record the static trial with both feet flat, or take moments of that "
+        "ankle with care where the person cannot"
     ]

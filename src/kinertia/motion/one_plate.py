@@ -5,11 +5,12 @@ Judged is which single correction lets the forces move the body as its markers s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from kinertia.motion.caused_velocity import caused_velocities
+from kinertia.motion.caused_velocity import CausedVelocity, caused_velocities
 from kinertia.motion.force_faults import HORIZONTAL, OFFSET_WINDOW_S, offset_trouble
 from kinertia.motion.unexplained_velocity import TOLD_APART, Scaled, Unexplained
 from kinertia.trial.data import PlateLoads, Trial
@@ -41,7 +42,7 @@ def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, st
     if not parts or len(plates.names) < 2:
         return ""
     for axis, k in HORIZONTAL.items():
-        left = Unexplained.of(plates.time, plates.force, parts, k)
+        left = _best_explained(plates, parts, k)
         best = int(np.argmin(left.plate_turned))
         turned = left.plate_turned[best]
         rivals = [left.all_turned, left.without_trend, *np.delete(left.plate_turned, best)]
@@ -57,6 +58,17 @@ def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, st
             f"this plate (or correct the order of its corners) before export{left.or_zero(plates.names, zero, turned)}"
         )
     return ""
+
+
+def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], k: int) -> Unexplained:
+    """By pelvis and markers' centre, or, where that leaves less of long windows, by the centre alone: the pelvis of
+    runners sways along the way.
+    """
+    shown = [parts]
+    if max(float(np.ptp(part.time)) for part in parts) >= _LEAST_GAIN_WINDOW_S:
+        shown.append([replace(part, pelvis=part.centre) for part in parts])
+    found = [Unexplained.of(plates.time, plates.force, each, k) for each in shown]
+    return min(found, key=lambda one: min(one.as_read, float(one.plate_turned.min())))
 
 
 def plate_offset_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str]) -> str:

@@ -118,11 +118,14 @@ class IdleReading(NamedTuple):
         level_n: median force along X, Y, Z, N; NaN where it is hardly ever idle.
         drift_n: by how much the vertical force changes over the recording, by a straight line, N; NaN likewise.
         peak_n: the largest vertical force of the whole recording, N.
+        rings_s: for how long the vertical force is below zero just before feet land and just after they leave, s; 0
+            where it does not do both.
     """
 
     level_n: tuple[float, float, float]
     drift_n: float
     peak_n: float
+    rings_s: float
 
 
 @dataclass(frozen=True, eq=False)

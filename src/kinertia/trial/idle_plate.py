@@ -14,6 +14,7 @@ import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading, nearest_samples
+from kinertia.trial.force_resolution import ringing_s
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
@@ -64,21 +65,21 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
 
 def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
     """What a plate reads (k, 3) N while nobody stands on it: in tenths of a second in which little changes."""
-    peak_n = float(np.abs(force[:, 1]).max(initial=0.0))
+    peak_n, rings_s = float(np.abs(force[:, 1]).max(initial=0.0)), ringing_s(time, force[:, 1])
     every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
     count = len(time) // every
     if not count:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n)
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, rings_s)
     blocks = force[: count * every].reshape(count, every, 3)
     low, high = np.percentile(blocks[..., 1], (5, 95), axis=1)
     level = np.median(blocks, axis=1)
     idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < _IDLE_BLOCK_N)
     if idle.sum() < _FEWEST_BLOCKS:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n)
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, rings_s)
     x, y, z = (float(value) for value in np.median(level[idle], axis=0))
     when = time[: count * every].reshape(count, every).mean(axis=1)[idle]
     drift_n = float(np.polyfit(when - when.mean(), level[idle, 1], 1)[0]) * float(time[-1] - time[0])
-    return IdleReading((x, y, z), drift_n, peak_n)
+    return IdleReading((x, y, z), drift_n, peak_n, rings_s)
 
 
 def load_threshold_n(vertical: FloatArray) -> float:

@@ -16,6 +16,7 @@ from kinertia.trial.exchanged_plates import exchanged_plates_trouble
 from kinertia.trial.foot_ways import FootWay, foot_ways
 from kinertia.trial.load_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, Contact, contacts_of, half_within
 from kinertia.trial.load_times import delay_trouble, rate_trouble
+from kinertia.trial.load_travel import load_travel_doubts
 from kinertia.trial.other_clock import other_delay_trouble, other_rate_trouble
 from kinertia.trial.turned_plates import turned_plates_trouble
 
@@ -58,11 +59,15 @@ def load_places_trouble(recording: Recording, feet: Mapping[str, Sequence[str]])
 
 
 def load_places_doubts(recording: Recording, feet: Mapping[str, Sequence[str]]) -> list[str]:
-    """Offsets of all plates together, and loads that belong to both feet, if `load_places_trouble` found nothing."""
+    """Loads that do not travel along their foot, offsets of all plates together, and loads that belong to both feet, if
+    `load_places_trouble` found nothing.
+    """
     ways = foot_ways(recording.markers, feet, recording.belt)
     if ways is None or recording.plates is None:
         return []
     contacts = contacts_of(recording.plates, ways)
+    if travel := load_travel_doubts(recording.plates, contacts, ways):
+        return travel
     doubts = [_offset_doubt(contacts), _both_feet_doubt(recording.plates, contacts, ways)]
     return [one for one in doubts if one]
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
-from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads, runs
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads, runs
+from kinertia.trial.force_resolution import force_step_n, rounded_force_doubts
 
 _LONGEST_ARM_M = 0.15
 """Free moment over vertical force; that of feet on the ground stays below 0.04 m."""
@@ -20,12 +21,12 @@ _CARRIED_SHARE = 0.4
 _NOTHING_N, _NOTHING_NM, _FEWEST_CARRIED = 0.5, 0.005, 10
 """Amplifiers have more noise than this; so many samples under load, at least."""
 _SAME, _FLAT_S, _FEWEST_FLAT, _STEEP = 1e-6, 0.02, 4, 0.02
-"""At the end of a range a force stays exactly the same, and comes there steeply."""
+"""At the end of a range a force stays exactly the same, and comes and goes steeply."""
 _FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
 _HELD_S, _LONG_HELD_S, _FEWEST_HELD, _LEAP_STEPS = 0.025, 0.1, 3, 3.0
 """Loads of 25 sound trials never stay the same in all channels for more than 2 ms."""
-_ROUNDED = 6.0
-"""A peak that is flat for being rounded is at most 4.5 times what it is rounded to above what was as long before."""
+_ROUNDED, _STEPS = 4.0, 3.2
+"""A round peak that is flat for being rounded lasts at most twice as long as the next three steps on one side of it."""
 _IDLE_PERCENT = (2.0, 15.0)
 """A plate that somebody walks over is idle for at least so many percent of the record."""
 
@@ -57,7 +58,8 @@ def loads_trouble(plates: PlateLoads) -> str:
 
 def loads_doubts(plates: PlateLoads) -> list[str]:
     """Saturated amplifiers; zeros that are wrong or drift, by what plates read while nobody stands on them."""
-    doubts = _dead_channels(plates) + _without_free_moment(plates) + (_held_samples(plates) or _saturated(plates))
+    doubts = _dead_channels(plates) + _without_free_moment(plates)
+    doubts += rounded_force_doubts(plates) or _held_samples(plates) or _saturated(plates)
     if plates.idle is None:
         return doubts
     for name, idle in zip(plates.names, plates.idle, strict=True):
@@ -159,10 +161,18 @@ def _lasts_at_top(time: FloatArray, values: FloatArray, top: float) -> float:
         (first, last)
         for first, last in runs(values >= top * (1.0 - _SAME))
         if last - first >= _FEWEST_FLAT and time[last] - time[first] >= _FLAT_S
+        if top - values[max(2 * first - last, 0)] > _STEEP * top
     ]
-    steps = np.diff(np.unique(values))
-    rise = max(_STEEP * top, _ROUNDED * float(steps.min(initial=top)))
-    return max((float(time[b] - time[a]) for a, b in flat if top - values[max(2 * a - b, 0)] > rise), default=0.0)
+    if (step := force_step_n(values[values != 0.0])) > 0.0:
+        near = values >= top - _STEPS * step
+        beside = [max(_as_long(near[:a][::-1]), _as_long(near[b + 1 :])) for a, b in flat]
+        flat = [(a, b) for (a, b), lasts in zip(flat, beside, strict=True) if b - a > _ROUNDED * (lasts + 1)]
+    return max((float(time[last] - time[first]) for first, last in flat), default=0.0)
+
+
+def _as_long(mask: BoolArray) -> int:
+    """With how many True a mask (k,) begins."""
+    return len(mask) if mask.all() else int(np.argmin(mask))
 
 
 def _held_samples(plates: PlateLoads, least_s: float = _HELD_S) -> list[str]:

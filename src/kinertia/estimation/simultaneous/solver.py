@@ -220,7 +220,9 @@ def _step(
     right = here.right + sum(each.right for each in displaced)
     information[np.diag_indices_from(information)] += held
     step = StaticInformation.of(information, problem.layout.in_root.stop).solution(right)
-    moved_sd = float(np.sqrt(step @ information @ step))
+    moved_squared = float(step @ information @ step)
+    # rounding may leave an information that is not positive definite; then nothing has converged
+    moved_sd = float(np.sqrt(moved_squared)) if moved_squared >= 0.0 else np.inf
     coefficients, moved = [], []
     promised = 0.5 * float(here.right @ step)
     for k, (part, normal) in enumerate(zip(parts, here.normals, strict=True)):
