@@ -71,7 +71,7 @@ def test_what_the_data_say_is_counted(fit, two_level):
     assert "10 are measured " in knowledge[0]
     assert "10 informed by the data;" in knowledge[0]
     assert "100 are hardly informed" in knowledge[0]
-    assert "essentially the literature's" in knowledge[0]
+    assert "about as uncertain as the literature's" in knowledge[0]
     assert knowledge[1:4] == (
         "masses measured: pelvis",
         "masses informed by the data: torso",

@@ -29,8 +29,8 @@ def report_fit(fit: Fit) -> None:
     out.print(_bsp_table(fit))
     if fit.posterior is not None:
         out.print(
-            "** measured by the data, * informed by them, no mark: little information; the value is essentially the "
-            "prior; sd: error bar\n"
+            "** measured by the data, * informed by them, no mark: little information; about as uncertain as the "
+            "prior, even where the value moved; sd: error bar\n"
         )
     named = {"measured": "stated", "literature": _before(fit)}
     masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())

@@ -228,7 +228,8 @@ class Fit:
         """One row per segment and parameter: segment, parameter, unit, literature, estimate.
 
         The simultaneous estimate adds prior_sd, sd (deviations before and after), information, and evidence:
-        "measured" (information above 0.75), "informed" (0.25 to 0.75) or "assumed" (the literature's, hardly changed).
+        "measured" (information above 0.75), "informed" (0.25 to 0.75) or "assumed" (about as
+        uncertain as the literature's).
         """
         import pandas as pd
 

@@ -109,7 +109,8 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
     sentences = [
         f"of {len(grades)} parameters {counts['measured']} are measured (information above {100 * MEASURED:g} %) "
         f"and {counts['informed']} informed by the data; {counts['assumed']} are hardly informed (below "
-        f'{100 * INFORMED:g} %; "assumed" in the table): their values are essentially {start_of(fit).whose}'
+        f'{100 * INFORMED:g} %; "assumed" in the table): their values are about as uncertain as '
+        f"{start_of(fit).whose}, even where they moved"
     ]
     masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
