@@ -4,7 +4,8 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import TrialError
 from kinertia.estimation import calibration
-from kinertia.estimation.calibration import first_poses, sampled
+from kinertia.estimation.arm_branch import with_elbows_that_bend_forwards
+from kinertia.estimation.calibration import first_poses, sampled, turn_about
 from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import Marker
 from kinertia.trial.data import FootLoads, Markers, Trial
@@ -150,3 +151,43 @@ def test_arm_markers_in_one_trial_only_are_an_error_that_names_the_other(skeleto
     trials = [trial(walk(skeleton), "with"), trial(dropped(walk(skeleton), ARM), "bare")]
     with pytest.raises(TrialError, match=r"trial 'bare': in no frame .*arm_flex_r"):
         hold_uninformed(skeleton, trials, HELD)
+
+
+@pytest.mark.parametrize("side", ["r", "l"])
+def test_an_elbow_that_the_static_trial_has_backwards_bends_forwards(skeleton, side):
+    """As after a T-pose, in which nothing tells where a straight arm's elbow points."""
+    time, motion = smooth_motion(skeleton, 300, 100.0, 0)
+    q = motion.q.copy()
+    elbow = skeleton.coordinates.index(f"elbow_flex_{side}")
+    q[:, elbow] = 1.3 + 0.3 * np.sin(5 * time)
+    walk = trial(Markers(time, skeleton.labels, skeleton.marker_positions(skeleton.pose(q))))
+    turn = f"arm_rot_{side}"
+    spoilt = skeleton.lock({turn: skeleton.locked[turn] + 0.8 * np.pi})
+    before = first_poses(spoilt, [walk])
+    assert np.median(before[0].q[:, elbow]) < -0.8
+    mended, poses = with_elbows_that_bend_forwards(spoilt, [walk], before)
+    assert np.angle(np.exp(1j * (mended.locked[turn] - skeleton.locked[turn]))) == pytest.approx(0.0, abs=0.05)
+    np.testing.assert_allclose(np.median(poses[0].q[:, elbow]), 1.3, atol=0.1)
+    other = f"arm_rot_{'l' if side == 'r' else 'r'}"
+    assert mended.locked[other] == skeleton.locked[other]
+    assert with_elbows_that_bend_forwards(skeleton, [walk], poses) == (skeleton, poses)
+
+
+def test_markers_that_may_not_turn_as_a_whole_move_one_by_one(skeleton):
+    """What one marker has moved is found; what all have turned is left to the motion, as far as arms do not show it."""
+    about = np.array([[np.cos(0.5), 0.0, np.sin(0.5)], [0.0, 1.0, 0.0], [-np.sin(0.5), 0.0, np.cos(0.5)]])
+    torso = np.mean([m.position for m in skeleton.markers if m.segment == "torso"], axis=0)
+    turned = [
+        Marker(m.label, m.segment, torso + about @ (m.position - torso)) if m.segment == "torso" else m
+        for m in skeleton.markers
+    ]
+    sunk = np.array([0.0, -0.06, 0.0])
+    markers = [Marker(m.label, m.segment, m.position + sunk * (m.label == "R.Acromium")) for m in turned]
+    recording = walk(skeleton.with_markers(markers))
+    free = adapt(skeleton, [recording], deviations(skeleton), {})
+    held = adapt(skeleton, [recording], deviations(skeleton), {}, ("torso",))
+    assert turn_about("torso", skeleton.markers, turned) == pytest.approx(np.sin(0.5), rel=0.1)
+    by_free, by_held = (turn_about("torso", skeleton.markers, one.skeleton.markers) for one in (free, held))
+    assert by_free > 0.4
+    assert by_held < 0.6 * by_free
+    assert held.moved_m["R.Acromium"] > 0.03

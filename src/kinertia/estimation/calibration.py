@@ -27,6 +27,8 @@ _STEPS = 15
 _TOLERANCE_M = 1e-5
 _ENOUGH_M2 = 1e-6
 """Square of a millimetre."""
+_TURN_SD_RAD, _FEWEST_TO_TURN = 0.02, 3
+"""Of markers that may not turn about their segment as a whole, and how many show a turn."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ def adapt(
     poses: Sequence[InverseKinematics],
     marker_sd_m: Mapping[str, float],
     coordinate_sd: Mapping[str, float],
+    unturned: Sequence[str] = (),
 ) -> Adaptation:
     """Adapt marker positions and locked coordinates to trials, with the skeleton as the prior.
 
@@ -64,6 +67,7 @@ def adapt(
         poses: their `first_poses`; of coordinates that are locked by now no notice is taken.
         marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
         coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
+        unturned: segments about which the markers may each move, but not turn as a whole.
 
     Frames whose visible markers do not determine every coordinate are left out.
 
@@ -94,13 +98,17 @@ def adapt(
     deviation = np.concatenate(
         [list(coordinate_sd.values()), np.repeat([marker_sd_m[marker.segment] for marker in kept], 3)]
     )
+    information = np.diag(1.0 / deviation**2)
+    for segment in unturned:
+        turn = _turn_by_places(kept, segment) / _TURN_SD_RAD
+        information[len(still) :, len(still) :] += turn.T @ turn
     static = prior.copy()
     for _ in range(_STEPS):
         q = np.empty((len(moving), len(freed.coordinates)))
         q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
         residual, jacobian = _in_segments(freed, measured, q, static[len(still) :].reshape(-1, 3))
         by_moving, by_still = jacobian[..., moving_at], jacobian[..., still_at]
-        step, moving_step = _step(residual, by_moving, by_still, (prior - static) / deviation**2, deviation)
+        step, moving_step = _step(residual, by_moving, by_still, information @ (prior - static), information)
         static, moving = static + step, moving + moving_step
         if np.abs(step).max() < _TOLERANCE_M:
             break
@@ -180,11 +188,11 @@ def _in_segments(
 
 
 def _step(
-    residual: np.ndarray, by_moving: np.ndarray, by_still: np.ndarray, prior_pull: np.ndarray, deviation: np.ndarray
+    residual: np.ndarray, by_moving: np.ndarray, by_still: np.ndarray, prior_pull: np.ndarray, information: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """One Gauss-Newton step of the static unknowns (k,), still coordinates then places, and of the moving (n, c).
 
-    Takes what `_in_segments` gives.
+    Takes what `_in_segments` gives, and the prior's information (k, k).
     """
     n = len(residual)
     seen = np.isfinite(residual).reshape(n, -1)
@@ -197,7 +205,7 @@ def _step(
     solved = np.linalg.solve(normal, np.concatenate([across, gradient], axis=-1))
     # S^T S and S^T r summed over frames; a place moves its own marker only
     k = by_still.shape[-1]
-    square, right = np.diag(1.0 / deviation**2), prior_pull.copy()
+    square, right = information.copy(), prior_pull.copy()
     square[:k, :k] += np.einsum("nri,nrj->ij", by_still, by_still)
     square[:k, k:] += by_still.sum(axis=0).T / MARKER_NOISE_M
     square[k:, :k] = square[:k, k:].T
@@ -208,6 +216,28 @@ def _step(
     followed = across.reshape(-1, len(right)).T @ solved.reshape(-1, len(right) + 1)
     step = np.linalg.solve(square - followed[:, :-1], right - followed[:, -1])
     return step, solved[..., -1] - solved[..., :-1] @ step
+
+
+def turn_about(segment: str, before: Sequence[Marker], after: Sequence[Marker]) -> float:
+    """Rad: by how much a segment's markers have turned about it as a whole; 0 with fewer than three."""
+    moved = {marker.label: marker.position for marker in after}
+    worn = [marker for marker in before if marker.segment == segment and marker.label in moved]
+    if len(worn) < _FEWEST_TO_TURN:
+        return 0.0
+    places = np.concatenate([moved[marker.label] - marker.position for marker in worn])
+    return float(np.linalg.norm(_turn_by_places(worn, segment) @ places))
+
+
+def _turn_by_places(markers: Sequence[Marker], segment: str) -> np.ndarray:
+    """(3, 3 m) rad/m: the turn that small displacements of the markers make of a segment's, by least squares."""
+    worn = [k for k, marker in enumerate(markers) if marker.segment == segment]
+    arms = np.array([markers[k].position for k in worn])
+    arms = arms - arms.mean(axis=0)
+    spread = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    turn = np.zeros((3, 3 * len(markers)))
+    for k, arm in zip(worn, arms, strict=True):
+        turn[:, 3 * k : 3 * k + 3] = np.linalg.pinv(spread) @ np.cross(arm, np.eye(3)).T
+    return turn
 
 
 def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
