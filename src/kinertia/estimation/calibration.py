@@ -233,10 +233,10 @@ def _turn_by_places(markers: Sequence[Marker], segment: str) -> np.ndarray:
     worn = [k for k, marker in enumerate(markers) if marker.segment == segment]
     arms = np.array([markers[k].position for k in worn])
     arms = arms - arms.mean(axis=0)
-    spread = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    by_moments = np.linalg.pinv(np.sum(arms**2) * np.eye(3) - arms.T @ arms)
     turn = np.zeros((3, 3 * len(markers)))
     for k, arm in zip(worn, arms, strict=True):
-        turn[:, 3 * k : 3 * k + 3] = np.linalg.pinv(spread) @ np.cross(arm, np.eye(3)).T
+        turn[:, 3 * k : 3 * k + 3] = by_moments @ np.cross(arm, np.eye(3)).T
     return turn
 
 

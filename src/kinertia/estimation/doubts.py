@@ -116,8 +116,8 @@ def trial_doubts(
         sentences += torque_point_doubts(recording.plates)
         # what is usual of loads under feet is of people who land on the heel
         backwards = marker_set is not None and walks_backwards(markers, marker_set)
-        judged = feet is not None and not backwards and _shows_whole_feet(markers, marker_set)
-        sentences += load_places_doubts(recording, feet) if judged and feet is not None else []
+        if feet is not None and not backwards and _shows_whole_feet(markers, marker_set):
+            sentences += load_places_doubts(recording, feet)
     return _told(sentences)
 
 

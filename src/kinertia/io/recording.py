@@ -96,9 +96,8 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None, stand
 
 def _turned(recording: Recording, path: Path, turn: FloatArray) -> Recording:
     """Markers of a TRC file, which takes Y to be up and has not been written so."""
-    markers = replace(recording.markers, positions=recording.markers.positions @ turn.T)
     note = f"{path.name}: people stand upright along Z; markers, and forces with them, were turned to Y up"
-    return replace(recording, markers=markers, vertical="+Z", notes=(*recording.notes, note))
+    return replace(recording, markers=recording.markers.rotated(turn), vertical="+Z", notes=(*recording.notes, note))
 
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:

@@ -176,7 +176,7 @@ def _path(plates: PlateLoads, p: int, contact: Contact) -> dict[str, Any] | None
     inside &= plates.force[:, p, 1] > FIRM_LOAD_N
     if not inside.any():
         return None
-    wrench = np.concatenate([plates.force[inside, p], plates.moment[inside, p]], axis=1)
+    wrench = plates.wrench[inside, p]
     height_m = 0.0 if plates.corners is None else float(plates.corners[p, :, 1].mean())
     at = centre_of_pressure(wrench[:: -(-len(wrench) // 200)], height_m)
     word, colour = _FEET[contact.foot]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _MOST_REASONS, _MOST_NAMES = 12, 5
 _FIT = "fit.json"
+_WORDS = ("passed", "with care", "not fitted", "a check failed")
 _QUOTED_OR_PATH = re.compile(
     r"(?<!\w)'[^']*'"  # and no apostrophes
     r'|"[^"]*"'
@@ -49,6 +50,15 @@ class Outcome:
     fitted: bool
     failed: tuple[str, ...]
     doubts: tuple[str, ...]
+
+    @property
+    def word(self) -> str:
+        """One of `_WORDS`."""
+        if not self.fitted:
+            return "not fitted"
+        if self.failed:
+            return "a check failed"
+        return "with care" if self.doubts else "passed"
 
 
 def outcomes_of(folder: Path, people: pd.DataFrame) -> list[Outcome]:
@@ -100,18 +110,8 @@ def lead(outcomes: Iterable[Outcome]) -> str:
 
 
 def _counts(outcomes: Iterable[Outcome]) -> dict[str, int]:
-    counts = dict.fromkeys(("passed", "with care", "not fitted", "a check failed"), 0)
-    for one in outcomes:
-        counts[
-            "not fitted"
-            if not one.fitted
-            else "a check failed"
-            if one.failed
-            else "with care"
-            if one.doubts
-            else "passed"
-        ] += 1
-    return counts
+    counted = Counter(one.word for one in outcomes)
+    return {word: counted[word] for word in _WORDS}
 
 
 def outcome_parts(outcomes: Iterable[Outcome]) -> list[Part]:

@@ -149,7 +149,7 @@ def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc"
 def force_table(plates: PlateLoads) -> pd.DataFrame:
     """Columns as OpenSim's examples name them: force, its point of application on the ground, and torque there."""
     columns: dict[str, np.ndarray] = {}
-    point = centre_of_pressure(np.concatenate([plates.force, plates.moment], axis=-1))
+    point = centre_of_pressure(plates.wrench)
     torque = plates.moment - np.cross(point, plates.force)
     for p, name in enumerate(plates.names):
         stems = {f"{name}_v": plates.force, f"{name}_p": point, f"{name.replace('force', 'torque')}_": torque}

@@ -91,7 +91,7 @@ def _with_idle_noise(plates: PlateLoads, rng: np.random.Generator) -> PlateLoads
 
 def acting(plates: PlateLoads) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Force (k, p, 3) N, its point on the ground (k, p, 3) m, and the torque (k, p, 3) N m about that."""
-    point = centre_of_pressure(np.concatenate([plates.force, plates.moment], axis=-1))
+    point = centre_of_pressure(plates.wrench)
     return plates.force, point, plates.moment - np.cross(point, plates.force)
 
 

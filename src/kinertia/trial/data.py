@@ -170,6 +170,11 @@ class PlateLoads:
         if self.corners is not None:
             _expect_shape("corners", self.corners, (len(self.names), 4, 3))
 
+    @property
+    def wrench(self) -> FloatArray:
+        """(k, p, 6) force and moment."""
+        return np.concatenate([self.force, self.moment], axis=-1)
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:

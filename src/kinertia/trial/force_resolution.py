@@ -6,6 +6,8 @@ plate reads less than nothing for more than 3 ms beside a load.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
@@ -68,15 +70,13 @@ def ringing_doubts(plates: PlateLoads) -> list[str]:
 def rounded_force_doubts(plates: PlateLoads) -> list[str]:
     """Forces, or centres of pressure, that come in coarse steps; empty where they do not."""
     doubts = []
-    coarse = {name: step for p, name in enumerate(plates.names) if (step := _coarsest_n(plates, p)) > _COARSE_N}
-    if coarse:
+    if coarse := _coarse(plates, _coarsest_n, _COARSE_N):
         doubts.append(
             f"the forces of {' and '.join(coarse)} come in steps of {max(coarse.values()):.3g} N: they were rounded, "
             "or a converter of few bits has far too large a range; joint moments are as coarse; export the forces with "
             "more digits, or choose a smaller range"
         )
-    places = {name: step for p, name in enumerate(plates.names) if (step := _coarsest_m(plates, p)) > _COARSE_M}
-    if places:
+    if places := _coarse(plates, _coarsest_m, _COARSE_M):
         doubts.append(
             f"the centres of pressure of {' and '.join(places)} come in steps of {1e3 * max(places.values()):.3g} mm: "
             "they were rounded (metres with two decimals, centimetres with none); joint moments are as coarse; export "
@@ -90,16 +90,21 @@ def force_step_n(values: FloatArray) -> float:
     return _step(values, _DECIMALS_N)
 
 
-def _coarsest_n(plates: PlateLoads, p: int) -> float:
-    """The coarsest step of the three axes of a plate, under load."""
-    firm = plates.force[:, p, 1] > FIRM_LOAD_N
-    return max(force_step_n(values) for values in plates.force[firm, p].T)
+def _coarse(plates: PlateLoads, step_of: Callable[[FloatArray], float], least: float) -> dict[str, float]:
+    """Names of the plates whose wrenches (j, 6) under load come in larger steps than this, and the steps."""
+    wrenches = zip(plates.names, np.moveaxis(plates.wrench, 1, 0), strict=True)
+    steps = {name: step_of(wrench[wrench[:, 1] > FIRM_LOAD_N]) for name, wrench in wrenches}
+    return {name: step for name, step in steps.items() if step > least}
 
 
-def _coarsest_m(plates: PlateLoads, p: int) -> float:
-    """The coarser step of its centre of pressure along X and Z."""
-    wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
-    point = centre_of_pressure(wrench[wrench[:, 1] > FIRM_LOAD_N])
+def _coarsest_n(wrench: FloatArray) -> float:
+    """The coarsest step of the forces along three axes."""
+    return max(force_step_n(values) for values in wrench[:, :3].T)
+
+
+def _coarsest_m(wrench: FloatArray) -> float:
+    """The coarser step of the centre of pressure along X and Z."""
+    point = centre_of_pressure(wrench)
     return max(_step(point[:, axis], _DECIMALS_M) for axis in (0, 2))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -44,8 +44,7 @@ def loads_trouble(plates: PlateLoads) -> str:
         return trouble
     if held := _held_samples(plates, _LONG_HELD_S):
         return held[0]
-    wrench = np.concatenate((plates.force, plates.moment), axis=2)
-    arms = np.abs(free_moment(wrench))[plates.force[..., 1] > FIRM_LOAD_N]
+    arms = np.abs(free_moment(plates.wrench))[plates.force[..., 1] > FIRM_LOAD_N]
     arms /= plates.force[..., 1][plates.force[..., 1] > FIRM_LOAD_N]
     typical = float(np.median(arms)) if arms.size else 0.0
     if typical > _LONGEST_ARM_M:
@@ -80,14 +79,11 @@ def loads_doubts(plates: PlateLoads) -> list[str]:
 def _dead_channels(plates: PlateLoads) -> list[str]:
     """Horizontal axes along which a plate that carries a person shows nothing at all."""
     doubts = []
-    for name, force in zip(plates.names, np.moveaxis(plates.force, 1, 0), strict=True):
-        carried = force[:, 1] > FIRM_LOAD_N
-        if np.count_nonzero(carried) < _FEWEST_CARRIED or force[:, 1].max() < _STEP_N:
-            continue
-        dead = [axis for axis, values in (("X", force[carried, 0]), ("Z", force[carried, 2])) if _shows_nothing(values)]
+    for name, wrench in _carried(plates):
+        dead = [axis for axis, values in (("X", wrench[:, 0]), ("Z", wrench[:, 2])) if _shows_nothing(values)]
         if dead:
             doubts.append(
-                f"{name} carries up to {force[:, 1].max():.0f} N and shows no force along {' and '.join(dead)} in any "
+                f"{name} carries up to {wrench[:, 1].max():.0f} N and shows no force along {' and '.join(dead)} in any "
                 "sample: a channel is dead, or was not exported; a foot pushes sideways by tens of newtons, and joint "
                 "moments are wrong by tens of N m without"
             )
@@ -96,15 +92,7 @@ def _dead_channels(plates: PlateLoads) -> list[str]:
 
 def _without_free_moment(plates: PlateLoads) -> list[str]:
     """Plates that carry a person and show no moment about the vertical through the centre of pressure."""
-    without = []
-    for k, name in enumerate(plates.names):
-        force = plates.force[:, k]
-        carried = force[:, 1] > FIRM_LOAD_N
-        if np.count_nonzero(carried) < _FEWEST_CARRIED or force[:, 1].max() < _STEP_N:
-            continue
-        free = free_moment(np.concatenate((force[carried], plates.moment[carried, k]), axis=1))
-        if np.abs(free).max() < _NOTHING_NM:
-            without.append(name)
+    without = [name for name, wrench in _carried(plates) if np.abs(free_moment(wrench)).max() < _NOTHING_NM]
     if not without:
         return []
     return [
@@ -113,6 +101,14 @@ def _without_free_moment(plates: PlateLoads) -> list[str]:
         "rotations and of the subtalar joints, and centres of mass to the side, are off by more than their error bars "
         "say; export the torques, too"
     ]
+
+
+def _carried(plates: PlateLoads) -> Iterator[tuple[str, FloatArray]]:
+    """Name and wrench (j, 6) under load, of every plate that carries a person."""
+    for name, wrench in zip(plates.names, np.moveaxis(plates.wrench, 1, 0), strict=True):
+        carried = wrench[wrench[:, 1] > FIRM_LOAD_N]
+        if len(carried) >= _FEWEST_CARRIED and carried[:, 1].max() >= _STEP_N:
+            yield name, carried
 
 
 def _lost_samples(plates: PlateLoads) -> str:
@@ -178,8 +174,7 @@ def _as_long(mask: BoolArray) -> int:
 def _held_samples(plates: PlateLoads, least_s: float = _HELD_S) -> list[str]:
     """Stretches in which a plate that carries somebody reads exactly the same, in all its channels, for so long."""
     doubts = []
-    for p, name in enumerate(plates.names):
-        wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
+    for name, wrench in zip(plates.names, np.moveaxis(plates.wrench, 1, 0), strict=True):
         same = np.equal(np.diff(wrench, axis=0), 0.0).all(axis=1) & (wrench[1:, 1] > FIRM_LOAD_N)
         # forces that are rounded stay, and go on by one step; before late ones a file may be filled up with the first
         leap = _LEAP_STEPS * float(np.diff(np.unique(wrench[:, 1])).min(initial=np.inf))

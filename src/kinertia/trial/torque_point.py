@@ -22,9 +22,8 @@ _FEWEST = 20
 def torque_point_doubts(plates: PlateLoads) -> list[str]:
     """Plates whose torques about the vertical are those about a fixed point."""
     shown = []
-    for p, name in enumerate(plates.names):
-        wrench = np.concatenate((plates.force[:, p], plates.moment[:, p]), axis=1)
-        wrench = wrench[wrench[:, 1] > FIRM_LOAD_N]
+    for name, whole in zip(plates.names, np.moveaxis(plates.wrench, 1, 0), strict=True):
+        wrench = whole[whole[:, 1] > FIRM_LOAD_N]
         if len(wrench) < _FEWEST:
             continue
         torque = free_moment(wrench)
