@@ -10,7 +10,7 @@ import pytest
 
 from kinertia.report.cohort_instruments import drift
 from kinertia.report.cohort_outcomes import lead, outcome_parts, outcomes_of, reason_of
-from kinertia.report.cohort_page import PAGE, _curves, _outliers, write_cohort_page
+from kinertia.report.cohort_page import PAGE, _curves, _mean_curves, _outliers, write_cohort_page
 from kinertia.report.cohort_tables import write_tables
 from study_results import person_record, write_cohort
 
@@ -32,7 +32,7 @@ def test_the_page_says_who_passed_and_who_is_far(cohort):
     links = re.findall(r'<a href="(people/[^"]+)">([^<]+)</a>: ([^<]+)', page)
     assert [link[:2] for link in links] == [("people/Zo%C3%AB%20%26/report.html", "Zoë &amp;")]
     assert links[0][2].startswith("mass of thigh, right, ")
-    assert "knee moment (N m/kg)" in page
+    assert "Knee moment, flexion + (N m/kg)" in page
 
 
 def test_whose_results_are_usable_with_care_has_not_passed_everything(tmp_path):
@@ -108,10 +108,24 @@ def test_few_people_who_are_close_together_by_chance_make_no_outlier():
 def test_where_nobody_was_measured_mean_curves_have_a_gap():
     every = np.tile([2.0, 4.0, 8.5], (101, 1))
     every[40:60] = 0.0
-    spread, line = _curves({"knee_angle_moment": every}).data
+    spread, line = _curves({("knee_angle_moment", "Knee moment, flexion +"): every}).data
     assert np.isnan(np.asarray(line["y"], dtype=float)[40:60]).all()
     assert np.asarray(line["y"])[:40] == pytest.approx(2.0)
     assert not set(range(40, 60)) & set(np.asarray(spread["x"])[np.isfinite(spread["y"])].tolist())
+
+
+def test_knees_of_models_with_opposite_signs_are_not_averaged(tmp_path):
+    """One model's knee angle is flexion and another's extension: mean 0."""
+    titles = {"Anna": ("Knee flexion +", 1.0), "Ben": ("Knee extension +", -1.0)}
+    rows = pd.concat(
+        pd.DataFrame({"quantity": "knee_angle_angle", "title": title, "percent": np.arange(101), "value": 30.0 * sign})
+        for title, sign in titles.values()
+    )
+    rows.to_parquet(tmp_path / "cycles.parquet")
+    (part,) = _mean_curves(tmp_path)
+    means = [trace["y"][0] for trace in part.figure.data if trace["name"] == "mean"]
+    assert sorted(means) == [-30.0, 30.0]
+    assert "panels of their own" in part.caption
 
 
 @pytest.mark.slow

@@ -5,14 +5,17 @@ Made from the cohort's tables: of ten thousand people, curves are summed up piec
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
+from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.bsp_figures import NAMES, segment_name
 from kinertia.report.cohort_instruments import COLUMNS, drift
@@ -30,14 +33,10 @@ if TYPE_CHECKING:
 PAGE = "cohort.html"
 _QUANTILES = {"5 % of people below": 0.05, "median": 0.5, "95 % below": 0.95}
 _SHOWN = {"mass": ("mass (kg)", 1.0), "com_x": ("CoM forward (mm)", 1e3), "com_y": ("CoM upward (mm)", 1e3)}
-_CURVES = {
-    "hip_flexion_angle": "hip flexion (degrees)",
-    "knee_angle_angle": "knee (degrees)",
-    "ankle_angle_angle": "ankle (degrees)",
-    "hip_flexion_moment": "hip flexion moment (N m/kg)",
-    "knee_angle_moment": "knee moment (N m/kg)",
-    "ankle_angle_moment": "ankle moment (N m/kg)",
-}
+_KINDS: tuple[Kind, ...] = ("angle", "moment")
+_JOINTS = ("hip_flexion", "knee_angle", "ankle_angle")
+_CURVES = {f"{name}_{kind}": UNITS[kind] for kind in _KINDS for name in _JOINTS}
+"""Which are shown, and their units."""
 _NORMAL = 1.4826
 """Standard deviation over median distance from the median, of normal values."""
 _MOST_OUTLIERS, _FAR = 20, 6.0
@@ -121,33 +120,35 @@ def _outliers(bsp: pd.DataFrame) -> Part:
 
 
 def _mean_curves(folder: Path) -> Iterator[Part]:
-    """Mean and spread of all strides over the gait cycle, both sides, summed up piece by piece."""
+    """Mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; apart where models differ
+    in the direction that is positive.
+    """
     from pyarrow import dataset
 
-    sums = {quantity: np.zeros((101, 3)) for quantity in _CURVES}
+    sums: defaultdict[tuple[str, str], np.ndarray] = defaultdict(lambda: np.zeros((len(PERCENT), 3)))
     source = dataset.dataset(folder / "cycles.parquet")
     wanted = dataset.field("quantity").isin(list(_CURVES))
-    for batch in source.to_batches(columns=["quantity", "percent", "value"], filter=wanted):
+    for batch in source.to_batches(columns=["quantity", "title", "percent", "value"], filter=wanted):
         frame = batch.to_pandas().dropna()
-        for quantity, part in frame.groupby("quantity"):
+        for curve, part in frame.groupby(["quantity", "title"]):
             at, value = part["percent"].to_numpy(), part["value"].to_numpy()
-            np.add.at(sums[quantity], at, np.column_stack([np.ones_like(value), value, value**2]))
-    shown = {quantity: total for quantity, total in sums.items() if total[:, 0].any()}
-    if shown:
-        yield Part(
-            "Mean curves",
-            figure=_curves(shown),
-            caption="Over the gait cycle (%): mean and SD of all strides of all people, both sides.",
-        )
+            np.add.at(sums[curve], at, np.column_stack([np.ones_like(value), value, value**2]))
+    if sums:
+        text = "Over the gait cycle (%): mean and SD of all strides of all people, both sides"
+        apart = "; people whose models call opposite directions positive are in panels of their own"
+        caption = f"{text}{apart if len(sums) > len({quantity for quantity, _ in sums}) else ''}."
+        order = list(_CURVES)
+        shown = sorted(sums, key=lambda curve: (order.index(curve[0]), curve[1]))
+        yield Part("Mean curves", figure=_curves({curve: sums[curve] for curve in shown}), caption=caption)
 
 
-def _curves(sums: Mapping[str, np.ndarray]) -> Figure:
+def _curves(sums: Mapping[tuple[str, str], np.ndarray]) -> Figure:
     panels = []
-    for quantity, every in sums.items():
+    for (quantity, title), every in sums.items():
         total = np.where(every[:, :1] > 0, every, np.nan)  # gaps where nobody was measured
         mean = total[:, 1] / total[:, 0]
         sd = np.sqrt(np.maximum(total[:, 2] / total[:, 0] - mean**2, 0.0))
         spread = {**band(mean - sd, mean + sd, style.faded(style.BLUE, 0.2)), "name": "mean ± SD"}
         line = {**mean_line(mean), "name": "mean", "line": {"color": style.BLUE}}
-        panels.append(Panel(_CURVES[quantity], [spread, line]))
+        panels.append(Panel(f"{title} ({_CURVES[quantity]})", [spread, line]))
     return small_multiples(panels, "Mean curves over the gait cycle.", {"range": [0, 100]})

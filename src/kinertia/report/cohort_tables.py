@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 from kinertia.checks.verdict import residual_verdicts, verdict_of_markers, worst_level
 from kinertia.errors import FileError
-from kinertia.estimation.cycles import cycle_columns
+from kinertia.estimation.cycles import UNITS, cycle_columns
 from kinertia.estimation.result import Fit
 from kinertia.io.csv_file import read_csv
 from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
-from kinertia.report.cycle_figures import MOST_STRIDES
+from kinertia.report.cycle_figures import MOST_STRIDES, titled_quantities
 from kinertia.report.files import summary
 from kinertia.studies.cohort_cluster import expect_extra
 from kinertia.studies.cohort_record import AGAINST, PASSED, Place, Record
@@ -50,7 +50,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "cycles": {
         **dict.fromkeys(("person", "trial", "side"), "string"),
         **dict.fromkeys(("stride", "percent"), "int64"),
-        "quantity": "string",
+        **dict.fromkeys(("quantity", "title"), "string"),
         **dict.fromkeys(("value", "sd"), "double"),
     },
     "instruments": {
@@ -186,8 +186,12 @@ def _trials(fit: Fit) -> dict[str, Any]:
 
 
 def _cycles(fit: Fit) -> dict[str, Any]:
-    """The rows of the person's `cycles.csv`."""
-    return cycle_columns(fit.trials, fit.mass_kg, "estimate", MOST_STRIDES)
+    """The rows of the person's `cycles.csv`, and what the person's figures call each curve: with the direction that is
+    positive, which models differ in.
+    """
+    columns = cycle_columns(fit.trials, fit.mass_kg, "estimate", MOST_STRIDES)
+    titles = {name: title for kind in UNITS for name, title in titled_quantities(fit.skeleton, kind)}
+    return {**columns, "title": [titles.get(quantity, "") for quantity in columns["quantity"]]}
 
 
 def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, Any]:

@@ -66,6 +66,22 @@ def curves_of(fit: Fit, stage: Stage) -> Curves:
     return curves
 
 
+def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
+    """Names and titles of the curves of a kind, in the order of the panels; a title says which direction is positive,
+    which the name of a coordinate does not in every model.
+    """
+    if kind == "force":
+        return list(_FORCE_TITLES.items())
+    coordinates = [one for one in panels_of(skeleton) if one.rotational]
+    if kind == "angle":
+        return [(f"{one.name}_angle", one.title) for one in coordinates]
+    if kind == "power":  # of arms and trunk next to nothing
+        legs = _leg_coordinates(skeleton)
+        coordinates = [one for one in coordinates if legs & set(one.columns.values())]
+        return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
+    return [(f"{one.name}_moment", load_title(one, "moment")) for one in coordinates]
+
+
 @dataclass(frozen=True)
 class _Drawn:
     """What the figures are drawn from."""
@@ -78,25 +94,12 @@ class _Drawn:
     def figure(self, kind: Kind) -> Figure:
         panels = [
             Panel(f"{title} ({UNITS[kind]})", [*self._traces(quantity, self._usual_name(kind))], self._toe_offs())
-            for quantity, title in self._quantities(kind)
+            for quantity, title in titled_quantities(self.fit.skeleton, kind)
             if any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
         ]
         axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
         axis["title"] = {"text": "% of the gait cycle", "font": {"size": 11}, "standoff": 2}
         return small_multiples(panels, self._alt(kind), axis)
-
-    def _quantities(self, kind: Kind) -> list[tuple[str, str]]:
-        """Names and titles, in the order of the panels."""
-        if kind == "force":
-            return list(_FORCE_TITLES.items())
-        coordinates = [one for one in panels_of(self.fit.skeleton) if one.rotational]
-        if kind == "angle":
-            return [(f"{one.name}_angle", one.title) for one in coordinates]
-        if kind == "power":  # of arms and trunk next to nothing
-            legs = _leg_coordinates(self.fit.skeleton)
-            coordinates = [one for one in coordinates if legs & set(one.columns.values())]
-            return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
-        return [(f"{one.name}_moment", load_title(one, "moment")) for one in coordinates]
 
     def _usual_name(self, kind: Kind) -> str:
         """Of the dotted curves: body segment parameters are in moments and powers alone."""
