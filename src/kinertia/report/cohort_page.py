@@ -120,8 +120,8 @@ def _outliers(bsp: pd.DataFrame) -> Part:
 
 
 def _mean_curves(folder: Path) -> Iterator[Part]:
-    """Mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; apart where models differ
-    in the direction that is positive.
+    """Mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; apart where models
+    differ in the direction that is positive.
     """
     from pyarrow import dataset
 
