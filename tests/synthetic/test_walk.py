@@ -8,6 +8,7 @@ from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual, root_regressor
 from kinertia.studies.table1 import measured_trial, symmetric_truth
+from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.walk import (
     STATIC_ONLY,
     centre_of_pressure,
@@ -61,6 +62,20 @@ def test_walk_is_periodic_and_advances(subject):
     np.testing.assert_allclose(joints[-1], joints[0], atol=0.01)
     assert 1.0 < stride.motion.q[-1, 0] - stride.motion.q[0, 0] < 2.0
     assert not set(STATIC_ONLY) & set(stride.markers.labels)
+
+
+def test_everybody_walks_in_a_manner_of_his_own(subject):
+    manner = Manner.draw(np.random.default_rng(4))
+    own, usual = walk(subject, 2.0, trapezoid=False, manner=manner), walk(subject, 2.0, trapezoid=False)
+    assert largest_residual(own) < 1e-9
+    swing = {name: np.ptp(own.motion.q[:, k]) for k, name in enumerate(own.skeleton.coordinates)}
+    before = {name: np.ptp(usual.motion.q[:, k]) for k, name in enumerate(usual.skeleton.coordinates)}
+    for name in ("arm_flex_r", "arm_flex_l"):
+        assert swing[name] == pytest.approx(manner.swing["arm_flex"] * before[name], rel=0.02)
+    assert swing["knee_angle_r"] == pytest.approx(before["knee_angle_r"], rel=0.02)
+    assert swing["pelvis_tx"] == pytest.approx(manner.pace * before["pelvis_tx"], rel=0.02)
+    fast = walk(subject, trapezoid=False, manner=Manner(pace=1.25))
+    assert fast.time[-1] == pytest.approx(walk(subject).time[-1] / 1.25, abs=0.01)
 
 
 def test_start_moves_along_the_stride(subject):

@@ -1,10 +1,11 @@
 """What does a wrong prior cost? People whom the tables do not describe, with the adults' prior and with their own.
 
-Every person walks once in a laboratory with skin motion and calibration errors (`accuracy`), and is estimated twice
-from the same recording: as if nothing were known, and with what the subject file can say of such a person. What the
-recording says is then joined with two more priors, without estimating anew: with the one learnt from others of the
-population, and with the distribution from which the person was drawn, which is the best that any prior can do. A draw
-depends on seed, population and its number only.
+Every person walks once, at a pace and with a posture and swing of trunk and arms that are the person's own, in a
+laboratory with skin motion and calibration errors (`accuracy`), and is estimated twice from the same recording: as if
+nothing were known, and with what the subject file can say of such a person. What the recording says is then joined with
+two more priors, without estimating anew: with the one learnt from others of the population, and with the distribution
+from which the person was drawn, which is the best that any prior can do. A draw depends on seed, population and its
+number only.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from kinertia.studies.accuracy import WALK_S
 from kinertia.studies.joint_accuracy import WITHIN
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticTrial, walk, walking_subject
 from kinertia.trial.rms import rms
@@ -231,7 +233,7 @@ def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
     else:
         person = replace(subject, bsp=POPULATIONS[name].of(adults).draw(rng))
         cases = [(prior, Instruments()) for prior in (adults, own_prior(name, adults))]
-    trial = walk(person, WALK_S, trapezoid=False)
+    trial = walk(person, WALK_S, trapezoid=False, manner=Manner.draw(rng))
     outcomes = []
     for prior, instruments in cases:
         laboratory = replace(LABORATORY, instruments=instruments)

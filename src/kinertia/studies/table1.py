@@ -26,6 +26,7 @@ from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.noise import study_noise
 from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.trial.data import Markers
@@ -198,7 +199,7 @@ def study_trial(pace: float = 1.0, on_axes: bool = False) -> SyntheticTrial:
     truth = symmetric_truth(subject.bsp)
     if on_axes:
         truth = replace(truth, com_m=truth.com_m * [0.0, 1.0, 0.0])
-    return walk(replace(subject, bsp=truth), _STRIDE_S / pace + 2 * MARGIN_S, pace=pace)
+    return walk(replace(subject, bsp=truth), _STRIDE_S / pace + 2 * MARGIN_S, manner=Manner(pace))
 
 
 @one_blas_thread

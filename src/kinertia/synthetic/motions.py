@@ -14,6 +14,7 @@ from scipy.interpolate import make_interp_spline
 
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
+from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, balancing_wrench, walk
 
 DURATION_S, RATE_HZ = 5.0, 100.0
@@ -51,7 +52,7 @@ def trunk_sway(subject: SyntheticSubject) -> SyntheticTrial:
 
 MOTIONS: Mapping[str, Callable[[SyntheticSubject], SyntheticTrial]] = {
     "walk": lambda subject: walk(subject, DURATION_S, trapezoid=False),
-    "fast walk": lambda subject: walk(subject, DURATION_S, trapezoid=False, pace=FAST_PACE),
+    "fast walk": lambda subject: walk(subject, DURATION_S, trapezoid=False, manner=Manner(FAST_PACE)),
     "squat": squat,
     "arm swing": arm_swing,
     "trunk sway": trunk_sway,

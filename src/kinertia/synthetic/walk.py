@@ -28,6 +28,7 @@ from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual
+from kinertia.synthetic.manner import Manner
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, Recording
 
@@ -39,6 +40,7 @@ STATIC_ONLY = tuple(
 """Markers that are taken off after the static trial, as in the measured walk; 41 remain."""
 UNLIKE_MASS, UNLIKE_COM_M, UNLIKE_INERTIA = 0.1, 0.01, 0.1
 """How far people are from the literature: standard deviations of masses and moments (share), CoM coordinates (m)."""
+PACKAGE_MANNER = Manner()
 _MAX_ITERATIONS = 100
 _RESIDUAL_TOLERANCE = 1e-9
 _HANDOVER = 0.3
@@ -159,7 +161,7 @@ def walk(
     rate_hz: float = 100.0,
     start: float = 0.0,
     trapezoid: bool = True,
-    pace: float = 1.0,
+    manner: Manner = PACKAGE_MANNER,
 ) -> SyntheticTrial:
     """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same; without the markers `STATIC_ONLY`.
 
@@ -170,10 +172,9 @@ def walk(
         start: share of the stride at which the trial begins (0: shortly before the left heel strikes).
         trapezoid: integrate the pelvis by the trapezoid rule, as the study's pelvis correction does; False keeps
             position and velocity that are exact integrals of the acceleration.
-        pace: the same steps this many times as fast.
+        manner: what is another's than the package's walk.
     """
-    series = _WalkSeries.read()
-    series = replace(series, period_s=series.period_s / pace, speed_m_s=series.speed_m_s * pace)
+    series = _WalkSeries.read().walked(manner)
     skeleton = subject.moving_skeleton
     duration_s = series.period_s if duration_s is None else duration_s
     time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
@@ -246,6 +247,14 @@ class _WalkSeries:
             numbers["speed_m_s"][0],
             (contacts[0], contacts[1]),
         )
+
+    def walked(self, manner: Manner) -> _WalkSeries:
+        """In another's manner."""
+        table = self.table.copy()
+        posture, swing = np.transpose([manner.of(coordinate) for coordinate in table.index])
+        table.iloc[:, 1:] *= swing[:, None]
+        table.iloc[:, 0] += posture
+        return replace(self, table=table, period_s=self.period_s / manner.pace, speed_m_s=self.speed_m_s * manner.pace)
 
     def motion(self, coordinates: tuple[str, ...], time: np.ndarray) -> Motion:
         """Coordinates and their derivatives at these times."""
