@@ -112,7 +112,8 @@ def _segments(fit: Fit, name: str, columns: slice) -> Use:
     estimated = fit.posterior.prior_sd[:, columns] > 0
     information = fit.posterior.information[:, columns][estimated]
     shown, measured = int((information > INFORMED).sum()), int((information > MEASURED).sum())
-    reason = f"the data show {shown} of {information.size} ({measured} of them well); the others are {start}'s"
+    reason = f"the data show {shown} of {information.size} ({measured} of them well)"
+    reason += f"; the others are about as uncertain as {start}'s"
     if shown == information.size:
         reason = f"the data show all {shown} ({measured} of them well)"
     away = away_from_expected(fit)
@@ -123,5 +124,5 @@ def _segments(fit: Fit, name: str, columns: slice) -> Use:
         if contradicts(away):
             return Use(name, "fail", reason)
     if not shown:
-        return Use(name, "fail", f"the data show none of {information.size}: these are {start}'s, not this person's")
+        return Use(name, "fail", f"the data show none of {information.size}: they are about as uncertain as {start}'s")
     return Use(name, "pass" if shown >= SHOWN_SHARE * information.size and not doubted else "caution", reason)
