@@ -40,6 +40,7 @@ def fit(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, **changes
         "posterior": None,
         "trials": (trial,),
         "file": None,
+        "skeleton": SimpleNamespace(locked={}),
         "expected": changes.get("literature", BODY),
         "more_known": False,
     }
@@ -94,6 +95,16 @@ def test_markers_by_the_guideline(markers_m, expected):
     of_model = verdicts(fit(markers_m=markers_m, file=object()))
     (sentence,) = [one.sentence for one in of_model if one.sentence.startswith(start)]
     assert ("--calibrate" in sentence) == (expected == "fail")
+
+
+def test_nobody_is_told_to_let_move_what_moves_already_or_is_grossly_wrong():
+    """What moves hides a model that is another person's."""
+    moved = {f"hip_r/offset_{axis}": 0.01 for axis in "xyz"}
+    for given in ({"markers_m": 0.05}, {"markers_m": 0.03, "skeleton": SimpleNamespace(locked=moved)}):
+        of_model = verdicts(fit(file=object(), **given))
+        (sentence,) = [one.sentence for one in of_model if one.sentence.startswith("walk: model and measured markers")]
+        assert "--calibrate" not in sentence
+        assert "was scaled to this person" in sentence
 
 
 @pytest.mark.parametrize(

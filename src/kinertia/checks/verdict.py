@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from kinertia.estimation.forces_used import full_bandwidth
+from kinertia.estimation.prepare_osim import centre_offsets
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
 from kinertia.estimation.warnings import CONTRADICTING_COM_M
 from kinertia.model.bsp import PARAMETERS, impossible_segments
@@ -33,6 +34,8 @@ PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 
 PASS_MARKERS_M, CAUTION_MARKERS_M = 0.012, 0.020
+_WRONG_MODEL_M = 0.045
+"""Farther apart are markers of a sound model on nobody, wherever they sit."""
 """RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 
 PLAIN_CONTRADICTION_SD = 4.0
@@ -205,7 +208,11 @@ def verdict_of_markers(fit: Fit, trial: TrialFit) -> Verdict:
         return Verdict(
             "caution", f"{sentence}; within OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm), marginally"
         )
-    advice = "" if fit.file is None else "; let markers and joint centres move (--calibrate)"
+    advice = "; let markers and joint centres move (--calibrate)"
+    # what moves hides what is grossly wrong, and helps no more where it has moved
+    if apart_m > _WRONG_MODEL_M or centre_offsets(fit.skeleton):
+        advice = "; see whether the model was scaled to this person, and whether all labels are right"
+    advice = "" if fit.file is None else advice
     return Verdict("fail", f"{sentence}, beyond OpenSim's guideline ({CAUTION_MARKERS_M * 1e3:g} mm){advice}")
 
 

@@ -27,6 +27,7 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported import OsimModel
 from kinertia.model.model_markers import markers_of_model
+from kinertia.model.model_on_person import moved_doubts
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
@@ -75,6 +76,7 @@ def prepare_osim(
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
     if calibrate:
         skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
+        warnings += moved_doubts(model.skeleton, skeleton, [trial.markers for trial in trials])
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, carried.body_kg)
     prior, held = parted(skeleton, own)

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError
+from kinertia.trial.data import Markers
 
 SEGMENTS = (
     "pelvis",
@@ -56,6 +57,7 @@ class MarkerSet:
         landmarks: landmark -> the labels whose mean it is.
         segments: segment -> labels of the markers that move with it.
         widths: joint -> name of a measurement (m) that comes with the static file.
+        in_model: one frame, where an OpenSim model has them in its default pose; None for a laboratory's.
 
     Examples:
         >>> kinertia.read_marker_set("plug-in-gait").foot_labels()["r"]
@@ -66,6 +68,7 @@ class MarkerSet:
     landmarks: Mapping[str, tuple[str, ...]]
     segments: Mapping[str, tuple[str, ...]]
     widths: Mapping[str, str]
+    in_model: Markers | None = None
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kinertia.errors import OsimError
 from kinertia.model.anatomy import segment_of
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import Markers
 
 
 def markers_of_model(model: OsimModel) -> MarkerSet:
-    """The markers of an OpenSim model by segment, without landmarks: no model is built from them.
+    """The markers of an OpenSim model, by segment and in its default pose; without landmarks: no model is built.
 
     Raises:
         OsimError: there are none.
@@ -20,4 +23,7 @@ def markers_of_model(model: OsimModel) -> MarkerSet:
     owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
     names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
     segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}
-    return MarkerSet(model.path.name, {}, segments, {})
+    skeleton, defaults = model.skeleton, {c.name: c.default for c in model.coordinates}
+    q = np.array([[defaults[name] for name in skeleton.coordinates]])
+    places = Markers(np.zeros(1), skeleton.labels, skeleton.marker_positions(skeleton.pose(q)))
+    return MarkerSet(model.path.name, {}, segments, {}, places)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers
 
-_LOWER = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
+LOWER_BODY = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
 _OTHER_BODY = 0.05
 """Median share by which the distances may differ."""
 _FEWEST_PAIRS = 6
@@ -35,12 +35,13 @@ _FRAMES = 60
 
 
 @dataclass(frozen=True, eq=False)
-class _Distances:
+class SegmentDistances:
     """Distances (m, m) m between the markers of the lower body that both trials have, and which of them count.
 
     Attributes:
         labels: of the m markers.
-        static, trial: medians over the frames; NaN for those that are never seen together.
+        static, trial: medians over the frames, of the static trial or of a model; NaN for those that are never seen
+            together.
         pairs: (p, 2) indices of two markers of one segment, both known.
     """
 
@@ -50,15 +51,27 @@ class _Distances:
     pairs: NDArray[np.int_]
 
     @classmethod
-    def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> _Distances:
+    def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> SegmentDistances:
+        """Of the markers that the set has on pelvis, legs and feet."""
         both = set(static.labels) & set(trial.labels)
-        segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in _LOWER]
+        segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in LOWER_BODY]
         labels = tuple(dict.fromkeys(label for own in segments for label in own))
         place = {label: k for k, label in enumerate(labels)}
         before, after = (_medians(markers, labels) for markers in (static, trial))
         pairs = [(place[a], place[b]) for own in segments for a, b in combinations(own, 2)]
         known = [(a, b) for a, b in pairs if before[a, b] > 0 and after[a, b] > 0]
         return cls(labels, before, after, np.array(known, dtype=int).reshape(-1, 2))
+
+    def ratio(self) -> float:
+        """How many times as far apart the pairs are in the trial: the median."""
+        before, after = (matrix[tuple(self.pairs.T)] for matrix in (self.static, self.trial))
+        return float(np.median(after / before))
+
+    def worst_pair(self) -> str:
+        """The two labels whose distances differ most, and by how much."""
+        off = self.differences()
+        worst = int(np.argmax(np.abs(off)))
+        return f"{' to '.join(self.labels[k] for k in self.pairs[worst])}, {1e3 * off[worst]:+.0f} mm"
 
     def differences(self, order: NDArray[np.int_] | None = None) -> FloatArray:
         """(p,) m, by how much the pairs are farther apart in the trial, with its markers in another order."""
@@ -69,17 +82,17 @@ class _Distances:
 
 def body_trouble(static: Markers, trial: Markers, marker_set: MarkerSet) -> str:
     """Why static trial and trial cannot be used together: swapped labels, or another person; empty where they may."""
-    distances = _Distances.of(static, trial, marker_set)
+    distances = SegmentDistances.of(static, trial, marker_set)
     if not len(distances.pairs):
         return ""
-    return _swapped(distances) or _turned_round(distances) or _another_body(distances)
+    return swapped_labels(distances) or swapped_pairs(distances) or _another_body(distances)
 
 
 def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
     """What speaks against markers that were left in place between static trial and trial, if `body_trouble` found
     nothing.
     """
-    distances = _Distances.of(static, trial, marker_set)
+    distances = SegmentDistances.of(static, trial, marker_set)
     if not len(distances.pairs):
         return []
     off = distances.differences()
@@ -102,17 +115,15 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
             f"static trial anew, or leave the marker out"
         ]
     if len(off) >= _FEWEST_PAIRS and typical > _SAME_SESSION_M:
-        worst = int(np.argmax(np.abs(off)))
-        pair = " to ".join(distances.labels[k] for k in distances.pairs[worst])
         return [
             f"distances between markers of one segment differ from the static trial's by {1e3 * typical:.0f} mm (RMS "
-            f"of {len(off)}; most of all {pair}, {1e3 * off[worst]:+.0f} mm): the static trial is of another session, "
+            f"of {len(off)}; most of all {distances.worst_pair()}): the static trial is of another session, "
             "with the markers put on anew, or of another person; give the one of this session"
         ]
     return []
 
 
-def _scaled(distances: _Distances) -> str:
+def _scaled(distances: SegmentDistances) -> str:
     """All distances are longer, or shorter, by the same share; empty where they are not, or by little."""
     before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
     if len(before) < _FEWEST_PAIRS or np.array_equal(before, after):
@@ -130,8 +141,8 @@ def _scaled(distances: _Distances) -> str:
     )
 
 
-def _swapped(distances: _Distances) -> str:
-    """Which two labels fit once they are exchanged."""
+def swapped_labels(distances: SegmentDistances, there: str = "the static trial") -> str:
+    """Which two labels fit once they are exchanged, here or there; empty where none do."""
     off = np.abs(distances.differences())
     suspects = sorted({int(k) for pair in distances.pairs[off > _SWAPPED_M] for k in pair})
     best, cured = (0.0, ("", "", 0.0, 0.0)), False
@@ -152,13 +163,13 @@ def _swapped(distances: _Distances) -> str:
         return ""
     one, other, before_m, after_m = best[1]
     return (
-        f"the markers {one} and {other} look swapped, here or in the static trial: distances to the others of their "
+        f"the markers {one} and {other} look swapped, here or in {there}: distances to the others of their "
         f"segments differ by up to {1e3 * before_m:.0f} mm between the two, and by {1e3 * after_m:.0f} mm once they "
         "are exchanged; correct the labels"
     )
 
 
-def _turned_round(distances: _Distances) -> str:
+def swapped_pairs(distances: SegmentDistances, there: str = "the static trial") -> str:
     """Which two pairs of labels of one segment fit once both are exchanged: front and back, for one."""
     off = np.abs(distances.differences())
     if not (off > _SWAPPED_M).any():
@@ -180,13 +191,13 @@ def _turned_round(distances: _Distances) -> str:
         return ""
     one, two, three, four = (distances.labels[k] for k in best[1])
     return (
-        f"the markers {one} and {two}, and {three} and {four} look swapped, here or in the static trial: distances in "
+        f"the markers {one} and {two}, and {three} and {four} look swapped, here or in {there}: distances in "
         f"their segment differ by up to {1e3 * off.max():.0f} mm between the two, and fit once they are exchanged "
         "(or the segment's other markers are); correct the labels"
     )
 
 
-def _another_body(distances: _Distances) -> str:
+def _another_body(distances: SegmentDistances) -> str:
     if len(distances.pairs) < _FEWEST_PAIRS:
         return ""
     before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
