@@ -31,6 +31,7 @@ from kinertia.model.model_on_person import moved_doubts
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.range_ends import clamped_doubts
 from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Trial
 from kinertia.trial.plate_assignment import build_trial
@@ -90,6 +91,7 @@ def prepare_osim(
         progress("inverse kinematics", k / len(trials))
         started = time.perf_counter()
         kinematics.append(solve_kinematics(skeleton, trial, 0.0, settings.cutoff_hz))
+        warnings += [f"{trial.name}: {one}" for one in clamped_doubts(skeleton, kinematics[k].ik)]
         ik_s = time.perf_counter() - started
         seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
     notes = [

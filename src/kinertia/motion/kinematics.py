@@ -22,6 +22,7 @@ from kinertia.motion.common_cutoff import Cutoff, common_cutoff
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.range_ends import range_notes
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial.data import Markers, Trial, runs
 
@@ -31,8 +32,6 @@ FEWEST_FRAMES = 11
 """A window needs at least as many frames."""
 AROUND_WINDOW_S = 0.25
 """Samples this near the measured window help to know what happens at its ends."""
-_AT_END, _BEYOND_RAD = 0.05, np.radians(10.0)
-"""Share of the frames, and angle, from which on the user is told of the end of a coordinate's range."""
 _END_PERIODS = 0.5
 """The window keeps off the ends of the record by this share of the cutoff's period: accelerations are poor there.
 
@@ -180,30 +179,8 @@ def solve_kinematics(
     if stuck:
         notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    remarks += [f"{trial.name}: {sentence}" for sentence in _ends_of_ranges(skeleton, ik)]
+    remarks += [f"{trial.name}: {sentence}" for sentence in range_notes(skeleton, ik)]
     return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks, *notes))
-
-
-def _ends_of_ranges(skeleton: Skeleton, ik: InverseKinematics) -> list[str]:
-    """Which coordinates stay at an end of their range because the model clamps them, or go beyond it, in words."""
-    bounds, known = skeleton.bounds, np.isfinite(ik.q)
-    frames = np.maximum(known.sum(axis=0), 1)
-    at_end = ((ik.q <= bounds.least) | (ik.q >= bounds.most)).sum(axis=0) / frames
-    beyond = np.abs(bounds.beyond(np.where(known, ik.q, bounds.clamped(np.zeros_like(ik.q))))).max(axis=0)
-    held = [f"{ik.coordinates[c]} ({100 * at_end[c]:.0f} %)" for c in np.flatnonzero(at_end > _AT_END)]
-    past = [
-        f"{ik.coordinates[c]} ({np.degrees(beyond[c]):.0f} deg)"
-        for c in np.flatnonzero((beyond > _BEYOND_RAD) & skeleton.rotational)
-    ]
-    sentences = []
-    if held:
-        sentences.append(
-            f"before the estimate these coordinates stand at an end of their range, which the model clamps (share of "
-            f"the frames): {', '.join(held)}"
-        )
-    if past:
-        sentences.append(f"beyond the usual range of a joint, by at most: {', '.join(past)}")
-    return sentences
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:

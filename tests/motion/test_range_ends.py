@@ -1,0 +1,42 @@
+"""A model that clamps a knee where its owner straightens it is named; knees that end straight are not."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.model.coordinate_range import Range
+from kinertia.motion.range_ends import clamped_doubts, range_notes
+from kinertia.synthetic.walk import walk, walking_subject
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return walk(walking_subject())
+
+
+def clamped(trial, name, low, high):
+    """The skeleton with this range (degrees), and what inverse kinematics makes of the walk."""
+    bounded = Range(np.radians(low), np.radians(high), clamped=True)
+    skeleton = replace(trial.skeleton, ranges={**trial.skeleton.ranges, name: bounded})
+    q = skeleton.bounds.clamped(trial.motion.q)
+    return skeleton, SimpleNamespace(q=q, coordinates=skeleton.coordinates)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [("knee_angle_r", 20.0, 120.0), ("subtalar_angle_l", -0.3, 0.3), ("lumbar_rotation", -1.0, 1.0)],
+)
+def test_legs_and_trunk_that_the_model_holds_back(trial, name, low, high):
+    skeleton, ik = clamped(trial, name, low, high)
+    (doubt,) = clamped_doubts(skeleton, ik)
+    assert f"{name}, {low:.3g} to {high:.3g} degrees: " in doubt
+    assert name in range_notes(skeleton, ik)[0]
+
+
+def test_sound_ranges_and_arms_are_not_doubted(trial):
+    straight = np.degrees(np.quantile(trial.motion.q[:, trial.skeleton.coordinates.index("knee_angle_r")], 0.08))
+    for name, low, high in (("knee_angle_r", -10.0, 120.0), ("knee_angle_r", straight, 120.0), ("arm_add_l", 5.0, 6.0)):
+        skeleton, ik = clamped(trial, name, low, high)
+        assert clamped_doubts(skeleton, ik) == []
