@@ -193,3 +193,20 @@ def test_somebody_old_is_warned_of_with_a_model_too(gait2354, walk):
     old = SUBJECT.model_copy(update={"age_years": 72.0})
     warnings = prepare_osim(old, gait2354, [TrialInput(walk)], Settings(), False).warnings
     assert any(one.startswith("population: elderly (72 years)") for one in warnings)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0])
+def test_mass_without_inertia_is_refused(gait2354, walk, factor):
+    """It ended in a matrix that is not positive definite."""
+    bsp = gait2354.bsp
+    inertia = np.where((np.array(bsp.segments) == "femur_r")[:, None, None], factor, 1.0) * bsp.inertia_kgm2
+    bad = replace(gait2354, bsp=replace(bsp, inertia_kgm2=inertia))
+    with pytest.raises(OsimError, match=r"inertia of zero or less for bodies that have mass: femur_r \([0-9.]+ kg\)"):
+        prepare_osim(SUBJECT, bad, [TrialInput(walk)], Settings(), False)
+
+
+def test_inertias_too_small_for_the_mass_are_said(gait2354, walk, prepared):
+    assert not any("denser" in warning for warning in prepared.warnings)
+    small = replace(gait2354, bsp=replace(gait2354.bsp, inertia_kgm2=0.1 * gait2354.bsp.inertia_kgm2))
+    warnings = prepare_osim(SUBJECT, small, [TrialInput(walk)], Settings(), False).warnings
+    assert any("subject01_scaled.osim: moments of inertia too small for the mass" in one for one in warnings)

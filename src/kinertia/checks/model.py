@@ -14,6 +14,7 @@ from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.anatomy import ModelSegments, model_segments
 from kinertia.model.anthropometry import BodyGeometry, check_subject, literature_bsp
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
+from kinertia.model.density import HEAVY_KG, dense_doubts, points
 from kinertia.model.skeleton import Skeleton
 
 ARMS_IN_TORSO = 0.42
@@ -133,6 +134,7 @@ def check_model(
     verdicts = [
         *_possible(bsp),
         *_sizes(bsp),
+        *_densities(bsp),
         *_total(total, mass_kg),
         *_placeholders(bsp),
         _symmetry(odd),
@@ -223,10 +225,11 @@ def _possible(bsp: BodySegmentParameters) -> list[Verdict]:
         for sentence in bsp.inconsistencies()
         if sentence.split(": ", 1)[0] in impossible
     ]
-    if not verdicts:
+    without = [name for name in points(bsp) if name not in impossible]
+    if not verdicts and not without:
         verdicts.append(Verdict("pass", "every body is physically possible"))
     at_fault = ~bsp.physically_consistent() & (bsp.mass_kg > 0)
-    thin = [bsp.segments[i] for i in np.flatnonzero(at_fault) if bsp.segments[i] not in impossible]
+    thin = [bsp.segments[i] for i in np.flatnonzero(at_fault) if bsp.segments[i] not in (*impossible, *without)]
     if thin:
         verdicts.append(
             Verdict(
@@ -253,6 +256,21 @@ def _sizes(bsp: BodySegmentParameters) -> list[Verdict]:
                 )
             )
     return verdicts
+
+
+def _densities(bsp: BodySegmentParameters) -> list[Verdict]:
+    """Bodies that would have to be smaller than their mass allows, as with inertias of zero."""
+    verdicts: list[Verdict] = []
+    impossible, masses = impossible_segments(bsp), dict(zip(bsp.segments, bsp.mass_kg.tolist(), strict=True))
+    without = [name for name in points(bsp) if name not in impossible]
+    heavy = [name for name in without if masses[name] >= HEAVY_KG]
+    light = [name for name in without if masses[name] < HEAVY_KG]
+    if heavy:
+        advice = "their inertias were left out: give them (kg m2); kinertia fit refuses such a model"
+        verdicts.append(Verdict("fail", f"mass without any moment of inertia: {', '.join(heavy)}; {advice}"))
+    if light:
+        verdicts.append(Verdict("caution", f"mass without any moment of inertia: {', '.join(light)}; light bodies"))
+    return [*verdicts, *(Verdict("caution", sentence) for sentence in dense_doubts(bsp))]
 
 
 def _total(total_kg: float, mass_kg: float | None) -> list[Verdict]:
@@ -318,7 +336,8 @@ def _arms_in_torso(segments: ModelSegments) -> list[Verdict]:
     if not _has_arms(segments) or "torso" not in segments.bodies:
         return []
     moments = segments.bsp.inertia_kgm2[segments.bsp.segments.index("torso")].diagonal()
-    ratio = moments[1] / (moments[[0, 2]].mean())
+    others = moments[[0, 2]].mean()
+    ratio = moments[1] / others if others > 0 else 0.0
     if ratio <= ARMS_IN_TORSO:
         return []
     return [

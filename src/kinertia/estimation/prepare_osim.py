@@ -25,6 +25,7 @@ from kinertia.estimation.repeated_trials import repeated_trials
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
+from kinertia.model.density import dense_doubts, points
 from kinertia.model.imported import OsimModel
 from kinertia.model.model_markers import markers_of_model
 from kinertia.model.skeleton import Axis, Skeleton
@@ -77,6 +78,7 @@ def prepare_osim(
         skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, carried.body_kg)
+    _check_inertias(model, _split(skeleton, own)[0])
     prior, held = parted(skeleton, own)
     expected = population_prior(prior, subject.model_copy(update={"sex": None}), carried.body_kg)
     prior = expected.prior
@@ -109,7 +111,7 @@ def prepare_osim(
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=(*warnings, *expected.warnings, *_impossible_warning(model, prior.mean)),
+        warnings=(*warnings, *expected.warnings, *_impossible_warning(model, prior.mean), *_dense_warning(model)),
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )
@@ -118,6 +120,10 @@ def prepare_osim(
 def _impossible_warning(model: OsimModel, estimated: BodySegmentParameters) -> list[str]:
     told = _impossible(model, estimated)
     return [f"{each}; the estimate starts from them, so correct them first ({_what_is_wrong(model)})" for each in told]
+
+
+def _dense_warning(model: OsimModel) -> list[str]:
+    return [f"{model.path.name}: {sentence}" for sentence in dense_doubts(model.bsp)]
 
 
 def _impossible_note(model: OsimModel, held: BodySegmentParameters) -> list[str]:
@@ -224,7 +230,15 @@ def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentPara
 
 
 def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
-    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others.
+    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others."""
+    estimated, rest = _split(skeleton, own)
+    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
+    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
+    return prior, rest if rest.segments else None
+
+
+def _split(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BodySegmentParameters, BodySegmentParameters]:
+    """The bodies to be estimated, and all others.
 
     Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
     """
@@ -236,9 +250,25 @@ def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, Bo
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
     chosen = {max(names, key=mass.__getitem__) for names in heavy}
     estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
-    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
-    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
-    return prior, rest if rest.segments else None
+    return estimated, rest
+
+
+def _check_inertias(model: OsimModel, estimated: BodySegmentParameters) -> None:
+    """The prior is around the model's own inertias: without any there is none.
+
+    Raises:
+        OsimError: a body has mass and no inertia.
+    """
+    if without := points(estimated):
+        masses = dict(zip(model.bsp.segments, model.bsp.mass_kg, strict=True))
+        listed = ", ".join(f"{name} ({masses[name]:.3g} kg)" for name in without)
+        raise OsimError(
+            model.path,
+            f"moments of inertia of zero or less for bodies that have mass: {listed}; expected positive ones (kg m2), "
+            f"around which the fit estimates; most likely they were left out: give them, or scale the model from one "
+            f"that has them",
+            element=without[0],
+        )
 
 
 def _part(bsp: BodySegmentParameters, names: Sequence[str]) -> BodySegmentParameters:

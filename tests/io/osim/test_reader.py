@@ -296,6 +296,14 @@ BAD = {
         SOUND.replace(">/bodyset/leg</socket_parent_frame>", ">/bodyset/arm</socket_parent_frame>"),
         "Marker 'L1' hangs on '/bodyset/arm'",
     ),
+    "two markers of one name": (
+        SOUND.replace('name="P2"', 'name="L1"'),
+        "two markers are named 'L1', on pelvis and on leg; expected one of each name",
+    ),
+    "a marker twice in one place": (
+        SOUND.replace('name="L2"', 'name="L1"').replace("-0.05 -0.1 0.07", "0.05 -0.2 0.02"),
+        "two markers are named 'L1', both on leg",
+    ),
     "a loop": (
         SOUND.replace(
             "</objects><groups /></JointSet>",

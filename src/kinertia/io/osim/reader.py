@@ -61,6 +61,7 @@ def read_osim(path: str | Path) -> OsimModel:
     joints = _ordered(values, joints, bodies)
     couplings = _couplings(values, model, joints)
     placed = [_marker(values, element, frames, bsp.segments) for element in marker_elements(model)]
+    _check_marker_names(values, marker_elements(model), [marker.segment for marker, _ in placed])
     markers = [marker for marker, _ in placed if marker.segment != "ground"]
     skeleton = _skeleton(values, model, joints, couplings, markers)
     if not bsp.mass_kg[bsp.segments.index(skeleton.segments[0])] > 0:
@@ -212,6 +213,21 @@ def _marker(
     else:
         body, (rotation, origin) = frames.place(element, element.name, values.text(element, "socket_parent_frame"))
     return Marker(element.name, body, origin + rotation @ location), rotation
+
+
+def _check_marker_names(values: Values, elements: Sequence[Element], bodies: Sequence[str]) -> None:
+    """Measured markers are told by their names, so every name must be of one marker."""
+    first: dict[str, str] = {}
+    for element, body in zip(elements, bodies, strict=True):
+        if element.name in first:
+            both = [first[element.name], body]
+            where = f"both on {body}" if both[0] == body else f"on {both[0]} and on {body}"
+            values.fail(
+                element,
+                f"two markers are named '{element.name}', {where}; expected one of each name, or nobody knows which "
+                f"of them the measured marker is; most likely one was copied: rename or delete one",
+            )
+        first[element.name] = body
 
 
 def _skeleton(
