@@ -210,3 +210,16 @@ def test_inertias_too_small_for_the_mass_are_said(gait2354, walk, prepared):
     small = replace(gait2354, bsp=replace(gait2354.bsp, inertia_kgm2=0.1 * gait2354.bsp.inertia_kgm2))
     warnings = prepare_osim(SUBJECT, small, [TrialInput(walk)], Settings(), False).warnings
     assert any("subject01_scaled.osim: moments of inertia too small for the mass" in one for one in warnings)
+
+
+def test_joints_that_do_not_mirror_each_other_are_said(gait2354, walk, prepared):
+    assert not any("mirror" in warning for warning in prepared.warnings)
+    joints = tuple(
+        replace(j, translation=j.translation + np.array([0.03, 0.0, 0.0])) if j.child == "talus_r" else j
+        for j in gait2354.skeleton.joints
+    )
+    moved = replace(gait2354, skeleton=replace(gait2354.skeleton, joints=joints))
+    warnings = prepare_osim(SUBJECT, moved, [TrialInput(walk)], Settings(), False).warnings
+    (warning,) = [one for one in warnings if "mirror" in one]
+    assert warning.startswith("subject01_scaled.osim: left and right do not mirror each other in the places")
+    assert "talus_r and talus_l (30 mm)" in warning

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinertia.checks.verdict import Verdict
 from kinertia.estimation.force_mass import CONTRADICTING_MASS
+from kinertia.estimation.model_doubts import model_doubts
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.anatomy import ModelSegments, model_segments
 from kinertia.model.anthropometry import BodyGeometry, check_subject, literature_bsp
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
-from kinertia.model.density import HEAVY_KG, dense_doubts, points
+from kinertia.model.density import HEAVY_KG, points
+from kinertia.model.mirrored_joints import mirrored_joints_doubts
 from kinertia.model.skeleton import Skeleton
 
 ARMS_IN_TORSO = 0.42
@@ -134,15 +136,25 @@ def check_model(
     verdicts = [
         *_possible(bsp),
         *_sizes(bsp),
-        *_densities(bsp),
+        *_without_inertia(bsp),
+        *(Verdict("caution", sentence) for sentence in model_doubts(skeleton, bsp)),
         *_total(total, mass_kg),
         *_placeholders(bsp),
-        _symmetry(odd),
+        _symmetry(odd, bool(mirrored_joints_doubts(skeleton))),
         *_arms_in_torso(segments),
         *outliers,
         *_markers(skeleton),
     ]
     return ModelCheck(skeleton.name, bsp, segments, literature, not odd, tuple(verdicts), tuple(left_out))
+
+
+def check_model_of_subject(skeleton: Skeleton, bsp: BodySegmentParameters) -> ModelCheck | None:
+    """What a fit with this model would warn of, for a check of all that a subject file names; None if nothing is."""
+    doubts = [Verdict("caution", sentence) for sentence in model_doubts(skeleton, bsp)]
+    if not doubts:
+        return None
+    whole = check_model(skeleton, bsp)
+    return replace(whole, verdicts=tuple(doubts), left_out=("masses and inertias; give the model to kinertia check",))
 
 
 def _markers(skeleton: Skeleton) -> list[Verdict]:
@@ -258,8 +270,8 @@ def _sizes(bsp: BodySegmentParameters) -> list[Verdict]:
     return verdicts
 
 
-def _densities(bsp: BodySegmentParameters) -> list[Verdict]:
-    """Bodies that would have to be smaller than their mass allows, as with inertias of zero."""
+def _without_inertia(bsp: BodySegmentParameters) -> list[Verdict]:
+    """Bodies whose whole mass would have to be in a point."""
     verdicts: list[Verdict] = []
     impossible, masses = impossible_segments(bsp), dict(zip(bsp.segments, bsp.mass_kg.tolist(), strict=True))
     without = [name for name in points(bsp) if name not in impossible]
@@ -270,7 +282,7 @@ def _densities(bsp: BodySegmentParameters) -> list[Verdict]:
         verdicts.append(Verdict("fail", f"mass without any moment of inertia: {', '.join(heavy)}; {advice}"))
     if light:
         verdicts.append(Verdict("caution", f"mass without any moment of inertia: {', '.join(light)}; light bodies"))
-    return [*verdicts, *(Verdict("caution", sentence) for sentence in dense_doubts(bsp))]
+    return verdicts
 
 
 def _total(total_kg: float, mass_kg: float | None) -> list[Verdict]:
@@ -302,10 +314,11 @@ def _placeholders(bsp: BodySegmentParameters) -> list[Verdict]:
     return verdicts
 
 
-def _symmetry(odd: list[str]) -> Verdict:
+def _symmetry(odd: list[str], joints_differ: bool) -> Verdict:
     if odd:
         return Verdict("caution", f"left and right differ: {'; '.join(odd)}")
-    return Verdict("pass", "left and right mirror each other")
+    of_what = "masses and inertias of " if joints_differ else ""
+    return Verdict("pass", f"{of_what}left and right mirror each other")
 
 
 def _sides(bsp: BodySegmentParameters) -> list[str]:

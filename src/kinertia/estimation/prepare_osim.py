@@ -18,6 +18,7 @@ from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.model_doubts import model_doubts
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
@@ -25,7 +26,7 @@ from kinertia.estimation.repeated_trials import repeated_trials
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
-from kinertia.model.density import dense_doubts, points
+from kinertia.model.density import points
 from kinertia.model.imported import OsimModel
 from kinertia.model.model_markers import markers_of_model
 from kinertia.model.skeleton import Axis, Skeleton
@@ -61,6 +62,7 @@ def prepare_osim(
     if not model.skeleton.markers:
         raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
     feet = _feet(model)
+    warnings += [f"{model.path.name}: {sentence}" for sentence in model_doubts(model.skeleton, model.bsp)]
     progress("calibration", 0.0)
     started = time.perf_counter()
     trials = []
@@ -111,7 +113,7 @@ def prepare_osim(
         file=model,
         kinematics=tuple(kinematics),
         seconds=tuple(seconds),
-        warnings=(*warnings, *expected.warnings, *_impossible_warning(model, prior.mean), *_dense_warning(model)),
+        warnings=(*warnings, *expected.warnings, *_impossible_warning(model, prior.mean)),
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )
@@ -120,10 +122,6 @@ def prepare_osim(
 def _impossible_warning(model: OsimModel, estimated: BodySegmentParameters) -> list[str]:
     told = _impossible(model, estimated)
     return [f"{each}; the estimate starts from them, so correct them first ({_what_is_wrong(model)})" for each in told]
-
-
-def _dense_warning(model: OsimModel) -> list[str]:
-    return [f"{model.path.name}: {sentence}" for sentence in dense_doubts(model.bsp)]
 
 
 def _impossible_note(model: OsimModel, held: BodySegmentParameters) -> list[str]:
