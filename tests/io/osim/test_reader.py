@@ -323,6 +323,12 @@ BAD = {
     "too few numbers": (SOUND.replace("-0.01 -0.2 0.02", "-0.01 -0.2"), "mass_center of 'leg' has 2 numbers"),
     "a negative mass": (SOUND.replace("<mass>3.0</mass>", "<mass>-3</mass>"), "body 'leg' has mass -3 kg"),
     "gravity sideways": (SOUND.replace("0 -9.8066 0", "0 0 -9.8066"), "expected it along -y"),
+    "gravity of the moon": (SOUND.replace("-9.8066", "-1.62"), "gravity is 1.62 m/s2; expected 9.76 to 9.84 m/s2"),
+    "gravity not quite": (SOUND.replace("-9.8066", "-9.5"), "gravity is 9.5 m/s2; expected 9.76 to 9.84 m/s2"),
+    "gravity in mm": (
+        SOUND.replace("-9.8066", "-9806.65"),
+        "gravity is 9806.65 m/s2; expected 9.76 to 9.84 m/s2, as anywhere on Earth; most likely millimetres",
+    ),
     "a coupling in a circle": (
         model(
             custom_root() + joint("UniversalJoint", "between", "/bodyset/pelvis", "leg", "ab"),

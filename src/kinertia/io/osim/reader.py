@@ -24,6 +24,8 @@ from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
 NEWEST_VERSION = 40600
 """Of the formats known here; OpenSim 4.6 writes it."""
+EARTHS_GRAVITY_M_S2 = (9.76, 9.84)
+"""From high mountains at the equator to the poles."""
 _START = 0.2
 """How far from its default to the middle of its range a coordinate starts.
 
@@ -240,6 +242,14 @@ def _skeleton(
     gravity = values.numbers(model, "gravity", 3, [0.0, -9.80665, 0.0])
     if gravity[0] or gravity[2] or not gravity[1] < 0:
         values.fail(model, f"gravity is {gravity.tolist()}; expected it along -y (Y up), turn the model")
+    low, high = EARTHS_GRAVITY_M_S2
+    if not low <= -gravity[1] <= high:
+        cause = "millimetres in place of metres" if -gravity[1] > 1000 else "a value that was changed for a simulation"
+        values.fail(
+            model,
+            f"gravity is {-gravity[1]:g} m/s2; expected {low:g} to {high:g} m/s2, as anywhere on Earth; most likely "
+            f"{cause}: set gravity to 0 -9.80665 0",
+        )
     locked: dict[str, float] = {}
     following = {coupling.dependent for coupling in couplings}
     for joint in joints:
