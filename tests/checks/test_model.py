@@ -102,6 +102,13 @@ def test_mass_without_inertia(recwarn):
     assert not recwarn.list
 
 
+def test_mass_centres_in_millimetres_are_against():
+    bsp = upright.bsp()
+    model_check = check(replace(bsp, com_m=1000.0 * bsp.com_m))
+    assert "the distance of the mass centre of body 'torso' from its joints" in sentences(model_check, "fail")
+    assert "most likely mm or cm in place of m" in sentences(model_check, "fail")
+
+
 def test_no_inertia_of_a_light_body_is_only_okay():
     none = dict.fromkeys(PARAMETERS[4:], 0.0)
     model_check = check(changed("talus_r", mass=0.1, **none))

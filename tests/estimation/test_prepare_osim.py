@@ -223,3 +223,9 @@ def test_joints_that_do_not_mirror_each_other_are_said(gait2354, walk, prepared)
     (warning,) = [one for one in warnings if "mirror" in one]
     assert warning.startswith("subject01_scaled.osim: left and right do not mirror each other in the places")
     assert "talus_r and talus_l (30 mm)" in warning
+
+
+def test_markers_in_millimetres_are_refused(gait2354, walk):
+    skeleton = gait2354.skeleton.with_places(1000.0 * gait2354.skeleton.marker_locals)
+    with pytest.raises(OsimError, match=r"subject01_scaled\.osim: the distance of marker 'Top\.Head' .* is 702 m; exp"):
+        prepare_osim(SUBJECT, replace(gait2354, skeleton=skeleton), [TrialInput(walk)], Settings(), False)

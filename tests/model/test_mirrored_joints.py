@@ -10,6 +10,7 @@ import upright_model as upright
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.mirrored_joints import mirrored_joints_doubts
 from kinertia.model.skeleton import Skeleton
+from sound_models import MODELS
 
 
 def changed(skeleton: Skeleton, child: str, **values) -> Skeleton:
@@ -84,20 +85,6 @@ def test_bodies_with_axes_of_their_own():
     """As in `test_anatomy`: thighs whose frames are askew, the same on both sides."""
     turned = Rotation.from_rotvec([0.3, -0.8, 0.4]).as_matrix()
     assert mirrored_joints_doubts(upright.skeleton(turned=turned)) == []
-
-
-MODELS = [
-    "gait2354/subject01_scaled.osim",
-    "gait2354/gait2354_simbody.osim",
-    "gait2354/opensim_results/rra_adjusted.osim",
-    "rajagopal_walk/scaled.osim",
-    "rajagopal_walk/Rajagopal2016.osim",
-    "subject4/addbiomechanics_scaled.osim",
-    "field/hamner_treadmill_run/final.osim",
-    "field/hamner_run/subject02_registered.osim",
-    "field/laiarnold6_walk/LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim",
-    "field/laiarnold5_jump/LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim",
-]
 
 
 @pytest.mark.parametrize("name", MODELS)

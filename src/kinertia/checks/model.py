@@ -17,6 +17,7 @@ from kinertia.model.anthropometry import BodyGeometry, check_subject, literature
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
 from kinertia.model.density import HEAVY_KG, points
 from kinertia.model.mirrored_joints import mirrored_joints_doubts
+from kinertia.model.person_size import size_trouble
 from kinertia.model.skeleton import Skeleton
 
 ARMS_IN_TORSO = 0.42
@@ -134,10 +135,11 @@ def check_model(
         left_out.append(f"bodies of unknown segment, not compared: {', '.join(segments.unknown)}")
     odd = _sides(bsp)
     verdicts = [
+        *_person_size(skeleton, bsp),
         *_possible(bsp),
         *_sizes(bsp),
         *_without_inertia(bsp),
-        *(Verdict("caution", sentence) for sentence in model_doubts(skeleton, bsp)),
+        *_doubts(skeleton, bsp),
         *_total(total, mass_kg),
         *_placeholders(bsp),
         _symmetry(odd, bool(mirrored_joints_doubts(skeleton))),
@@ -150,11 +152,20 @@ def check_model(
 
 def check_model_of_subject(skeleton: Skeleton, bsp: BodySegmentParameters) -> ModelCheck | None:
     """What a fit with this model would warn of, for a check of all that a subject file names; None if nothing is."""
-    doubts = [Verdict("caution", sentence) for sentence in model_doubts(skeleton, bsp)]
+    doubts = [*_person_size(skeleton, bsp), *_doubts(skeleton, bsp)]
     if not doubts:
         return None
     whole = check_model(skeleton, bsp)
     return replace(whole, verdicts=tuple(doubts), left_out=("masses and inertias; give the model to kinertia check",))
+
+
+def _person_size(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[Verdict]:
+    trouble = size_trouble(skeleton, bsp)
+    return [Verdict("fail", trouble)] if trouble else []
+
+
+def _doubts(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[Verdict]:
+    return [Verdict("caution", sentence) for sentence in model_doubts(skeleton, bsp)]
 
 
 def _markers(skeleton: Skeleton) -> list[Verdict]:

@@ -29,6 +29,7 @@ from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.density import points
 from kinertia.model.imported import OsimModel
 from kinertia.model.model_markers import markers_of_model
+from kinertia.model.person_size import size_trouble
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
@@ -61,6 +62,8 @@ def prepare_osim(
     warnings += repeated_trials([item.recording for item in inputs], [item.window_s for item in inputs])
     if not model.skeleton.markers:
         raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    if trouble := size_trouble(model.skeleton, model.bsp):
+        raise OsimError(model.path, trouble)
     feet = _feet(model)
     warnings += [f"{model.path.name}: {sentence}" for sentence in model_doubts(model.skeleton, model.bsp)]
     progress("calibration", 0.0)
