@@ -6,6 +6,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.density import dense_doubts
 from kinertia.model.mirrored_joints import mirrored_joints_doubts
 from kinertia.model.skeleton import Skeleton
+from kinertia.model.subtalar_axis import subtalar_axis_doubts
 
 
 def model_doubts(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[str]:
@@ -15,4 +16,4 @@ def model_doubts(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[str]:
         skeleton: of the model as it was read.
         bsp: of its bodies.
     """
-    return [*dense_doubts(bsp), *mirrored_joints_doubts(skeleton)]
+    return [*dense_doubts(bsp), *mirrored_joints_doubts(skeleton), *subtalar_axis_doubts(skeleton)]

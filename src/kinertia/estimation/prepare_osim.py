@@ -60,12 +60,8 @@ def prepare_osim(
     settings = settings or Settings()
     subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
     warnings += repeated_trials([item.recording for item in inputs], [item.window_s for item in inputs])
-    if not model.skeleton.markers:
-        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
-    if trouble := size_trouble(model.skeleton, model.bsp):
-        raise OsimError(model.path, trouble)
+    warnings += _doubted(model)
     feet = _feet(model)
-    warnings += [f"{model.path.name}: {sentence}" for sentence in model_doubts(model.skeleton, model.bsp)]
     progress("calibration", 0.0)
     started = time.perf_counter()
     trials = []
@@ -120,6 +116,19 @@ def prepare_osim(
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )
+
+
+def _doubted(model: OsimModel) -> list[str]:
+    """Warnings of the model by itself.
+
+    Raises:
+        OsimError: it has no markers, or lengths in another unit.
+    """
+    if not model.skeleton.markers:
+        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    if trouble := size_trouble(model.skeleton, model.bsp):
+        raise OsimError(model.path, trouble)
+    return [f"{model.path.name}: {sentence}" for sentence in model_doubts(model.skeleton, model.bsp)]
 
 
 def _impossible_warning(model: OsimModel, estimated: BodySegmentParameters) -> list[str]:
