@@ -89,6 +89,41 @@ def test_unit_inertia():
     )
 
 
+def test_mass_without_inertia(recwarn):
+    """Of bodies that count it is against the model; and no ratio is made of two zeros."""
+    bsp = upright.bsp()
+    table = bsp.table()
+    table[:, 4:] = 0.0
+    model_check = check(BodySegmentParameters.from_table(bsp.segments, table))
+    assert "mass without any moment of inertia: pelvis, torso, femur_r" in sentences(model_check, "fail")
+    assert "physically possible" not in sentences(model_check, "pass")
+    assert "without thickness" not in sentences(model_check, "caution")
+    assert "nan" not in " ".join(verdict.sentence for verdict in model_check.verdicts)
+    assert not recwarn.list
+
+
+def test_mass_centres_in_millimetres_are_against():
+    bsp = upright.bsp()
+    model_check = check(replace(bsp, com_m=1000.0 * bsp.com_m))
+    assert "the distance of the mass centre of body 'torso' from its joints" in sentences(model_check, "fail")
+    assert "most likely mm or cm in place of m" in sentences(model_check, "fail")
+
+
+def test_no_inertia_of_a_light_body_is_only_okay():
+    none = dict.fromkeys(PARAMETERS[4:], 0.0)
+    model_check = check(changed("talus_r", mass=0.1, **none))
+    assert "mass without any moment of inertia: talus_r; light" in sentences(model_check, "caution")
+    assert not stands_against(model_check.verdicts)
+
+
+def test_inertia_too_small_for_the_mass():
+    bsp = upright.bsp()
+    torso = bsp.table()[bsp.segments.index("torso"), 4:] * 0.1
+    cautions = sentences(check(changed("torso", **dict(zip(PARAMETERS[4:], torso, strict=True)))), "caution")
+    assert "these bodies would have to be denser than water" in cautions
+    assert "torso (" in cautions
+
+
 @pytest.mark.parametrize(("values", "said"), [((0.0014, 0.0039, 0.0041), True), ((0.00141, 0.0039, 0.0041), False)])
 def test_rounded_inertia(values, said):
     model_check = check(

@@ -283,6 +283,27 @@ def test_subject_file_with_a_model(shared_data, tmp_path):
     assert "pass: every foot on the ground stands on a plate from" in printed
 
 
+def test_model_that_is_doubted_in_a_subject_file(shared_data, tmp_path):
+    """What the fit will warn of; a sound model is not mentioned."""
+    data = shared_data / "subject4"
+    sound = (data / "addbiomechanics_scaled.osim").read_text()
+    (joint,) = re.findall(r'<CustomJoint name="walker_knee_l">.*?</CustomJoint>', sound, flags=re.DOTALL)
+    moved, count = re.subn(r"(<translation>)(\S+)", lambda found: f"{found[1]}{float(found[2]) + 0.03}", joint, count=1)
+    assert count == 1
+    for name, content in (("sound", sound), ("moved", sound.replace(joint, moved))):
+        (tmp_path / f"{name}.osim").write_text(content)
+        (tmp_path / f"{name}.toml").write_text(
+            f'[subject]\nname = "four"\nmass_kg = 60.0\n[model]\nosim = "{name}.osim"\n'
+            f'[[trial]]\nmarkers = "{data / "walking1.trc"}"\nforces = "{data / "walking1_grf.mot"}"\n'
+            f'loads = "{data / "walking1_external_forces.xml"}"\n'
+        )
+    assert "mirror" not in text(run("check", tmp_path / "sound.toml"))
+    outcome = run("check", tmp_path / "moved.toml", "-o", tmp_path / "out")
+    assert "caution: left and right do not mirror each other in the places" in text(outcome)
+    assert "tibia_r and tibia_l (30 mm)" in text(outcome)
+    assert "tibia_r and tibia_l (30 mm)" in (tmp_path / "out" / "check.html").read_text()
+
+
 def test_model_of_other_markers_in_a_subject_file(lab, shared_data):
     """None shared fails; none in the model is an error, as it is to a fit."""
     model = shared_data / "subject4" / "addbiomechanics_scaled.osim"

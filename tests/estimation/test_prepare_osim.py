@@ -193,3 +193,39 @@ def test_somebody_old_is_warned_of_with_a_model_too(gait2354, walk):
     old = SUBJECT.model_copy(update={"age_years": 72.0})
     warnings = prepare_osim(old, gait2354, [TrialInput(walk)], Settings(), False).warnings
     assert any(one.startswith("population: elderly (72 years)") for one in warnings)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0])
+def test_mass_without_inertia_is_refused(gait2354, walk, factor):
+    """It ended in a matrix that is not positive definite."""
+    bsp = gait2354.bsp
+    inertia = np.where((np.array(bsp.segments) == "femur_r")[:, None, None], factor, 1.0) * bsp.inertia_kgm2
+    bad = replace(gait2354, bsp=replace(bsp, inertia_kgm2=inertia))
+    with pytest.raises(OsimError, match=r"inertia of zero or less for bodies that have mass: femur_r \([0-9.]+ kg\)"):
+        prepare_osim(SUBJECT, bad, [TrialInput(walk)], Settings(), False)
+
+
+def test_inertias_too_small_for_the_mass_are_said(gait2354, walk, prepared):
+    assert not any("denser" in warning for warning in prepared.warnings)
+    small = replace(gait2354, bsp=replace(gait2354.bsp, inertia_kgm2=0.1 * gait2354.bsp.inertia_kgm2))
+    warnings = prepare_osim(SUBJECT, small, [TrialInput(walk)], Settings(), False).warnings
+    assert any("subject01_scaled.osim: moments of inertia too small for the mass" in one for one in warnings)
+
+
+def test_joints_that_do_not_mirror_each_other_are_said(gait2354, walk, prepared):
+    assert not any("mirror" in warning for warning in prepared.warnings)
+    joints = tuple(
+        replace(j, translation=j.translation + np.array([0.03, 0.0, 0.0])) if j.child == "talus_r" else j
+        for j in gait2354.skeleton.joints
+    )
+    moved = replace(gait2354, skeleton=replace(gait2354.skeleton, joints=joints))
+    warnings = prepare_osim(SUBJECT, moved, [TrialInput(walk)], Settings(), False).warnings
+    (warning,) = [one for one in warnings if "mirror" in one]
+    assert warning.startswith("subject01_scaled.osim: left and right do not mirror each other in the places")
+    assert "talus_r and talus_l (30 mm)" in warning
+
+
+def test_markers_in_millimetres_are_refused(gait2354, walk):
+    skeleton = gait2354.skeleton.with_places(1000.0 * gait2354.skeleton.marker_locals)
+    with pytest.raises(OsimError, match=r"subject01_scaled\.osim: the distance of marker 'Top\.Head' .* is 702 m; exp"):
+        prepare_osim(SUBJECT, replace(gait2354, skeleton=skeleton), [TrialInput(walk)], Settings(), False)

@@ -1,4 +1,4 @@
-"""One recording that is listed as two trials is told; two windows of one recording are not."""
+"""One recording that is listed as two trials is told, and so are its forces; two windows of one recording are not."""
 
 from dataclasses import replace
 
@@ -27,9 +27,33 @@ def test_two_windows_of_a_recording(walk):
     assert len(repeated_trials([walk, walk], [(2.7, 3.1), (3.0, 3.4)])) == 1
 
 
+def other_markers(walk):
+    return replace(walk, name="walk 2", markers=replace(walk.markers, positions=np.round(walk.markers.positions, 4)))
+
+
 def test_two_recordings(walk):
-    other = replace(walk, markers=replace(walk.markers, positions=np.round(walk.markers.positions, 4)))
-    assert repeated_trials([walk, other], [None, None]) == []
+    other = other_markers(walk)
+    plates = replace(other.plates, force=np.round(other.plates.force, 1))
+    assert repeated_trials([walk, replace(other, plates=plates)], [None, None]) == []
+    assert repeated_trials([replace(walk, plates=None), replace(other, plates=None)], [None, None]) == []
+    idle = replace(walk.plates, force=np.zeros_like(walk.plates.force))
+    assert repeated_trials([replace(walk, plates=idle), replace(other, plates=idle)], [None, None]) == []
+
+
+def test_forces_of_the_other_trial(walk):
+    other = other_markers(walk)
+    (warning,) = repeated_trials([walk, other], [None, None])
+    assert f"'{walk.name}' and 'walk 2' have the same forces to the last digit, but not the same markers" in warning
+    assert repeated_trials([walk, other], [(2.7, 3.0), (3.0, 3.4)]) == []
+
+
+def test_pieces_of_a_recording_may_have_the_forces_of_the_whole(walk):
+    middle = len(walk.markers.time) // 2
+    pieces = [
+        replace(walk, markers=replace(walk.markers, time=walk.markers.time[k], positions=walk.markers.positions[k]))
+        for k in (slice(None, middle), slice(middle, None))
+    ]
+    assert repeated_trials(pieces, [None, None]) == []
 
 
 def test_the_fit_says_so(walk, measured_recording):

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
-from kinertia.model.model_on_person import model_doubts, model_trouble, moved_doubts
+from kinertia.model.model_on_person import model_on_person_doubts, model_on_person_trouble, moved_doubts
 from kinertia.trial.data import Markers
 
 LAI_ARNOLD = "LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
@@ -37,25 +37,25 @@ def relabelled(markers, exchanged):
 
 
 def test_the_own_model(person):
-    assert model_trouble(*person) == ""
-    assert model_doubts(*person) == []
+    assert model_on_person_trouble(*person) == ""
+    assert model_on_person_doubts(*person) == []
 
 
 @pytest.mark.parametrize("size", [0.92, 0.95, 1.05, 1.08])
 def test_the_model_of_a_person_of_another_size(person, size):
     places, walk, marker_set = person
     other = Markers(places.time, places.labels, size * places.positions)
-    told = model_trouble(other, walk, marker_set) or model_doubts(other, walk, marker_set)[0]
+    told = model_on_person_trouble(other, walk, marker_set) or model_on_person_doubts(other, walk, marker_set)[0]
     assert ("longer" if size < 1 else "shorter") in told
     assert "not scaled" in told
-    assert model_trouble(other, walk, marker_set) or abs(size - 1) < 0.06
+    assert model_on_person_trouble(other, walk, marker_set) or abs(size - 1) < 0.06
 
 
 @pytest.mark.parametrize("factor", [1000.0, 0.001])
 def test_another_unit_of_length(person, factor):
     places, walk, marker_set = person
     other = Markers(places.time, places.labels, factor * places.positions)
-    assert "another unit of length" in model_trouble(other, walk, marker_set)
+    assert "another unit of length" in model_on_person_trouble(other, walk, marker_set)
 
 
 def test_left_and_right_exchanged_in_all_labels(person):
@@ -65,12 +65,14 @@ def test_left_and_right_exchanged_in_all_labels(person):
     pairs = {one: {"R": "L", "r": "L" if f"L{one[1:]}" in places.labels else "l"}[one[0]] + one[1:] for one in right}
     pairs = {one: other for one, other in pairs.items() if other in places.labels}
     exchanged = pairs | {other: one for one, other in pairs.items()}
-    trouble = model_trouble(places, relabelled(walk, exchanged), marker_set)
+    trouble = model_on_person_trouble(places, relabelled(walk, exchanged), marker_set)
     assert "pelvis, torso are arranged like a mirror image" in trouble
     assert "left and right labels" in trouble
     legs = marker_set.segments | {"torso": ()}
-    assert model_trouble(places, walk, replace(marker_set, segments=legs)) == ""
-    assert "mirror image" in model_trouble(places, relabelled(walk, exchanged), replace(marker_set, segments=legs))
+    assert model_on_person_trouble(places, walk, replace(marker_set, segments=legs)) == ""
+    assert "mirror image" in model_on_person_trouble(
+        places, relabelled(walk, exchanged), replace(marker_set, segments=legs)
+    )
 
 
 def test_heel_and_another_marker_of_the_foot_exchanged(person):
@@ -81,7 +83,7 @@ def test_heel_and_another_marker_of_the_foot_exchanged(person):
         ((a, b) for a in foot for b in foot if a < b),
         key=lambda pair: np.linalg.norm(np.subtract(*[at[places.labels.index(label)] for label in pair])),
     )
-    trouble = model_trouble(places, relabelled(walk, {one: other, other: one}), marker_set)
+    trouble = model_on_person_trouble(places, relabelled(walk, {one: other, other: one}), marker_set)
     if len(foot) > 2:
         assert "look swapped, here or in the model" in trouble
         assert one in trouble or other in trouble
@@ -91,7 +93,7 @@ def test_markers_that_were_never_placed(person):
     places, walk, marker_set = person
     away = np.random.default_rng(1).normal(0.0, 0.02, places.positions.shape)
     generic = Markers(places.time, places.labels, places.positions + away)
-    told = [model_trouble(generic, walk, marker_set), *model_doubts(generic, walk, marker_set)]
+    told = [model_on_person_trouble(generic, walk, marker_set), *model_on_person_doubts(generic, walk, marker_set)]
     assert any("not moved to where" in one or "not placed" in one for one in told)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kinertia.checks.marker_set_match import common_marker_set
+from kinertia.checks.model import ModelCheck, check_model_of_subject
 from kinertia.checks.recording import RecordingCheck, check_recording
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.joint_widths import with_widths
@@ -51,6 +52,7 @@ class PersonFiles:
         mass_kg, height_m: of who walked, where they are known.
         static: which of the recordings is the static trial; if None, the only one in which the person stands still.
         subject: who walked, with the widths of joints that were stated.
+        models: the OpenSim model by its name, where something speaks against it.
     """
 
     recordings: tuple[RecordingFiles, ...]
@@ -59,6 +61,7 @@ class PersonFiles:
     height_m: float | None = None
     static: RecordingFiles | None = None
     subject: Subject | None = None
+    models: tuple[tuple[str, ModelCheck], ...] = ()
 
 
 def files_of_subject(subject: SubjectFile) -> PersonFiles:
@@ -71,9 +74,13 @@ def files_of_subject(subject: SubjectFile) -> PersonFiles:
         for trial in subject.trials
     ]
     marker_set = None if named is None else read_marker_set(named)
-    if subject.model.osim is not None:
-        marker_set = markers_of_model(read_osim(subject.model.osim))
     who = subject.subject
+    if subject.model.osim is not None:
+        model = read_osim(subject.model.osim)
+        marker_set = markers_of_model(model)
+        doubted = check_model_of_subject(model.skeleton, model.bsp)
+        models = () if doubted is None else ((model.path.name, doubted),)
+        return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m, subject=who, models=models)
     if subject.model.static is None:
         return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m, subject=who)
     static = RecordingFiles(subject.model.static, length_unit=subject.model.length_unit)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinertia.checks.verdict import Verdict
 from kinertia.estimation.force_mass import CONTRADICTING_MASS
+from kinertia.estimation.model_doubts import model_doubts
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.anatomy import ModelSegments, model_segments
 from kinertia.model.anthropometry import BodyGeometry, check_subject, literature_bsp
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
+from kinertia.model.density import HEAVY_KG, points
+from kinertia.model.mirrored_joints import mirrored_joints_doubts
+from kinertia.model.person_size import size_trouble
 from kinertia.model.skeleton import Skeleton
 
 ARMS_IN_TORSO = 0.42
@@ -131,16 +135,37 @@ def check_model(
         left_out.append(f"bodies of unknown segment, not compared: {', '.join(segments.unknown)}")
     odd = _sides(bsp)
     verdicts = [
+        *_person_size(skeleton, bsp),
         *_possible(bsp),
         *_sizes(bsp),
+        *_without_inertia(bsp),
+        *_doubts(skeleton, bsp),
         *_total(total, mass_kg),
         *_placeholders(bsp),
-        _symmetry(odd),
+        _symmetry(odd, bool(mirrored_joints_doubts(skeleton))),
         *_arms_in_torso(segments),
         *outliers,
         *_markers(skeleton),
     ]
     return ModelCheck(skeleton.name, bsp, segments, literature, not odd, tuple(verdicts), tuple(left_out))
+
+
+def check_model_of_subject(skeleton: Skeleton, bsp: BodySegmentParameters) -> ModelCheck | None:
+    """What a fit with this model would warn of, for a check of all that a subject file names; None if nothing is."""
+    doubts = [*_person_size(skeleton, bsp), *_doubts(skeleton, bsp)]
+    if not doubts:
+        return None
+    whole = check_model(skeleton, bsp)
+    return replace(whole, verdicts=tuple(doubts), left_out=("masses and inertias; give the model to kinertia check",))
+
+
+def _person_size(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[Verdict]:
+    trouble = size_trouble(skeleton, bsp)
+    return [Verdict("fail", trouble)] if trouble else []
+
+
+def _doubts(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[Verdict]:
+    return [Verdict("caution", sentence) for sentence in model_doubts(skeleton, bsp)]
 
 
 def _markers(skeleton: Skeleton) -> list[Verdict]:
@@ -223,10 +248,11 @@ def _possible(bsp: BodySegmentParameters) -> list[Verdict]:
         for sentence in bsp.inconsistencies()
         if sentence.split(": ", 1)[0] in impossible
     ]
-    if not verdicts:
+    without = [name for name in points(bsp) if name not in impossible]
+    if not verdicts and not without:
         verdicts.append(Verdict("pass", "every body is physically possible"))
     at_fault = ~bsp.physically_consistent() & (bsp.mass_kg > 0)
-    thin = [bsp.segments[i] for i in np.flatnonzero(at_fault) if bsp.segments[i] not in impossible]
+    thin = [bsp.segments[i] for i in np.flatnonzero(at_fault) if bsp.segments[i] not in (*impossible, *without)]
     if thin:
         verdicts.append(
             Verdict(
@@ -252,6 +278,21 @@ def _sizes(bsp: BodySegmentParameters) -> list[Verdict]:
                     f"another unit",
                 )
             )
+    return verdicts
+
+
+def _without_inertia(bsp: BodySegmentParameters) -> list[Verdict]:
+    """Bodies whose whole mass would have to be in a point."""
+    verdicts: list[Verdict] = []
+    impossible, masses = impossible_segments(bsp), dict(zip(bsp.segments, bsp.mass_kg.tolist(), strict=True))
+    without = [name for name in points(bsp) if name not in impossible]
+    heavy = [name for name in without if masses[name] >= HEAVY_KG]
+    light = [name for name in without if masses[name] < HEAVY_KG]
+    if heavy:
+        advice = "their inertias were left out: give them (kg m2); kinertia fit refuses such a model"
+        verdicts.append(Verdict("fail", f"mass without any moment of inertia: {', '.join(heavy)}; {advice}"))
+    if light:
+        verdicts.append(Verdict("caution", f"mass without any moment of inertia: {', '.join(light)}; light bodies"))
     return verdicts
 
 
@@ -284,10 +325,11 @@ def _placeholders(bsp: BodySegmentParameters) -> list[Verdict]:
     return verdicts
 
 
-def _symmetry(odd: list[str]) -> Verdict:
+def _symmetry(odd: list[str], joints_differ: bool) -> Verdict:
     if odd:
         return Verdict("caution", f"left and right differ: {'; '.join(odd)}")
-    return Verdict("pass", "left and right mirror each other")
+    of_what = "masses and inertias of " if joints_differ else ""
+    return Verdict("pass", f"{of_what}left and right mirror each other")
 
 
 def _sides(bsp: BodySegmentParameters) -> list[str]:
@@ -318,7 +360,8 @@ def _arms_in_torso(segments: ModelSegments) -> list[Verdict]:
     if not _has_arms(segments) or "torso" not in segments.bodies:
         return []
     moments = segments.bsp.inertia_kgm2[segments.bsp.segments.index("torso")].diagonal()
-    ratio = moments[1] / (moments[[0, 2]].mean())
+    others = moments[[0, 2]].mean()
+    ratio = moments[1] / others if others > 0 else 0.0
     if ratio <= ARMS_IN_TORSO:
         return []
     return [

@@ -96,6 +96,7 @@ def check(
     marker_set = None if markers is None else read_marker_set(markers)
     if subjects:
         wanted = files_of_subject(read_subject(subjects[0]))
+        models += wanted.models
     else:
         wanted = PersonFiles(files_by_name(measured, loads), marker_set, mass, height)
     with shown_progress() as progress:

@@ -12,7 +12,7 @@ from kinertia.errors import TrialError
 from kinertia.model.body_sides import sides_trouble, walks_backwards
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.model_on_person import model_doubts, model_trouble
+from kinertia.model.model_on_person import model_on_person_doubts, model_on_person_trouble
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.model.torn_segments import torn_segments_trouble
@@ -96,8 +96,8 @@ def trial_doubts(
         trouble = body_trouble(static.markers, markers, marker_set)
         session = [] if trouble else session_doubts(static.markers, markers, marker_set)
     if not trouble and marker_set is not None and marker_set.in_model is not None:
-        trouble = model_trouble(marker_set.in_model, own, marker_set)
-        session = [] if trouble else model_doubts(marker_set.in_model, own, marker_set)
+        trouble = model_on_person_trouble(marker_set.in_model, own, marker_set)
+        session = [] if trouble else model_on_person_doubts(marker_set.in_model, own, marker_set)
     smeared = [] if recording.plates is None else ringing_doubts(recording.plates)
     if not trouble and recording.plates is not None:
         trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)

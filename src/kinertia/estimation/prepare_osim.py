@@ -18,6 +18,7 @@ from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.model_doubts import model_doubts
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
@@ -25,9 +26,11 @@ from kinertia.estimation.repeated_trials import repeated_trials
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
+from kinertia.model.density import points
 from kinertia.model.imported import OsimModel
 from kinertia.model.model_markers import markers_of_model
 from kinertia.model.model_on_person import moved_doubts
+from kinertia.model.person_size import size_trouble
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
@@ -59,8 +62,7 @@ def prepare_osim(
     settings = settings or Settings()
     subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
     warnings += repeated_trials([item.recording for item in inputs], [item.window_s for item in inputs])
-    if not model.skeleton.markers:
-        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    warnings += _doubted(model)
     feet = _feet(model)
     progress("calibration", 0.0)
     started = time.perf_counter()
@@ -80,6 +82,7 @@ def prepare_osim(
         warnings += moved_doubts(model.skeleton, skeleton, [trial.markers for trial in trials])
     calibration_s = (time.perf_counter() - started) / len(inputs)
     own, factor = at_mass(model.bsp, carried.body_kg)
+    _check_inertias(model, _split(skeleton, own)[0])
     prior, held = parted(skeleton, own)
     expected = population_prior(prior, subject.model_copy(update={"sex": None}), carried.body_kg)
     prior = expected.prior
@@ -117,6 +120,19 @@ def prepare_osim(
         notes=tuple(dict.fromkeys(notes)),
         attached=tuple(attached),
     )
+
+
+def _doubted(model: OsimModel) -> list[str]:
+    """Warnings of the model by itself.
+
+    Raises:
+        OsimError: it has no markers, or lengths in another unit.
+    """
+    if not model.skeleton.markers:
+        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+    if trouble := size_trouble(model.skeleton, model.bsp):
+        raise OsimError(model.path, trouble)
+    return [f"{model.path.name}: {sentence}" for sentence in model_doubts(model.skeleton, model.bsp)]
 
 
 def _impossible_warning(model: OsimModel, estimated: BodySegmentParameters) -> list[str]:
@@ -228,7 +244,15 @@ def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentPara
 
 
 def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
-    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others.
+    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others."""
+    estimated, rest = _split(skeleton, own)
+    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
+    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
+    return prior, rest if rest.segments else None
+
+
+def _split(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BodySegmentParameters, BodySegmentParameters]:
+    """The bodies to be estimated, and all others.
 
     Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
     """
@@ -240,9 +264,25 @@ def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, Bo
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
     chosen = {max(names, key=mass.__getitem__) for names in heavy}
     estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
-    prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
-    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
-    return prior, rest if rest.segments else None
+    return estimated, rest
+
+
+def _check_inertias(model: OsimModel, estimated: BodySegmentParameters) -> None:
+    """The prior is around the model's own inertias: without any there is none.
+
+    Raises:
+        OsimError: a body has mass and no inertia.
+    """
+    if without := points(estimated):
+        masses = dict(zip(model.bsp.segments, model.bsp.mass_kg, strict=True))
+        listed = ", ".join(f"{name} ({masses[name]:.3g} kg)" for name in without)
+        raise OsimError(
+            model.path,
+            f"moments of inertia of zero or less for bodies that have mass: {listed}; expected positive ones (kg m2), "
+            f"around which the fit estimates; most likely they were left out: give them, or scale the model from one "
+            f"that has them",
+            element=without[0],
+        )
 
 
 def _part(bsp: BodySegmentParameters, names: Sequence[str]) -> BodySegmentParameters:

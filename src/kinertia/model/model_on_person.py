@@ -38,7 +38,7 @@ _FRAMES = 60
 _THERE = "the model"
 
 
-def model_trouble(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
+def model_on_person_trouble(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
     """Why model and trial cannot be used together; empty where they may.
 
     Args:
@@ -53,8 +53,8 @@ def model_trouble(places: Markers, trial: Markers, marker_set: MarkerSet) -> str
     return swapped or _other_body(distances)
 
 
-def model_doubts(places: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
-    """What speaks against the model's scale and marker places, if `model_trouble` found nothing."""
+def model_on_person_doubts(places: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
+    """What speaks against the model's scale and marker places, if `model_on_person_trouble` found nothing."""
     distances = SegmentDistances.of(places, trial, marker_set)
     if len(distances.pairs) < _FEWEST_PAIRS:
         return []

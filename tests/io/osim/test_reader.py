@@ -296,6 +296,14 @@ BAD = {
         SOUND.replace(">/bodyset/leg</socket_parent_frame>", ">/bodyset/arm</socket_parent_frame>"),
         "Marker 'L1' hangs on '/bodyset/arm'",
     ),
+    "two markers of one name": (
+        SOUND.replace('name="P2"', 'name="L1"'),
+        "two markers are named 'L1', on pelvis and on leg; expected one of each name",
+    ),
+    "a marker twice in one place": (
+        SOUND.replace('name="L2"', 'name="L1"').replace("-0.05 -0.1 0.07", "0.05 -0.2 0.02"),
+        "two markers are named 'L1', both on leg",
+    ),
     "a loop": (
         SOUND.replace(
             "</objects><groups /></JointSet>",
@@ -315,6 +323,12 @@ BAD = {
     "too few numbers": (SOUND.replace("-0.01 -0.2 0.02", "-0.01 -0.2"), "mass_center of 'leg' has 2 numbers"),
     "a negative mass": (SOUND.replace("<mass>3.0</mass>", "<mass>-3</mass>"), "body 'leg' has mass -3 kg"),
     "gravity sideways": (SOUND.replace("0 -9.8066 0", "0 0 -9.8066"), "expected it along -y"),
+    "gravity of the moon": (SOUND.replace("-9.8066", "-1.62"), "gravity is 1.62 m/s2; expected 9.76 to 9.84 m/s2"),
+    "gravity not quite": (SOUND.replace("-9.8066", "-9.5"), "gravity is 9.5 m/s2; expected 9.76 to 9.84 m/s2"),
+    "gravity in mm": (
+        SOUND.replace("-9.8066", "-9806.65"),
+        "gravity is 9806.65 m/s2; expected 9.76 to 9.84 m/s2, as anywhere on Earth; most likely millimetres",
+    ),
     "a coupling in a circle": (
         model(
             custom_root() + joint("UniversalJoint", "between", "/bodyset/pelvis", "leg", "ab"),

@@ -24,6 +24,8 @@ from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
 NEWEST_VERSION = 40600
 """Of the formats known here; OpenSim 4.6 writes it."""
+EARTHS_GRAVITY_M_S2 = (9.76, 9.84)
+"""From high mountains at the equator to the poles."""
 _START = 0.2
 """How far from its default to the middle of its range a coordinate starts.
 
@@ -61,6 +63,7 @@ def read_osim(path: str | Path) -> OsimModel:
     joints = _ordered(values, joints, bodies)
     couplings = _couplings(values, model, joints)
     placed = [_marker(values, element, frames, bsp.segments) for element in marker_elements(model)]
+    _check_marker_names(values, marker_elements(model), [marker.segment for marker, _ in placed])
     markers = [marker for marker, _ in placed if marker.segment != "ground"]
     skeleton = _skeleton(values, model, joints, couplings, markers)
     if not bsp.mass_kg[bsp.segments.index(skeleton.segments[0])] > 0:
@@ -214,6 +217,21 @@ def _marker(
     return Marker(element.name, body, origin + rotation @ location), rotation
 
 
+def _check_marker_names(values: Values, elements: Sequence[Element], bodies: Sequence[str]) -> None:
+    """Measured markers are told by their names, so every name must be of one marker."""
+    first: dict[str, str] = {}
+    for element, body in zip(elements, bodies, strict=True):
+        if element.name in first:
+            both = [first[element.name], body]
+            where = f"both on {body}" if both[0] == body else f"on {both[0]} and on {body}"
+            values.fail(
+                element,
+                f"two markers are named '{element.name}', {where}; expected one of each name, or nobody knows which "
+                f"of them the measured marker is; most likely one was copied: rename or delete one",
+            )
+        first[element.name] = body
+
+
 def _skeleton(
     values: Values,
     model: Element,
@@ -224,6 +242,14 @@ def _skeleton(
     gravity = values.numbers(model, "gravity", 3, [0.0, -9.80665, 0.0])
     if gravity[0] or gravity[2] or not gravity[1] < 0:
         values.fail(model, f"gravity is {gravity.tolist()}; expected it along -y (Y up), turn the model")
+    low, high = EARTHS_GRAVITY_M_S2
+    if not low <= -gravity[1] <= high:
+        cause = "millimetres in place of metres" if -gravity[1] > 1000 else "a value that was changed for a simulation"
+        values.fail(
+            model,
+            f"gravity is {-gravity[1]:g} m/s2; expected {low:g} to {high:g} m/s2, as anywhere on Earth; most likely "
+            f"{cause}: set gravity to 0 -9.80665 0",
+        )
     locked: dict[str, float] = {}
     following = {coupling.dependent for coupling in couplings}
     for joint in joints:

@@ -1,0 +1,124 @@
+"""Does the left of a model mirror its right? Finds the joint of one side that has the other side's frames.
+
+A pair of joints is compared in ground axes and in the axes of the bodies that carry them, and the better of the two
+counts: bodies' axes may be chosen freely on both sides, and whatever is askew above a joint is not the joint's fault.
+Of places, what different lengths of the two segments explain is taken off.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.model.bsp import FloatArray
+from kinertia.model.neutral_joints import NeutralJoints, angle_deg, mirrored, neutral_joints
+from kinertia.model.skeleton import Skeleton
+
+AXIS_DEG = 5.0
+"""Sound models: 0.0 degrees. The left subtalar joint with the right one's frames: 13.9."""
+PLACE_M = 0.015
+"""Sound models: 0.0 mm; their segments differ in length by up to 10 mm. A talus whose offset has the other side's sign:
+18 mm."""
+
+
+def mirrored_joints_doubts(skeleton: Skeleton) -> list[str]:
+    """At most two sentences: on axes, and on places of joints, of which left and right do not mirror each other."""
+    neutral = neutral_joints(skeleton)
+    sideways = neutral.sideways
+    if sideways is None:
+        return []
+    axes = [
+        f"{first} and {second} ({angle:.0f} degrees)"
+        for pair in neutral.pairs
+        for first, second, angle in _askew(neutral, pair, sideways)
+        if angle > AXIS_DEG
+    ]
+    places = [
+        f"{right} and {left} ({off * 1e3:.0f} mm)"
+        for right, left in neutral.pairs
+        for off in [_apart_m(neutral, right, left, sideways)]
+        if off > PLACE_M
+    ]
+    sentences = []
+    if axes:
+        sentences.append(
+            f"left and right do not mirror each other in the axes of {', '.join(axes)}; most likely a joint of one "
+            f"side has the other side's frames: mirror them (a place changes the sign of z, a direction or orientation "
+            f"those of x and y); if the axes of each side were measured, they may differ"
+        )
+    if places:
+        sentences.append(
+            f"left and right do not mirror each other in the places of the joints that carry {', '.join(places)}, "
+            f"beyond what different lengths of their segments explain; most likely a joint of one side was moved, or "
+            f"has the sign of the other side: correct it, unless this person's sides differ so much"
+        )
+    return sentences
+
+
+def _askew(neutral: NeutralJoints, pair: tuple[str, str], sideways: int) -> Iterator[tuple[str, str, float]]:
+    """Coordinates of the right and left joint, and the angle (degrees) of one's axis from the other's mirror image."""
+    right, left = pair
+    others = {_without_side(name): name for name in neutral.turns[left]}
+    for name, axis in neutral.turns[right].items():
+        other = others.get(_without_side(name))
+        if other is not None:
+            angles = [
+                angle_deg(turn.T @ axis, reflection @ back.T @ neutral.turns[left][other])
+                for turn, back, reflection in _views(neutral, right, left, sideways)
+            ]
+            yield name, other, min(angles)
+
+
+def _apart_m(neutral: NeutralJoints, right: str, left: str, sideways: int) -> float:
+    """How far (m) the right joint is from the left one's mirror image, each in its own parent."""
+    parents = [neutral.joints[name].parent for name in (right, left)]
+    if "ground" in parents:
+        return 0.0
+    apart = []
+    for turn, back, reflection in _views(neutral, right, left, sideways):
+        if parents[0] == parents[1]:
+            apart.append(_in_one_parent(neutral, right, left, (turn, reflection)))
+            continue
+        vectors = [
+            frame.T @ (neutral.centres[name] - neutral.centres[parent])
+            for frame, name, parent in zip((turn, back), (right, left), parents, strict=True)
+        ]
+        lengths = [float(np.linalg.norm(vector)) for vector in vectors]
+        if min(lengths) < 1e-6:
+            return max(lengths)
+        directions = vectors[0] / lengths[0] - reflection @ vectors[1] / lengths[1]
+        apart.append(float(np.linalg.norm(directions)) * sum(lengths) / 2)
+    return min(apart)
+
+
+def _in_one_parent(neutral: NeutralJoints, right: str, left: str, view: tuple[FloatArray, FloatArray]) -> float:
+    """The same of two joints of one body; its middle is where it carries joints of no side, else between the two."""
+    turn, reflection = view
+    parent = neutral.joints[right].parent
+    first, second = (turn.T @ (neutral.centres[name] - neutral.origins[parent]) for name in (right, left))
+    across = reflection.diagonal() < 0
+    middle = [
+        (turn.T @ (neutral.centres[name] - neutral.origins[parent]))[across]
+        for name, joint in neutral.joints.items()
+        if joint.parent == parent and not name.endswith(("_r", "_l"))
+    ]
+    apart = first - reflection @ second
+    apart[across] -= 2 * np.mean(middle) if middle else apart[across]
+    return float(np.linalg.norm(apart))
+
+
+def _views(
+    neutral: NeutralJoints, right: str, left: str, sideways: int
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Axes to look along at the right and the left joint, and the reflection between them: ground's, the parents'."""
+    yield np.eye(3), np.eye(3), mirrored(sideways)
+    first, second = (neutral.joints[name].parent for name in (right, left))
+    if "ground" not in (first, second):
+        turn, back = neutral.rotations[first], neutral.rotations[second]
+        yield turn, back, mirrored(int(np.abs(turn[sideways]).argmax()))
+
+
+def _without_side(coordinate: str) -> str:
+    return re.sub(r"_[rl](?=_|$)", "", coordinate)

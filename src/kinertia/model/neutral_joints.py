@@ -1,0 +1,84 @@
+"""Where the joints of a model are, and how their axes point, with all coordinates at zero: people stand upright then.
+
+Mirroring is across the plane between the sides: in ground axes, and in those of the bodies that carry the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.model.bsp import FloatArray
+from kinertia.model.skeleton import Joint, Skeleton
+
+
+@dataclass(frozen=True)
+class NeutralJoints:
+    """Joints by the name of the body that each one carries.
+
+    Attributes:
+        joints: as in the model.
+        rotations: (3, 3) by body, its axes in ground.
+        origins: (3,) m by body, its origin in ground.
+        centres: (3,) m by body, the centre of its joint in ground.
+        turns: by body, by coordinate, (3,) the axis in ground about which the joint turns; those that turn nothing are
+            not there.
+    """
+
+    joints: Mapping[str, Joint]
+    rotations: Mapping[str, FloatArray]
+    origins: Mapping[str, FloatArray]
+    centres: Mapping[str, FloatArray]
+    turns: Mapping[str, Mapping[str, FloatArray]]
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """Bodies of the right and of the left that are each other's."""
+        pairs = [(name, f"{name[:-2]}_l") for name in self.joints if name.endswith("_r")]
+        return [(right, left) for right, left in pairs if left in self.joints]
+
+    @property
+    def sideways(self) -> int | None:
+        """The ground axis from left to right, 0 or 2 (x or z); None where the sides are not beside each other."""
+        across = sum((self.centres[right] - self.centres[left] for right, left in self.pairs), np.zeros(3))
+        if not np.abs(across).any() or np.abs(across).argmax() == 1:
+            return None
+        return int(np.abs(across).argmax())
+
+
+def neutral_joints(skeleton: Skeleton) -> NeutralJoints:
+    """The joints of a model whose coordinates are all zero, but for those that are locked at another value."""
+    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    rotations = {name: pose.rotation[0, i] for i, name in enumerate(skeleton.segments)}
+    origins = {name: pose.translation[0, i] for i, name in enumerate(skeleton.segments)}
+    joints = {joint.child: joint for joint in skeleton.joints}
+    centres = {name: origins[name] + rotations[name] @ joint.child_translation for name, joint in joints.items()}
+    moving = [
+        (joint.child, axis.coordinate)
+        for joint in skeleton.joints
+        for axis in joint.axes
+        if axis.coordinate not in skeleton.locked
+    ]
+    slopes = np.ones(len(moving)) if pose.slopes is None else pose.slopes[0]
+    turns: dict[str, dict[str, FloatArray]] = {name: {} for name in joints}
+    for (child, coordinate), velocity, slope in zip(moving, pose.axes[0], slopes, strict=True):
+        turns[child][coordinate] = turns[child].get(coordinate, np.zeros(3)) + slope * velocity[3:]
+    turning = {
+        child: {coordinate: axis / np.linalg.norm(axis) for coordinate, axis in axes.items() if axis.any()}
+        for child, axes in turns.items()
+    }
+    return NeutralJoints(joints, rotations, origins, centres, turning)
+
+
+def mirrored(axis: int) -> FloatArray:
+    """(3, 3) reflection that turns this axis round."""
+    reflection = np.eye(3)
+    reflection[axis, axis] = -1.0
+    return reflection
+
+
+def angle_deg(one: FloatArray, other: FloatArray) -> float:
+    """Between two lines of these directions (unit): an axis and its opposite are the same line."""
+    return float(np.degrees(np.arccos(min(1.0, abs(float(one @ other))))))
