@@ -128,6 +128,19 @@ class IdleReading(NamedTuple):
     rings_s: float
 
 
+class TorqueColumns(NamedTuple):
+    """What the torque columns of one plate held in its file, while the plate carried somebody.
+
+    Attributes:
+        arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does not
+            move, or the plate was hardly loaded.
+        rms_nm: of the torque about X, Y and Z, N m.
+    """
+
+    arm_m: float
+    rms_nm: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class PlateLoads:
     """What p force plates (or column groups of a force file) measured.
@@ -143,6 +156,7 @@ class PlateLoads:
         noise_n: of each plate, deviation of its vertical force while nobody stands on it, N; None where it is unknown.
         idle: of each plate, what it read while nobody stood on it, before that was taken away; None where it is
             unknown.
+        torques: of each plate, what its torque columns held; None where the file has no points and torques.
 
     Examples:
         >>> force, moment = np.zeros((5, 1, 3)), np.zeros((5, 1, 3))
@@ -160,6 +174,7 @@ class PlateLoads:
     corners: FloatArray | None = None
     noise_n: tuple[float, ...] | None = None
     idle: tuple[IdleReading, ...] | None = None
+    torques: tuple[TorqueColumns, ...] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.names), 3)
