@@ -36,7 +36,8 @@ the readers set force and moment of such samples to zero, but for those with whi
 (`kinertia.trial.idle_plate`).
 """
 
-_TIME_TOLERANCE_S = 1e-6
+TIME_TOLERANCE_S = 1e-6
+"""Times that differ by less are the same: what a clock adds by its rounding must decide nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class Markers:
 
     def cut(self, start_s: float, end_s: float) -> Markers:
         """The frames with start_s <= time <= end_s."""
-        keep = (self.time >= start_s - _TIME_TOLERANCE_S) & (self.time <= end_s + _TIME_TOLERANCE_S)
+        keep = (self.time >= start_s - TIME_TOLERANCE_S) & (self.time <= end_s + TIME_TOLERANCE_S)
         return Markers(self.time[keep], self.labels, self.positions[keep])
 
     def select(self, labels: Sequence[str]) -> Markers:
@@ -356,9 +357,14 @@ class Trial:
 
 
 def nearest_samples(time: FloatArray, at: FloatArray) -> npt.NDArray[np.int_]:
-    """Indices into `time` (ascending) of the samples nearest to the times `at`."""
+    """Indices into `time` (ascending) of the samples nearest to the times `at`; of two as near, the later one."""
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
-    return after - (at - time[after - 1] < time[after] - at)
+    return after - (at - time[after - 1] < time[after] - at - TIME_TOLERANCE_S)
+
+
+def span_s(time: FloatArray, first: int = 0, last: int = -1) -> float:
+    """Seconds from one sample to another, to a microsecond: 0.04, and neither more nor less, for 10.17 to 10.21 s."""
+    return round(float(time[last] - time[first]), 6)
 
 
 def runs(mask: BoolArray) -> list[tuple[int, int]]:
