@@ -9,6 +9,7 @@ from kinertia.estimation.doubts import trial_doubts
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_table, write_table
+from kinertia.trial.exchanged_torques import exchanged_torques_doubts
 from kinertia.trial.torque_columns import torque_columns_doubts
 from recorded_walks import WALKS
 
@@ -62,7 +63,9 @@ def changed(measured_file, tmp_path):
 
 @pytest.mark.parametrize("name", SOUND)
 def test_sound_files(measured_file, name):
-    assert torque_columns_doubts(read_forces(measured_file(name))) == []
+    plates = read_forces(measured_file(name))
+    assert torque_columns_doubts(plates) == []
+    assert exchanged_torques_doubts(plates) == []
 
 
 @pytest.mark.parametrize("name", ["plug-in gait a", "plug-in gait b"])
@@ -98,6 +101,33 @@ def test_free_moment_in_another_column(changed, name, axis, named):
     assert doubt.startswith("the torques of the force file are about a horizontal axis: those of")
     assert doubt.count(named) == 2
     assert "not turned with the forces" in doubt
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_torques_of_the_other_plate(changed, name):
+    def exchange(groups):
+        (force, point, torque), (other_force, other_point, other_torque) = groups
+        return [(force, point, other_torque), (other_force, other_point, torque)]
+
+    plates = changed(name, exchange)
+    assert torque_columns_doubts(plates) == []
+    (doubt,) = exchanged_torques_doubts(plates)
+    assert doubt.startswith(f"the free moments (torques) of {plates.names[0]} and {plates.names[1]} are exchanged: ")
+
+
+@pytest.mark.parametrize("size_nm", [0.3, 3.0, 5.0, 8.0, 15.0, 3000.0])
+@pytest.mark.parametrize("name", GROUPS)
+def test_what_an_unloaded_plate_reads_is_no_torque_of_the_other(changed, name, size_nm):
+    """Exports divide by next to no force there, so that torques and points may be anything."""
+    rng = np.random.default_rng(0)
+
+    def noisy(groups):
+        return [
+            (force, point, torque + np.where(force[:, 1:2] < 20.0, size_nm * rng.standard_normal(torque.shape), 0.0))
+            for force, point, torque in groups
+        ]
+
+    assert exchanged_torques_doubts(changed(name, noisy)) == []
 
 
 @pytest.mark.parametrize("middle", [(0.0, 0.0, 0.0), (0.9, 0.0, 0.3)])

@@ -21,6 +21,7 @@ from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, p
 from kinertia.motion.over_smoothed import over_smoothed_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
+from kinertia.trial.exchanged_torques import exchanged_torques_doubts
 from kinertia.trial.foot_ways import belt_doubts
 from kinertia.trial.force_resolution import ringing_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
@@ -114,6 +115,7 @@ def trial_doubts(
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
         sentences += [*hum_doubts(recording.plates), *loads_doubts(recording.plates)]
+        sentences += exchanged_torques_doubts(recording.plates)
         sentences += torque_columns_doubts(recording.plates) or torque_point_doubts(recording.plates)
         # what is usual of loads under feet is of people who land on the heel
         backwards = marker_set is not None and walks_backwards(markers, marker_set)

@@ -136,10 +136,12 @@ class TorqueColumns(NamedTuple):
         arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does not
             move, or the plate was hardly loaded.
         rms_nm: of the torque about X, Y and Z, N m.
+        belongs_to: index of the plate with whose load the torque comes and goes, where that is another.
     """
 
     arm_m: float
     rms_nm: tuple[float, float, float]
+    belongs_to: int | None
 
 
 @dataclass(frozen=True, eq=False)

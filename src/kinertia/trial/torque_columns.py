@@ -13,6 +13,7 @@ import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import FloatArray, PlateLoads, TorqueColumns
+from kinertia.trial.exchanged_torques import exchanged_torques
 from kinertia.trial.rms import rms
 
 _FEWEST = 20
@@ -32,17 +33,17 @@ def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> 
             anything.
     """
     loaded = force[..., 1] > FIRM_LOAD_N
-    columns = []
+    columns, elsewhere = [], exchanged_torques(force[..., 1], torque[..., 1])
     for p in range(force.shape[1]):
         rows = loaded[:, p]
         if rows.sum() < _FEWEST:
-            columns.append(TorqueColumns(np.nan, (0.0, 0.0, 0.0)))
+            columns.append(TorqueColumns(np.nan, (0.0, 0.0, 0.0), None))
             continue
         own = torque[rows, p]
         moves = float(np.ptp(point[rows, p][:, [0, 2]], axis=0).max()) > _MOVES_M
         arm = float(np.median(np.hypot(own[:, 0], own[:, 2]) / force[rows, p, 1])) if moves else np.nan
         x, y, z = (rms(values) for values in own.T)
-        columns.append(TorqueColumns(arm, (x, y, z)))
+        columns.append(TorqueColumns(arm, (x, y, z), elsewhere.get(p)))
     return tuple(columns)
 
 
