@@ -9,6 +9,7 @@ from pathlib import Path
 from kinertia.checks.marker_set_match import common_marker_set
 from kinertia.checks.model import ModelCheck, check_model_of_subject
 from kinertia.checks.recording import RecordingCheck, check_recording
+from kinertia.checks.verdict import Verdict
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.joint_widths import with_widths
 from kinertia.io.belt_file import read_belt
@@ -20,6 +21,7 @@ from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_markers import markers_of_model
+from kinertia.motion.trial_delays import trial_delays_doubts
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
@@ -147,7 +149,16 @@ def check_files(
             recording, own_set, _ = with_widths(recording, others, marker_set, wanted.subject or Subject(name="person"))
         judged = check_recording(recording, own_set, mass_kg, one.window_s, static, height_m, is_static)
         checks.append((one.title, judged))
-    return checks, mistakes
+    return _with_delays(checks), mistakes
+
+
+def _with_delays(checks: Sequence[tuple[str, RecordingCheck]]) -> list[tuple[str, RecordingCheck]]:
+    """Findings by title, with what the trials' delays say of one another."""
+    doubts = trial_delays_doubts([one.delay for _, one in checks])
+    told = {
+        name: tuple(Verdict("caution", sentence) for each, sentence in doubts if each == name) for name, _ in doubts
+    }
+    return [(title, replace(one, verdicts=(*one.verdicts, *told.get(one.recording.name, ())))) for title, one in checks]
 
 
 def _common(stated: Sequence[float | None]) -> float | None:

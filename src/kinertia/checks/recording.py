@@ -17,6 +17,7 @@ from kinertia.estimation.warnings import FORCE_MASS_TOLERANCE
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES, LONGEST_BRIDGE_S, facing
+from kinertia.motion.trial_delays import TrialDelay, trial_delay
 from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.free_moment import mean_turning
 from kinertia.trial.ground_contact import FootMarkers
@@ -52,6 +53,7 @@ class RecordingCheck:
         scale_kg: body mass as given or as the file tells, or None.
         verdicts: whether a fit can use this recording.
         notes: assumptions made while reading and sorting the loads.
+        delay: of the forces against the markers, or None.
 
     Examples:
         >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -72,6 +74,7 @@ class RecordingCheck:
     scale_kg: float | None
     verdicts: tuple[Verdict, ...]
     notes: tuple[str, ...]
+    delay: TrialDelay | None = None
 
     def facts(self) -> list[tuple[str, str]]:
         """What was measured and how, as pairs of a name and a sentence."""
@@ -142,6 +145,7 @@ def check_recording(
         if used.landmarks:
             verdicts += _facing(recording.markers, used, moves)
             verdicts += _static(recording, used) if standing else []
+    delay: TrialDelay | None = None
     doubts = (
         static_doubts(recording, used, recording.height_m if height_m is None else height_m)
         if is_static or standing
@@ -161,10 +165,11 @@ def check_recording(
     if trial is not None and used is not None:
         verdicts += _turning(trial, used)
         verdicts += [] if refused else _verdicts(motion_doubts(recording, trial, used))
+        delay = None if refused or standing else trial_delay(trial, used.segments)
     verdicts += _weight(mass, scale)
     telling = None if used is None else _telling(recording.markers, used)
     return RecordingCheck(
-        recording, match, used, seen, moves, telling, plates, windows, mass, scale, tuple(verdicts), tuple(notes)
+        recording, match, used, seen, moves, telling, plates, windows, mass, scale, tuple(verdicts), tuple(notes), delay
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.errors import TrialError
 from kinertia.model.skeleton import Marker, Pose, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
-from kinertia.trial.data import Markers, Trial
+from kinertia.trial.data import Markers, Trial, span_s
 
 MARKER_NOISE_M = 0.01
 """Deviation of one marker coordinate in one frame; the frames used stand 0.1 s apart and count as independent."""
@@ -157,8 +157,7 @@ def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str])
 
 def sampled(markers: Markers) -> Markers:
     """A few frames, FRAME_SPACING_S apart, from all over the trial (at most sixty)."""
-    duration = float(markers.time[-1] - markers.time[0])
-    count = min(_MAX_FRAMES, len(markers.time), 1 + int(duration / FRAME_SPACING_S))
+    count = min(_MAX_FRAMES, len(markers.time), 1 + int(span_s(markers.time) / FRAME_SPACING_S * (1.0 + 1e-9)))
     every = -(-len(markers.time) // count)
     return Markers(markers.time[::every], markers.labels, markers.positions[::every])
 

@@ -22,6 +22,7 @@ from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, p
 from kinertia.motion.over_smoothed import over_smoothed_trouble
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.data import Markers, Recording, Trial
+from kinertia.trial.exchanged_torques import exchanged_torques_doubts
 from kinertia.trial.foot_ways import belt_doubts
 from kinertia.trial.force_resolution import ringing_doubts
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
@@ -36,6 +37,7 @@ from kinertia.trial.marker_faults import (
 from kinertia.trial.marker_quality import axes_trouble, extent_m, travel
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
 from kinertia.trial.plate_faults import loads_doubts, loads_trouble
+from kinertia.trial.torque_columns import torque_columns_doubts
 from kinertia.trial.torque_point import torque_point_doubts
 from kinertia.trial.walkway_slope import walkway_slope_doubts
 
@@ -102,8 +104,8 @@ def trial_doubts(
     if not trouble and recording.plates is not None:
         trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)
         if not trouble and feet is not None and (trouble := load_places_trouble(recording, feet)):
-            # loads that are smeared last too long
-            trouble = "; ".join([*smeared, trouble])
+            # loads that are smeared last too long, and those with wrong torques act elsewhere
+            trouble = "; ".join([*smeared, *torque_columns_doubts(recording.plates), trouble])
     if trouble:
         return _refused(trouble)
     ways = _ways_doubts(own, marker_set)
@@ -117,7 +119,8 @@ def trial_doubts(
         sentences += belt_doubts(markers, feet, recording.belt)
     if recording.plates is not None:
         sentences += [*hum_doubts(recording.plates), *loads_doubts(recording.plates)]
-        sentences += torque_point_doubts(recording.plates)
+        sentences += exchanged_torques_doubts(recording.plates)
+        sentences += torque_columns_doubts(recording.plates) or torque_point_doubts(recording.plates)
         # what is usual of loads under feet is of people who land on the heel
         backwards = marker_set is not None and walks_backwards(markers, marker_set)
         if feet is not None and not backwards and _shows_whole_feet(markers, marker_set):

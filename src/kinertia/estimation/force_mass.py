@@ -20,7 +20,7 @@ from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.markers_centre import markers_centre, owners_of
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
-from kinertia.trial.data import FloatArray, Trial, runs
+from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, Trial, runs, span_s
 
 CONTRADICTING_MASS = 0.10
 """Scale and vertical force, or two trials, may differ by this share, and by twice the deviation of the mass by force,
@@ -97,7 +97,7 @@ class ForceMass:
         """When a part of the weight is on no plate though at other times none is, and what to do; else empty."""
         share = self.carried / carried.total_kg - 1.0
         whole = np.abs(share) < _CARRIED
-        spans = [(a, b) for a, b in runs(share < -_MISSING) if self.time[b] - self.time[a] >= shortest_s]
+        spans = [(a, b) for a, b in runs(share < -_MISSING) if span_s(self.time, a, b) >= shortest_s]
         if whole.mean() < _MOSTLY or not spans:
             return ""
         first, last = max(spans, key=lambda span: span[1] - span[0])
@@ -144,7 +144,7 @@ def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
         return None
     height = place[:, 1]
     loads = trial.loads
-    inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
+    inside = (loads.time >= start - TIME_TOLERANCE_S) & (loads.time <= end + TIME_TOLERANCE_S)
     force = loads.force[:, :, 1].sum(axis=1)
     velocity = smooth(around.time, height, _FAST_HZ)(time[[0, -1]], 1)
     gained = float(velocity[1] - velocity[0]) / (time[-1] - time[0])

@@ -41,6 +41,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.swapped_markers import check_labels
+from kinertia.motion.trial_delays import uneven_delays
 from kinertia.motion.upright_trunk import with_upright_trunk
 from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Recording, Trial
@@ -184,6 +185,7 @@ def prepare(
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [(with_upright_trunk(model.skeleton, trial), angle) for trial, angle in turned]
     trials = [trial for trial, _ in turned]
+    warnings += uneven_delays(trials, marker_set.segments)
     carried = CarriedMass.of(known(subject.mass_kg), attached)
     skeleton, notes = calibrate(model, trials, carried)
     warnings += unseen_body(skeleton)

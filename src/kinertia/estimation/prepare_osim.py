@@ -35,6 +35,7 @@ from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.range_ends import clamped_doubts
+from kinertia.motion.trial_delays import uneven_delays
 from kinertia.settings import Attached, Settings, Subject
 from kinertia.trial.data import Trial
 from kinertia.trial.plate_assignment import build_trial
@@ -71,6 +72,7 @@ def prepare_osim(
         trial, doubts = _looked_at(model, item, feet)
         warnings += doubts
         trials.append(trial)
+    warnings += uneven_delays(trials, markers_of_model(model).segments)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
     carried = CarriedMass.of(known(subject.mass_kg), attached)

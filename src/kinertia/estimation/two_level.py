@@ -32,6 +32,7 @@ from kinertia.motion.dynamics import (
     root_regressor,
 )
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.trial.data import span_s
 
 MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""
@@ -70,7 +71,7 @@ def stretches(window: Window) -> list[Window]:
     The two constants per coordinate hold the corrected pelvis near the measured one only for so long: literature BSPs
     are off by some 10 N m, which over 2.4 s turns the pelvis away by 0.3 rad. The study's trials were one stride.
     """
-    count = int(np.ceil((window.time[-1] - window.time[0]) / MAX_STRETCH_S))
+    count = int(np.ceil(span_s(window.time) / MAX_STRETCH_S * (1.0 - 1e-9)))
     edges = np.linspace(0, len(window.time), max(count, 1) + 1).round().astype(int)
     parts = [slice(start, end) for start, end in pairwise(edges)]
     return [Window(window.time[part], window.motion.cut(part), window.wrench[part]) for part in parts]

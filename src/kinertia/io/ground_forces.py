@@ -16,6 +16,7 @@ from kinertia.io.number_table import expect_file
 from kinertia.io.sto import TimeTable, read_table
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.idle_plate import PlateLoad, without_idle
+from kinertia.trial.torque_columns import torque_columns
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
 
@@ -75,7 +76,8 @@ def read_forces_with_notes(
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
     _expect_steady_time(path, table.time)
-    wrenches = [_wrench(path, table, group, np.eye(3) if turn is None else turn) for group in groups]
+    turn = np.eye(3) if turn is None else turn
+    wrenches = [_wrench(path, table, group, turn) for group in groups]
     loads = PlateLoads(
         table.time,
         tuple(group.name for group in groups),
@@ -84,6 +86,7 @@ def read_forces_with_notes(
         tuple(group.foot for group in groups),
         noise_n=tuple(plate.noise_n for plate in wrenches),
         idle=tuple(plate.idle for plate in wrenches),
+        torques=torque_columns(*_stated(table, groups, turn)),
     )
     return loads, (*notes, *table.notes, *_remarks(path, loads, groups))
 
@@ -127,6 +130,16 @@ def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> 
         _expect_numbers(path, table, group.torque, loaded)
         moment = moment + _triple(table, group.torque) @ turn.T
     return without_idle(table.time, force, moment)
+
+
+def _stated(table: TimeTable, groups: Sequence[_Columns], turn: FloatArray) -> list[FloatArray]:
+    """Forces, points and torques (k, p, 3) as they stand in the file, in ground axes; torques that are not are zero."""
+    zero = np.zeros((len(table.time), 3))
+    identifiers = ((group.force, group.point, group.torque) for group in groups)
+    return [
+        np.stack([zero if one is None else _triple(table, one) @ turn.T for one in own], axis=1)
+        for own in zip(*identifiers, strict=True)
+    ]
 
 
 def _triple(table: TimeTable, identifier: str) -> FloatArray:

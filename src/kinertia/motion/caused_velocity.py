@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
-from kinertia.trial.data import FloatArray, Trial
+from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, Trial, span_s
 
 _PELVIS_HZ = 6.0
 _LEAST_WINDOW_S = 0.4
@@ -89,9 +89,11 @@ def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVel
     first, last = trial.markers.time[seen][[0, -1]]
     parts = []
     for start, end in trial.carried_windows():
-        inside = (trial.loads.time >= max(start, first) - 1e-9) & (trial.loads.time <= min(end, last) + 1e-9)
+        inside = (trial.loads.time >= max(start, first) - TIME_TOLERANCE_S) & (
+            trial.loads.time <= min(end, last) + TIME_TOLERANCE_S
+        )
         time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
-        if len(time) < 10 or np.ptp(time) < _LEAST_WINDOW_S - 1e-9 or not force[:, 1].mean() > 0:
+        if len(time) < 10 or span_s(time) < _LEAST_WINDOW_S or not force[:, 1].mean() > 0:
             continue
         mass_kg = float(force[:, 1].mean()) / GRAVITY_M_S2
         impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)

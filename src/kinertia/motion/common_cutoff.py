@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.motion.smoothing import smooth
-from kinertia.trial.data import Trial
+from kinertia.trial.data import TIME_TOLERANCE_S, Trial, span_s
 
 LOWEST_HZ = 3.0
 ENDS_HZ = (6.0, 8.0, 10.0, 12.0, 15.0)
@@ -63,12 +63,12 @@ def common_cutoff(time: np.ndarray, pelvis: np.ndarray, trial: Trial) -> Cutoff:
 def _motion_ends_hz(trial: Trial) -> float:
     """The lowest of ENDS_HZ that leaves little of the ground reactions in the longest measured window."""
     loads, (start, end) = trial.loads, trial.windows()[0]
-    inside = (loads.time >= start - 1e-9) & (loads.time <= end + 1e-9)
+    inside = (loads.time >= start - TIME_TOLERANCE_S) & (loads.time <= end + TIME_TOLERANCE_S)
     time, force = loads.time[inside], loads.force[inside].sum(axis=1)
     if len(time) < _FEWEST:
         return ENDS_HZ[-1]
     # what is faster than a cutoff at 15 Hz shows in means over a hundredth of a second just as well
-    together = max(1, int((len(time) - 1) / (time[-1] - time[0]) / _ENOUGH_HZ))
+    together = max(1, int((len(time) - 1) / span_s(time) / _ENOUGH_HZ))
     count = len(time) // together
     time, force = (part[: count * together].reshape(count, together, -1).mean(axis=1) for part in (time, force))
     limit = LEFT_SHARE_OF_WEIGHT * force[:, 1].mean()

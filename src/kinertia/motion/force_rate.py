@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import Trial
+from kinertia.trial.data import Trial, span_s
 
 _LEAST_WINDOW_S, _LEAST_GROWTH, _MOST_LEFT = 1.0, 0.0105, 0.22
 """By pelvis or by markers' centre the delay of 21 sound trials grows by -0.017 to 0.013 in windows of 1.03 to 1.3 s
@@ -28,7 +28,7 @@ def rate_doubts(trial: Trial, owners: Mapping[str, str]) -> list[str]:
         owners: the segment that each marker is on.
     """
     for part in caused_velocities(trial, owners):
-        if np.ptp(part.time) < _LEAST_WINDOW_S:
+        if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         found = ups_and_downs_of(part, growing=True)
         if not found or max(one.left for one in found) > _MOST_LEFT:

@@ -134,7 +134,7 @@ def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]
         for first, second in zip(strikes[side], strikes[side][1:], strict=False):
             start, end = first.event.time_s, second.event.time_s
             across = _between([e.event.time_s for e in strikes[other]], start, end)
-            usual = _STRIDE_S[0] <= end - start <= _STRIDE_S[1] and len(across) == 1
+            usual = _STRIDE_S[0] <= round(end - start, 6) <= _STRIDE_S[1] and len(across) == 1
             if not usual or not _PHASE[0] <= (across[0] - start) / (end - start) <= _PHASE[1]:
                 continue
             number += 1

@@ -24,7 +24,7 @@ from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.range_ends import range_notes
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
-from kinertia.trial.data import Markers, Trial, runs
+from kinertia.trial.data import TIME_TOLERANCE_S, Markers, Trial, runs, span_s
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
@@ -91,7 +91,7 @@ class Kinematics:
     @cached_property
     def stretches(self) -> tuple[slice, ...]:
         """Of the w frames, those of each stretch."""
-        starts = np.searchsorted(self.time, [start - 1e-9 for start, _ in self.windows_s])
+        starts = np.searchsorted(self.time, [start - TIME_TOLERANCE_S for start, _ in self.windows_s])
         return tuple(slice(a, b) for a, b in pairwise([*starts.tolist(), len(self.time)]))
 
     @cached_property
@@ -117,14 +117,14 @@ class Kinematics:
     def near_window(self) -> np.ndarray:
         """(k,) which samples of the ground reactions lie between first and last, or at most AROUND_WINDOW_S outside."""
         time, (start, end) = self.trial.loads.time, self.window_s
-        return (time >= start - AROUND_WINDOW_S - 1e-9) & (time <= end + AROUND_WINDOW_S + 1e-9)
+        return (time >= start - AROUND_WINDOW_S - TIME_TOLERANCE_S) & (time <= end + AROUND_WINDOW_S + TIME_TOLERANCE_S)
 
 
 def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.ndarray:
     """Which of these times (n,) lie in one of the windows (first and last time, s)."""
     result = np.zeros(np.shape(time), dtype=bool)
     for first, last in windows_s:
-        result |= (time >= first - 1e-9) & (time <= last + 1e-9)
+        result |= (time >= first - TIME_TOLERANCE_S) & (time <= last + TIME_TOLERANCE_S)
     return result
 
 
@@ -173,7 +173,10 @@ def solve_kinematics(
             f"few to smooth it; fill the gaps of the markers or use a longer trial",
         ) from error
     known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
-    known &= np.abs(ik.time - ik.time[shown].mean()) <= np.ptp(ik.time[shown]) / 2 - _END_PERIODS / cutoff.hz + 1e-9
+    known &= (
+        np.abs(ik.time - ik.time[shown].mean())
+        <= np.ptp(ik.time[shown]) / 2 - _END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
+    )
     windows, notes = _long_enough(trial, known & trial.measured, known)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
@@ -189,7 +192,7 @@ def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
     for c in range(known.shape[1]):
         for first, last in runs(~known[:, c]):
             inner = first > 0 and last < len(time) - 1
-            if inner and time[last + 1] - time[first - 1] <= LONGEST_BRIDGE_S:
+            if inner and span_s(time, first - 1, last + 1) <= LONGEST_BRIDGE_S:
                 filled[first : last + 1, c] = True
     return filled
 

@@ -13,7 +13,7 @@ import numpy as np
 from kinertia.motion.caused_velocity import CausedVelocity, caused_velocities
 from kinertia.motion.force_faults import HORIZONTAL, OFFSET_WINDOW_S, offset_trouble
 from kinertia.motion.unexplained_velocity import TOLD_APART, Scaled, Unexplained
-from kinertia.trial.data import PlateLoads, Trial
+from kinertia.trial.data import PlateLoads, Trial, span_s
 
 _ONE_TURNED, _CLEARLY_BEST, _LEAST_TURNED_M_S = 0.65, 0.85, 0.08
 """Where one plate's sign is wrong, turning it leaves 0.04 to 0.57 of the difference of velocities on five trials; on
@@ -65,7 +65,7 @@ def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], k: int)
     runners sways along the way.
     """
     shown = [parts]
-    if max(float(np.ptp(part.time)) for part in parts) >= _LEAST_GAIN_WINDOW_S:
+    if max(span_s(part.time) for part in parts) >= _LEAST_GAIN_WINDOW_S:
         shown.append([replace(part, pelvis=part.centre) for part in parts])
     found = [Unexplained.of(plates.time, plates.force, each, k) for each in shown]
     return min(found, key=lambda one: min(one.as_read, float(one.plate_turned.min())))
@@ -80,10 +80,10 @@ def plate_offset_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, 
         trial: what became of them, in the same axes.
         owners: the segment that each marker is on.
     """
-    parts = [part for part in caused_velocities(trial, owners) if np.ptp(part.time) >= _LEAST_ZERO_WINDOW_S]
+    parts = [part for part in caused_velocities(trial, owners) if span_s(part.time) >= _LEAST_ZERO_WINDOW_S]
     if not parts:
         return ""
-    longest_s = max(float(np.ptp(part.time)) for part in parts)
+    longest_s = max(span_s(part.time) for part in parts)
     for axis, k in HORIZONTAL.items():
         left = Unexplained.of(plates.time, plates.force, parts, k)
         best = int(np.argmin(left.plate_zeroed))
@@ -116,7 +116,7 @@ def axis_gain_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str
         trial: what became of them, in the same axes.
         owners: the segment that each marker is on.
     """
-    parts = [part for part in caused_velocities(trial, owners) if np.ptp(part.time) >= _LEAST_GAIN_WINDOW_S]
+    parts = [part for part in caused_velocities(trial, owners) if span_s(part.time) >= _LEAST_GAIN_WINDOW_S]
     if not parts:
         return ""
     for axis, k in HORIZONTAL.items():

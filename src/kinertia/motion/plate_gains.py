@@ -16,7 +16,7 @@ from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import FloatArray, Recording, Trial, nearest_samples, runs
+from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, Recording, Trial, nearest_samples, runs, span_s
 
 _CENTRE_HZ = 8.0
 _ALONE_N, _IDLE_N, _SHORTEST_S = 50.0, 10.0, 0.2
@@ -58,7 +58,7 @@ def _ups_and_downs(recording: Recording, trial: Trial, owners: Mapping[str, str]
     if plates is None or len(plates.names) < 2:
         return []
     for part in caused_velocities(trial, owners):
-        if np.ptp(part.time) < _LEAST_WINDOW_S:
+        if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         read, rate = ups_and_downs_of(part), ups_and_downs_of(part, growing=True)
         own = [part.by(plates.time, vertical) for vertical in plates.force[..., 1].T]
@@ -95,14 +95,16 @@ def _masses(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> di
     except SmoothingError:
         return {}
     measured = trial.measured[nearest_samples(markers.time, plates.time)]
-    measured &= (plates.time >= markers.time[0]) & (plates.time <= markers.time[-1])
+    measured &= (plates.time >= markers.time[0] - TIME_TOLERANCE_S) & (
+        plates.time <= markers.time[-1] + TIME_TOLERANCE_S
+    )
     by_plate = {}
     for p, name in enumerate(plates.names):
         vertical: FloatArray = plates.force[:, p, 1]
         alone = (vertical > _ALONE_N) & (np.delete(plates.force[..., 1], p, axis=1).max(axis=1) < _IDLE_N) & measured
         masses_kg = []
         for first, last in runs(alone):
-            span = float(plates.time[last] - plates.time[first])
+            span = span_s(plates.time, first, last)
             if span < _SHORTEST_S:
                 continue
             step = np.diff(plates.time[first : last + 1])

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinertia.errors import MarkerSetError
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
+from kinertia.trial.data import BoolArray, FloatArray, Markers, runs, span_s
 
 _SPEED_SPAN_S = 0.01
 _FILLED_GAP_S = 0.2
@@ -130,7 +130,7 @@ def _still(time: FloatArray, velocity: FloatArray) -> BoolArray:
     slow = np.isfinite(speed).any(axis=1) & (np.where(np.isnan(speed), 0.0, speed) <= _STILL_M_S).all(axis=1)
     still = np.zeros(len(time), dtype=bool)
     for first, last in runs(slow):
-        still[first : last + 1] = time[last] - time[first] >= _STILL_S
+        still[first : last + 1] = span_s(time, first, last) >= _STILL_S
     return still
 
 
@@ -150,7 +150,7 @@ def _short_gaps_filled(markers: Markers) -> FloatArray:
     positions = markers.positions[:, kept].copy()
     for column, marker in enumerate(kept):
         for first, last in runs(~seen[:, marker]):
-            if markers.time[last] - markers.time[first] > _FILLED_GAP_S:
+            if span_s(markers.time, first, last) > _FILLED_GAP_S:
                 continue
             for axis in range(3):
                 positions[first : last + 1, column, axis] = np.interp(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers, runs
+from kinertia.trial.data import FEET, TIME_TOLERANCE_S, BoolArray, FloatArray, Markers, runs, span_s
 from kinertia.trial.ground_contact import bridged
 
 _LOW = 0.15
@@ -51,7 +51,8 @@ class FootWay:
         """(k,) whether it stands then, or a little before or after; everywhere where that cannot be told."""
         if not self.stands:
             return np.ones(len(time), dtype=bool)
-        spans = [(time >= start - _LANDING_S) & (time <= end + _LANDING_S) for start, end, _ in self.stands]
+        slack_s = _LANDING_S + TIME_TOLERANCE_S
+        spans = [(time >= start - slack_s) & (time <= end + slack_s) for start, end, _ in self.stands]
         result: BoolArray = np.any(spans, axis=0)
         return result
 
@@ -197,7 +198,7 @@ def _short_gaps_filled(time: FloatArray, place: FloatArray) -> FloatArray:
         frames = np.flatnonzero(seen)
         for first, last in runs(~seen):
             inside = len(frames) > 0 and frames[0] < first and last < frames[-1]
-            if inside and time[last + 1] - time[first - 1] <= _SHORTEST_S + 1e-9:
+            if inside and span_s(time, first - 1, last + 1) <= _SHORTEST_S:
                 for axis in range(3):
                     ends = place[[first - 1, last + 1], marker, axis]
                     gap = slice(first, last + 1)
@@ -222,7 +223,7 @@ def _stands(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bo
     return tuple(
         (float(time[first]), float(time[last]), whole(first, last))
         for first, last in runs(stands)
-        if time[last] - time[first] >= _SHORTEST_S
+        if span_s(time, first, last) >= _SHORTEST_S
     )
 
 

@@ -35,7 +35,7 @@ def ringing_s(time: FloatArray, vertical: FloatArray) -> float:
     peak = float(vertical.max(initial=0.0))
     if len(time) < 2 or peak < _LEAST_LOAD_N:
         return 0.0
-    step = float(np.median(np.diff(time)))
+    step = round(float(np.median(np.diff(time))), 9)
     landings: list[float] = []
     leavings: list[float] = []
     loads = _loads(vertical > LOAD_THRESHOLD_N, _BRIDGED_S / step)

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial, runs
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, TIME_TOLERANCE_S, FootLoads, Trial, runs, span_s
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import BRIDGED_GAP_S, SHORTEST_CONTACT_S
 
@@ -22,7 +22,7 @@ class GaitEvent(NamedTuple):
 def gait_events(trial: Trial) -> list[GaitEvent]:
     """All events between measured frames, in order: elsewhere a load also begins and ends with the plate."""
     frames, edges = trial.markers.time, load_edges(trial.loads)
-    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S for event in edges]
+    near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S + TIME_TOLERANCE_S for event in edges]
     return [event for event, around in zip(edges, near, strict=True) if around.any() and trial.measured[around].all()]
 
 
@@ -32,7 +32,7 @@ def load_edges(loads: FootLoads) -> list[GaitEvent]:
     for foot, side in enumerate(FEET):
         loaded = bridged(loads.time, loads.force[:, foot, 1] > LOAD_THRESHOLD_N)
         for first, last in runs(loaded):
-            if loads.time[last] - loads.time[first] < SHORTEST_CONTACT_S:
+            if span_s(loads.time, first, last) < SHORTEST_CONTACT_S:
                 continue
             if first > 0:
                 edges.append(GaitEvent(float(loads.time[first]), side, "heel strike"))

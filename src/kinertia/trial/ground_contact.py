@@ -13,7 +13,18 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Markers, nearest_samples, runs
+from kinertia.trial.data import (
+    FEET,
+    LOAD_THRESHOLD_N,
+    TIME_TOLERANCE_S,
+    BoolArray,
+    FloatArray,
+    FootLoads,
+    Markers,
+    nearest_samples,
+    runs,
+    span_s,
+)
 from kinertia.trial.foot_motion import FootMotion, foot_motions
 
 BRIDGED_GAP_S = 0.02
@@ -85,7 +96,7 @@ class GroundContact:
         flight = measured & ~self.ground.any(axis=1)
         for first, last in runs(flight):
             between = first > 0 and last < len(time) - 1 and measured[first - 1] and measured[last + 1]
-            if not between or time[last] - time[first] > LONGEST_FLIGHT_S:
+            if not between or span_s(time, first, last) > LONGEST_FLIGHT_S:
                 measured[first : last + 1] = False
         return measured
 
@@ -93,7 +104,7 @@ class GroundContact:
 def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> GroundContact:
     """Which foot is on the ground and which on a loaded plate, by the rules of `measured_frames`."""
     nearest = nearest_samples(loads.time, markers.time)
-    inside = (markers.time >= loads.time[0] - 1e-6) & (markers.time <= loads.time[-1] + 1e-6)
+    inside = (markers.time >= loads.time[0] - TIME_TOLERANCE_S) & (markers.time <= loads.time[-1] + TIME_TOLERANCE_S)
     loaded = np.stack(
         [bridged(loads.time, loads.force[:, foot, 1] >= LOAD_THRESHOLD_N)[nearest] & inside for foot in range(2)],
         axis=1,
@@ -173,11 +184,11 @@ def _stand(planted: BoolArray, first: int, last: int) -> BoolArray:
 
 def _off_plates(planted: BoolArray, loaded: BoolArray, time: FloatArray) -> BoolArray:
     """`planted` without load: without the short stretches that touch a load, the others widened."""
-    off = np.zeros_like(planted)
+    off, margin_s = np.zeros_like(planted), CONTACT_MARGIN_S + TIME_TOLERANCE_S
     for first, last in runs(planted & ~loaded):
         touches = (first > 0 and loaded[first - 1]) or (last < len(time) - 1 and loaded[last + 1])
-        if not touches or time[last] - time[first] > CONTACT_SLACK_S:
-            off |= (time >= time[first] - CONTACT_MARGIN_S) & (time <= time[last] + CONTACT_MARGIN_S)
+        if not touches or span_s(time, first, last) > CONTACT_SLACK_S:
+            off |= (time >= time[first] - margin_s) & (time <= time[last] + margin_s)
     return off & ~loaded
 
 
@@ -186,6 +197,6 @@ def bridged(time: FloatArray, loaded: BoolArray) -> BoolArray:
     closed = loaded.copy()
     for first, last in runs(~loaded):
         within = first > 0 and last < len(time) - 1
-        if within and time[last + 1] - time[first - 1] < BRIDGED_GAP_S:
+        if within and span_s(time, first - 1, last + 1) < BRIDGED_GAP_S:
             closed[first : last + 1] = True
     return closed

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading, nearest_samples
+from kinertia.trial.data import LOAD_THRESHOLD_N, TIME_TOLERANCE_S, BoolArray, FloatArray, IdleReading, nearest_samples
 from kinertia.trial.force_resolution import ringing_s
 
 LONGEST_TAIL_S = 0.03
@@ -56,7 +56,7 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     firm = np.flatnonzero(loaded)
     nearest = firm[nearest_samples(time[firm], time)] if len(firm) > 1 else np.full(len(time), firm[0])
     stands_out = force[:, 1] > max(offset_n + _ABOVE_NOISE * noise_n, _LEAST_TAIL_N)
-    near = np.abs(time - time[nearest]) <= LONGEST_TAIL_S
+    near = np.abs(time - time[nearest]) <= LONGEST_TAIL_S + TIME_TOLERANCE_S
     tail = _joining(loaded, loaded | (stands_out & near)) & ~loaded
     point = centre_of_pressure(np.concatenate([force, moment], axis=1)[nearest])
     moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads, runs
+from kinertia.trial.data import LOAD_THRESHOLD_N, TIME_TOLERANCE_S, FloatArray, PlateLoads, runs, span_s
 from kinertia.trial.foot_ways import FootWay
 from kinertia.trial.ground_contact import bridged
 
@@ -50,7 +50,7 @@ class Contact:
     @property
     def is_step(self) -> bool:
         """Whether the trial shows all of it, and it is no longer than a step."""
-        return 0.0 < self.end_s - self.start_s < ONE_STEP_S
+        return 0.0 < round(self.end_s - self.start_s, 6) < ONE_STEP_S
 
     @property
     def in_turn(self) -> bool:
@@ -76,7 +76,7 @@ class Contact:
 
 def contacts_of(plates: PlateLoads, ways: tuple[FootWay, FootWay]) -> list[Contact]:
     """Loads of at least `SHORTEST_S` while markers are there."""
-    first_s, last_s = ways[0].time[0], ways[0].time[-1]
+    first_s, last_s = ways[0].time[0] - TIME_TOLERANCE_S, ways[0].time[-1] + TIME_TOLERANCE_S
     point = load_points(plates)
     contacts = []
     for p in range(len(plates.names)):
@@ -86,7 +86,7 @@ def contacts_of(plates: PlateLoads, ways: tuple[FootWay, FootWay]) -> list[Conta
             rows = np.arange(first, last + 1)
             time = plates.time[rows]
             rows = rows[(vertical[rows] > FIRM_N) & (time >= first_s) & (time <= last_s)]
-            if end - start < SHORTEST_S or len(rows) < 3:
+            if span_s(plates.time, first, last) < SHORTEST_S or len(rows) < 3:
                 continue
             off = np.stack([way.off_foot(plates.time[rows], point[rows, p]) for way in ways])
             near = [float(vertical[rows] @ np.linalg.norm(one, axis=1)) for one in off]

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinertia.trial.data import PlateLoads, Recording
+from kinertia.trial.data import PlateLoads, Recording, span_s
 from kinertia.trial.exchanged_plates import exchanged_plates_trouble
 from kinertia.trial.foot_ways import FootWay, foot_ways
 from kinertia.trial.load_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, Contact, contacts_of, half_within
@@ -165,11 +165,11 @@ def _both_feet_doubt(plates: PlateLoads, contacts: Sequence[Contact], ways: tupl
         between = (distance > BETWEEN_M).all(axis=0) & (np.prod(contact.off_m, axis=0).sum(axis=1) < 0)
         away = between | (distance[contact.foot] > _OUTSIDE_M)
         # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
-        if contact.time[-1] - contact.time[0] > ONE_STEP_S:
+        if span_s(contact.time) > ONE_STEP_S:
             away = between
         away &= ways[1 - contact.foot].standing(contact.time)
         share = float(contact.weight[away].sum() / contact.weight.sum())
-        if share > (_MOSTLY if contact.time[-1] - contact.time[0] > ONE_STEP_S else _OUTSIDE_SHARE):
+        if share > (_MOSTLY if span_s(contact.time) > ONE_STEP_S else _OUTSIDE_SHARE):
             when = contact.time[away]
             spans.append(f"{plates.names[contact.plate]} from {when[0]:.3f} to {when[-1]:.3f} s")
     if not spans:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.trial.data import FloatArray, PlateLoads, runs
+from kinertia.trial.data import FloatArray, PlateLoads, runs, span_s
 from kinertia.trial.foot_ways import FootWay
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.load_contacts import EDGE_N, FAR_M, SHORTEST_S, Contact, contacts_of, half_within
@@ -33,7 +33,7 @@ def rate_trouble(plates: PlateLoads, contacts: Sequence[Contact], ways: Sequence
         float(plates.time[last] - plates.time[first])
         for p, vertical in enumerate(plates.force[..., 1].T)
         for first, last in runs(bridged(plates.time, vertical > EDGE_N))
-        if first > 0 and last < last_row and plates.time[last] - plates.time[first] >= SHORTEST_S
+        if first > 0 and last < last_row and span_s(plates.time, first, last) >= SHORTEST_S
         if not any(one.plate == p and plates.time[first] <= one.time[0] <= plates.time[last] for one in walked)
     ]
     standing = [end - start for way in ways for start, end, whole in way.stands if whole]

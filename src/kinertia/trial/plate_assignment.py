@@ -17,6 +17,7 @@ import numpy.typing as npt
 from kinertia.errors import TrialError
 from kinertia.trial.data import (
     FEET,
+    TIME_TOLERANCE_S,
     BoolArray,
     FloatArray,
     FootLoads,
@@ -25,6 +26,7 @@ from kinertia.trial.data import (
     Trial,
     nearest_samples,
     runs,
+    span_s,
     windows,
 )
 from kinertia.trial.ground_contact import (
@@ -77,7 +79,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
     if window_s is not None:
         spans = _spans(recording.markers.time, measured)
         time = recording.markers.time
-        measured = contact.inside & (time >= window_s[0] - 1e-6) & (time <= window_s[1] + 1e-6)
+        measured = contact.inside & (time >= window_s[0] - TIME_TOLERANCE_S) & (time <= window_s[1] + TIME_TOLERANCE_S)
         notes += (
             f"{recording.name}: the window {window_s[0]:.3f} to {window_s[1]:.3f} s was given by the user; "
             f"by the data, all ground contact is measured in {spans}",
@@ -150,7 +152,9 @@ def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:
     changes = (time[1:] + time[:-1])[np.diff(nearer) != 0] / 2
     if not changes.size:
         return np.zeros(len(time), dtype=bool)
-    result: BoolArray = np.abs(time - changes[nearest_samples(changes, time)]) <= DOUBLE_SUPPORT_S / 2
+    result: BoolArray = (
+        np.abs(time - changes[nearest_samples(changes, time)]) <= DOUBLE_SUPPORT_S / 2 + TIME_TOLERANCE_S
+    )
     return result
 
 
@@ -181,7 +185,7 @@ def _contacts(time: FloatArray, loaded: BoolArray) -> tuple[list[tuple[int, int]
     real = [
         (first, last)
         for first, last in spans
-        if time[last] - time[first] >= SHORTEST_CONTACT_S or first == 0 or last == len(time) - 1
+        if span_s(time, first, last) >= SHORTEST_CONTACT_S or first == 0 or last == len(time) - 1
     ]
     return real, len(spans) - len(real)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads, runs
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads, runs, span_s
 from kinertia.trial.force_resolution import force_step_n, rounded_force_doubts
 
 _LONGEST_ARM_M = 0.15
@@ -156,7 +156,7 @@ def _lasts_at_top(time: FloatArray, values: FloatArray, top: float) -> float:
     flat = [
         (first, last)
         for first, last in runs(values >= top * (1.0 - _SAME))
-        if last - first >= _FEWEST_FLAT and time[last] - time[first] >= _FLAT_S
+        if last - first >= _FEWEST_FLAT and span_s(time, first, last) >= _FLAT_S
         if top - values[max(2 * first - last, 0)] > _STEEP * top
     ]
     if (step := force_step_n(values[values != 0.0])) > 0.0:
@@ -181,7 +181,7 @@ def _held_samples(plates: PlateLoads, least_s: float = _HELD_S) -> list[str]:
         held = [
             (float(plates.time[first]), float(plates.time[last + 1]))
             for first, last in runs(same)
-            if first > 0 and last - first + 1 >= _FEWEST_HELD and plates.time[last + 1] - plates.time[first] >= least_s
+            if first > 0 and last - first + 1 >= _FEWEST_HELD and span_s(plates.time, first, last + 1) >= least_s
             if last + 2 < len(wrench) and abs(wrench[last + 2, 1] - wrench[last, 1]) > leap
         ]
         if held:

@@ -27,7 +27,7 @@ def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
             continue
         both = sorted((time, foot) for foot, times in enumerate(events) for time in times)
         between = [b - a for (a, one), (b, other) in pairwise(both) if one != other]
-        if 2 * sum(step < _SHORTEST_STEP_S for step in between) > len(between):
+        if 2 * sum(round(step, 6) < _SHORTEST_STEP_S for step in between) > len(between):
             continue
         strides += [b - a for times in events for a, b in combinations(times, 2)]
         steps += between

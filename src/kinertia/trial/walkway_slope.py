@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinertia.trial.data import FloatArray, Markers, runs
+from kinertia.trial.data import FloatArray, Markers, runs, span_s
 
 _STILL_M_S, _SHORTEST_S = 0.15, 0.08
 _LONGEST_M, _FEWEST_PLACES = 1.0, 3
@@ -57,6 +57,6 @@ def _stands(time: FloatArray, place: FloatArray) -> FloatArray:
     still = [
         place[first : last + 1].mean(axis=0)
         for first, last in runs(np.nan_to_num(speed, nan=np.inf) < _STILL_M_S)
-        if time[last] - time[first] >= _SHORTEST_S
+        if span_s(time, first, last) >= _SHORTEST_S
     ]
     return np.array(still).reshape(-1, 3)

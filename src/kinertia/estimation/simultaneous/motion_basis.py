@@ -14,7 +14,7 @@ _ACTIVE = _DEGREE + 1
 _RIDGE = 1e-8
 """Keeps splines that no frame touches at zero."""
 _ROUNDING = 1e-9
-"""Of a knot interval."""
+"""Of a knot interval, and of a trial: what a clock adds by its rounding must not make one knot more."""
 
 
 class MotionBasis:
@@ -29,7 +29,8 @@ class MotionBasis:
     """
 
     def __init__(self, time: np.ndarray, spacing_s: float) -> None:
-        count = min(max(1, int(np.ceil((time[-1] - time[0]) / spacing_s))), (len(time) - 1) // 2)
+        intervals = (time[-1] - time[0]) / spacing_s * (1.0 - _ROUNDING)
+        count = min(max(1, int(np.ceil(intervals))), (len(time) - 1) // 2)
         step = (time[-1] - time[0]) / count
         knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
