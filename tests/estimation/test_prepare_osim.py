@@ -5,11 +5,12 @@ import pytest
 
 from kinertia.errors import OsimError, SubjectError, TrialError
 from kinertia.estimation.prepare import TrialInput
-from kinertia.estimation.prepare_osim import at_mass, centre_offsets, kind_of, parted, prepare_osim, with_centre_offsets
+from kinertia.estimation.prepare_osim import at_mass, kind_of, parted, prepare_osim, with_centre_offsets
 from kinertia.estimation.prior import MASS_SD, OTHER_MASS_SD
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.trc import read_trc
+from kinertia.model.centre_offsets import centre_offsets
 from kinertia.model.imported import OsimModel
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.settings import Settings, Subject

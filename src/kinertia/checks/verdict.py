@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from kinertia.estimation.forces_used import full_bandwidth
-from kinertia.estimation.prepare_osim import centre_offsets
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
 from kinertia.estimation.warnings import CONTRADICTING_COM_M
 from kinertia.model.bsp import PARAMETERS, impossible_segments
+from kinertia.model.centre_offsets import centre_offsets
 from kinertia.trial.rms import rms
 
 if TYPE_CHECKING:

@@ -221,12 +221,6 @@ def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
     return replace(skeleton, joints=tuple(joints), locked={**skeleton.locked, **locked})
 
 
-def centre_offsets(skeleton: Skeleton) -> dict[str, np.ndarray]:
-    """By joint, (3,) m by which the skeleton's joint centre offsets move it in its parent, along the parent's axes."""
-    names = {name.removesuffix("/offset_x") for name in skeleton.locked if name.endswith("/offset_x")}
-    return {name: np.array([skeleton.locked[f"{name}/offset_{axis}"] for axis in "xyz"]) for name in names}
-
-
 def _marker_sd(skeleton: Skeleton) -> dict[str, float]:
     """Per segment, how far its markers may be from where the model has them."""
     upper = ("torso", "upper_arm", "forearm")

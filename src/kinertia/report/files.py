@@ -26,6 +26,7 @@ from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.spreadsheet import inert
 from kinertia.io.sto import TimeTable, write_table
+from kinertia.model.centre_offsets import centre_offsets
 from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
@@ -102,7 +103,6 @@ def _write_model(fit: Fit, folder: Path) -> None:
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
-    from kinertia.estimation.prepare_osim import centre_offsets
     from kinertia.io.osim.editor import write_osim
 
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
