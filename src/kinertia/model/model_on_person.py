@@ -28,10 +28,9 @@ _NOBODY = 5.0
 """Nobody is this many times as large as another."""
 _FEWEST_PAIRS = 6
 _ELSEWHERE_M = 0.014
-_MIRRORED = 1.15
-_ARRANGED = {("pelvis", "torso"): 5, ("pelvis", "thigh_r", "thigh_l"): 8}
-"""Segments whose markers tell left from right, which pose hardly changes, and how many it takes; the first that will
-do."""
+_ARRANGED = {("pelvis", "torso"): (5, 1.6), ("pelvis", "thigh_r", "thigh_l"): (8, 1.15)}
+"""Segments whose markers tell left from right, which pose hardly changes; how many it takes, and how many times as bad
+a fit decides. Markers in one plane fit as well as their mirror image: then the next segments are asked."""
 _MOVED_M = 0.055
 """Calibration moves markers of the lower body by 5 to 36 mm on sound trials."""
 _FRAMES = 60
@@ -124,7 +123,7 @@ def _scale_sentence(distances: SegmentDistances) -> str:
 
 def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
     """The person's markers are rather arranged as the model's mirror image."""
-    for names, fewest in _ARRANGED.items():
+    for names, (fewest, limit) in _ARRANGED.items():
         worn = [marker_set.segments.get(name, ()) for name in names]
         parts = [[label for label in own if label in trial.labels] for own in worn]
         labels = [label for part in parts for label in part]
@@ -134,13 +133,14 @@ def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
             continue
         model = places.select(labels).positions[0]
         ratio = _mirror_ratio(model, person[whole[:: max(len(whole) // _FRAMES, 1)]])
-        if ratio <= _MIRRORED:
-            return ""
-        return (
-            f"the markers of {', '.join(names)} are arranged like a mirror image of the model's (its default pose fits "
-            f"them {ratio:.1f} times as badly as its mirror image): all left and right labels are exchanged in one of "
-            "the two, or an axis of one is mirrored; correct the labels or the axis"
-        )
+        if ratio > limit:
+            return (
+                f"the markers of {', '.join(names)} are arranged like a mirror image of the model's (its default pose "
+                f"fits them {ratio:.1f} times as badly as its mirror image): all left and right labels are exchanged "
+                "in one of the two, or an axis of one is mirrored; correct the labels or the axis"
+            )
+        if ratio < 1.0 / limit:
+            break
     return ""
 
 
