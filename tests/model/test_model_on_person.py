@@ -75,15 +75,15 @@ def test_left_and_right_exchanged_in_all_labels(person):
     )
 
 
-def test_markers_in_one_plane_do_not_tell_left_from_right(person):
-    """Such as those of hips and shoulders alone: a little noise decides which of the two fits better."""
+@pytest.mark.parametrize("seed", range(10))
+def test_markers_in_one_plane_do_not_tell_left_from_right(person, seed):
+    """Such as those of hips and shoulders alone: where they were put decides which of the two fits better."""
     places, walk, marker_set = person
-    rng = np.random.default_rng(2)
-    trunk = [label for name in ("pelvis", "torso") for label in marker_set.segments[name] if label in walk.labels]
-    flat = Markers(places.time, places.labels, places.positions * [0.0, 1.0, 1.0])
-    frames = np.array(flat.select(trunk).positions[0]) + rng.normal(0.0, 0.01, (100, len(trunk), 3))
-    segments = {"pelvis": tuple(trunk[:-1]), "torso": tuple(trunk[-1:])}
-    seen = Markers(np.arange(100) / 100.0, tuple(trunk), frames)
+    trunk = [label for name in ("pelvis", "torso") for label in marker_set.segments[name] if label in walk.labels][:5]
+    flat = Markers(places.time, places.labels, places.positions * [0.1, 1.0, 1.0])
+    elsewhere = np.random.default_rng(seed).normal(0.0, 0.015, (1, len(trunk), 3))
+    seen = Markers(np.zeros(1), tuple(trunk), flat.select(trunk).positions + elsewhere)
+    segments = {"pelvis": tuple(trunk[:3]), "torso": tuple(trunk[3:])}
     assert "mirror" not in model_on_person_trouble(flat, seen, replace(marker_set, segments=segments))
 
 
