@@ -198,6 +198,24 @@ def test_what_was_entered_is_kept_when_files_come_or_go_and_on_other_pages(tab, 
     tab.quiet()
 
 
+def test_a_form_in_which_nobody_typed_is_not_sent(tab):
+    """What the page came with is compared with what stands there, in fields of every kind."""
+    tab.drop(FILES / "walk.c3d", FILES / "static.c3d").arrived()
+    kept = []
+    tab.page.on("request", lambda request: request.url.endswith("/keep") and kept.append(request.url))
+    tab.page.reload()
+    tab.page.get_by_role("link", name="Markers", exact=True).click()
+    tab.page.wait_for_url("**/markers")
+    assert not kept
+    tab.page.go_back()
+    tab.page.reload()
+    tab.page.get_by_label("Height (m)").fill("1.7")
+    tab.page.get_by_role("link", name="Markers", exact=True).click()
+    tab.page.wait_for_url("**/markers")
+    assert len(kept) == 1
+    tab.quiet()
+
+
 def test_a_wrong_mass_is_said_in_place(tab):
     tab.drop(FILES / "walk.c3d", FILES / "static.c3d").arrived().fill(sex="male", mass="4150", height="1.61").check()
     assert "mass_kg = 4150" in tab.message()

@@ -19,13 +19,28 @@
   class Entries {
     constructor(form) {
       this.form = form;
-      this.saved = form.hasAttribute("data-unsaved") ? "" : this.now();
+      this.saved = form.hasAttribute("data-unsaved") ? "" : this.served();
       document.querySelectorAll("[data-keeps]").forEach((one) =>
         one.addEventListener(one.tagName === "FORM" ? "submit" : "click", (event) => this.before(event, one)));
     }
 
     now() {
       return new URLSearchParams(new FormData(this.form)).toString();
+    }
+
+    // as the page came: somebody may have typed before this runs
+    served() {
+      const fields = new URLSearchParams();
+      for (const one of this.form.elements) {
+        if (!one.name || one.matches(":disabled, button, [type=submit], [type=file]")) continue;
+        if (one.matches("[type=checkbox], [type=radio]")) {
+          if (one.defaultChecked) fields.append(one.name, one.value);
+        } else if (one.tagName === "SELECT") {
+          const chosen = [...one.options].find((option) => option.defaultSelected) || one.options[0];
+          if (chosen) fields.append(one.name, chosen.value);
+        } else fields.append(one.name, one.defaultValue);
+      }
+      return fields.toString();
     }
 
     // what is wrong with it; empty if nothing is
