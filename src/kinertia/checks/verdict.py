@@ -34,9 +34,9 @@ PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 
 PASS_MARKERS_M, CAUTION_MARKERS_M = 0.012, 0.020
+"""RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 _WRONG_MODEL_M = 0.045
 """Farther apart are markers of a sound model on nobody, wherever they sit."""
-"""RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 
 PLAIN_CONTRADICTION_SD = 4.0
 """A parameter this many prior SDs from the literature contradicts the model by itself: chance brings it about in one of

@@ -20,7 +20,7 @@ from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.markers_centre import markers_centre, owners_of
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
-from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, Trial, runs, span_s
+from kinertia.trial.data import FloatArray, Trial, runs, span_s, within
 
 CONTRADICTING_MASS = 0.10
 """Scale and vertical force, or two trials, may differ by this share, and by twice the deviation of the mass by force,
@@ -144,7 +144,7 @@ def force_mass(skeleton: Skeleton, trial: Trial) -> ForceMass | None:
         return None
     height = place[:, 1]
     loads = trial.loads
-    inside = (loads.time >= start - TIME_TOLERANCE_S) & (loads.time <= end + TIME_TOLERANCE_S)
+    inside = within(loads.time, start, end)
     force = loads.force[:, :, 1].sum(axis=1)
     velocity = smooth(around.time, height, _FAST_HZ)(time[[0, -1]], 1)
     gained = float(velocity[1] - velocity[0]) / (time[-1] - time[0])

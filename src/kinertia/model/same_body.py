@@ -64,8 +64,13 @@ class SegmentDistances:
 
     def ratio(self) -> float:
         """How many times as far apart the pairs are in the trial: the median."""
-        before, after = (matrix[tuple(self.pairs.T)] for matrix in (self.static, self.trial))
+        before, after = self.lengths()
         return float(np.median(after / before))
+
+    def lengths(self) -> tuple[FloatArray, FloatArray]:
+        """(p,) m, of the pairs before, and in the trial."""
+        at = tuple(self.pairs.T)
+        return self.static[at], self.trial[at]
 
     def worst_pair(self) -> str:
         """The two labels whose distances differ most, and by how much."""
@@ -125,12 +130,12 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
 
 def _scaled(distances: SegmentDistances) -> str:
     """All distances are longer, or shorter, by the same share; empty where they are not, or by little."""
-    before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
+    before, after = distances.lengths()
     if len(before) < _FEWEST_PAIRS or np.array_equal(before, after):
         return ""
     factor = float(before @ after / (before @ before))
     left = float(np.sqrt(np.square(after - factor * before).mean() / np.square(after - before).mean()))
-    share = float(np.median(after / before)) - 1.0
+    share = distances.ratio() - 1.0
     if min(abs(factor - 1.0), abs(share)) < _OTHER_SCALE or left > _LEFT_OF_SCALE:
         return ""
     return (
@@ -200,8 +205,7 @@ def swapped_pairs(distances: SegmentDistances, there: str = "the static trial") 
 def _another_body(distances: SegmentDistances) -> str:
     if len(distances.pairs) < _FEWEST_PAIRS:
         return ""
-    before, after = (matrix[tuple(distances.pairs.T)] for matrix in (distances.static, distances.trial))
-    ratio = float(np.median(after / before))
+    (before, after), ratio = distances.lengths(), distances.ratio()
     if abs(ratio - 1) <= _OTHER_BODY:
         return ""
     worst = int(np.argmax(np.abs(after - before)))

@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
-from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, Trial, span_s
+from kinertia.trial.data import FloatArray, Trial, span_s, within
 
 _PELVIS_HZ = 6.0
 _LEAST_WINDOW_S = 0.4
@@ -89,9 +89,7 @@ def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVel
     first, last = trial.markers.time[seen][[0, -1]]
     parts = []
     for start, end in trial.carried_windows():
-        inside = (trial.loads.time >= max(start, first) - TIME_TOLERANCE_S) & (
-            trial.loads.time <= min(end, last) + TIME_TOLERANCE_S
-        )
+        inside = within(trial.loads.time, max(start, first), min(end, last))
         time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
         if len(time) < 10 or span_s(time) < _LEAST_WINDOW_S or not force[:, 1].mean() > 0:
             continue

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.motion.smoothing import smooth
-from kinertia.trial.data import TIME_TOLERANCE_S, Trial, span_s
+from kinertia.trial.data import Trial, span_s, within
 
 LOWEST_HZ = 3.0
 ENDS_HZ = (6.0, 8.0, 10.0, 12.0, 15.0)
@@ -63,7 +63,7 @@ def common_cutoff(time: np.ndarray, pelvis: np.ndarray, trial: Trial) -> Cutoff:
 def _motion_ends_hz(trial: Trial) -> float:
     """The lowest of ENDS_HZ that leaves little of the ground reactions in the longest measured window."""
     loads, (start, end) = trial.loads, trial.windows()[0]
-    inside = (loads.time >= start - TIME_TOLERANCE_S) & (loads.time <= end + TIME_TOLERANCE_S)
+    inside = within(loads.time, start, end)
     time, force = loads.time[inside], loads.force[inside].sum(axis=1)
     if len(time) < _FEWEST:
         return ENDS_HZ[-1]

@@ -24,7 +24,7 @@ from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.range_ends import range_notes
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
-from kinertia.trial.data import TIME_TOLERANCE_S, Markers, Trial, runs, span_s
+from kinertia.trial.data import TIME_TOLERANCE_S, Markers, Trial, runs, span_s, within
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
@@ -117,14 +117,14 @@ class Kinematics:
     def near_window(self) -> np.ndarray:
         """(k,) which samples of the ground reactions lie between first and last, or at most AROUND_WINDOW_S outside."""
         time, (start, end) = self.trial.loads.time, self.window_s
-        return (time >= start - AROUND_WINDOW_S - TIME_TOLERANCE_S) & (time <= end + AROUND_WINDOW_S + TIME_TOLERANCE_S)
+        return within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S)
 
 
 def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.ndarray:
     """Which of these times (n,) lie in one of the windows (first and last time, s)."""
     result = np.zeros(np.shape(time), dtype=bool)
     for first, last in windows_s:
-        result |= (time >= first - TIME_TOLERANCE_S) & (time <= last + TIME_TOLERANCE_S)
+        result |= within(time, first, last)
     return result
 
 

@@ -16,7 +16,7 @@ from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, Recording, Trial, nearest_samples, runs, span_s
+from kinertia.trial.data import FloatArray, Recording, Trial, nearest_samples, runs, span_s, within
 
 _CENTRE_HZ = 8.0
 _ALONE_N, _IDLE_N, _SHORTEST_S = 50.0, 10.0, 0.2
@@ -95,9 +95,7 @@ def _masses(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> di
     except SmoothingError:
         return {}
     measured = trial.measured[nearest_samples(markers.time, plates.time)]
-    measured &= (plates.time >= markers.time[0] - TIME_TOLERANCE_S) & (
-        plates.time <= markers.time[-1] + TIME_TOLERANCE_S
-    )
+    measured &= within(plates.time, markers.time[0], markers.time[-1])
     by_plate = {}
     for p, name in enumerate(plates.names):
         vertical: FloatArray = plates.force[:, p, 1]

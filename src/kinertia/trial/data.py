@@ -78,7 +78,7 @@ class Markers:
 
     def cut(self, start_s: float, end_s: float) -> Markers:
         """The frames with start_s <= time <= end_s."""
-        keep = (self.time >= start_s - TIME_TOLERANCE_S) & (self.time <= end_s + TIME_TOLERANCE_S)
+        keep = within(self.time, start_s, end_s)
         return Markers(self.time[keep], self.labels, self.positions[keep])
 
     def select(self, labels: Sequence[str]) -> Markers:
@@ -362,6 +362,12 @@ def nearest_samples(time: FloatArray, at: FloatArray) -> npt.NDArray[np.int_]:
     """Indices into `time` (ascending) of the samples nearest to the times `at`; of two as near, the later one."""
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
     return after - (at - time[after - 1] < time[after] - at - TIME_TOLERANCE_S)
+
+
+def within(time: FloatArray, start_s: float, end_s: float) -> BoolArray:
+    """Which of these times are at least the one and at most the other; a clock's rounding decides nothing."""
+    result: BoolArray = (time >= start_s - TIME_TOLERANCE_S) & (time <= end_s + TIME_TOLERANCE_S)
+    return result
 
 
 def span_s(time: FloatArray, first: int = 0, last: int = -1) -> float:

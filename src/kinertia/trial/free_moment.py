@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import free_moment
-from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, FootLoads, span_s
+from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, FootLoads, span_s, within
 from kinertia.trial.strides import periods
 
 TURNING_LEVER_M = 0.002
@@ -82,7 +82,7 @@ def mean_turning(loads: FootLoads, time: FloatArray, centre: FloatArray) -> Turn
     if not strides:
         return None
     first, last = ((time[0] + time[-1] + sign * max(strides)) / 2 for sign in (-1, 1))
-    inside = (loads.time >= first - TIME_TOLERANCE_S) & (loads.time <= last + TIME_TOLERANCE_S)
+    inside = within(loads.time, first, last)
     force, moment = loads.force[inside], loads.moment[inside]
     loaded = force[..., 1] > 0
     if not loaded.any(axis=0).all():

@@ -24,6 +24,7 @@ from kinertia.trial.data import (
     nearest_samples,
     runs,
     span_s,
+    within,
 )
 from kinertia.trial.foot_motion import FootMotion, foot_motions
 
@@ -104,7 +105,7 @@ class GroundContact:
 def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> GroundContact:
     """Which foot is on the ground and which on a loaded plate, by the rules of `measured_frames`."""
     nearest = nearest_samples(loads.time, markers.time)
-    inside = (markers.time >= loads.time[0] - TIME_TOLERANCE_S) & (markers.time <= loads.time[-1] + TIME_TOLERANCE_S)
+    inside = within(markers.time, loads.time[0], loads.time[-1])
     loaded = np.stack(
         [bridged(loads.time, loads.force[:, foot, 1] >= LOAD_THRESHOLD_N)[nearest] & inside for foot in range(2)],
         axis=1,
@@ -114,7 +115,7 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
     if loaded.any():
         clearance, landing, leaving = _learned(moves, loaded)
         resting = np.stack([move.still for move in moves], axis=1) & ~loaded
-        carried = _carried(loads, nearest, loaded, resting.any(axis=1))
+        carried = _carried(loads, nearest, loaded, np.logical_or.reduce(resting, axis=1))
         for foot, move in enumerate(moves):
             planted = move.planted(clearance, landing, leaving)
             for first, last in runs(resting[:, foot]):

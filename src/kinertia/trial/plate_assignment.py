@@ -28,6 +28,7 @@ from kinertia.trial.data import (
     runs,
     span_s,
     windows,
+    within,
 )
 from kinertia.trial.ground_contact import (
     BRIDGED_GAP_S,
@@ -79,7 +80,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
     if window_s is not None:
         spans = _spans(recording.markers.time, measured)
         time = recording.markers.time
-        measured = contact.inside & (time >= window_s[0] - TIME_TOLERANCE_S) & (time <= window_s[1] + TIME_TOLERANCE_S)
+        measured = contact.inside & within(time, *window_s)
         notes += (
             f"{recording.name}: the window {window_s[0]:.3f} to {window_s[1]:.3f} s was given by the user; "
             f"by the data, all ground contact is measured in {spans}",

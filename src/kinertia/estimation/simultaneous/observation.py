@@ -31,7 +31,7 @@ from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.settings import ForceCutoff
-from kinertia.trial.data import TIME_TOLERANCE_S, nearest_samples
+from kinertia.trial.data import nearest_samples, within
 
 FORCE_SD_OF_WEIGHT = 0.005
 """Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
@@ -160,7 +160,7 @@ class _Errors:
 def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     time = kinematics.trial.markers.time
     start, end = kinematics.window_s
-    near = (time >= start - AROUND_WINDOW_S - TIME_TOLERANCE_S) & (time <= end + AROUND_WINDOW_S + TIME_TOLERANCE_S)
+    near = within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S)
     solved = np.isfinite(kinematics.ik.q).any(axis=1)
     frames = np.flatnonzero(near & np.logical_or.accumulate(solved) & np.logical_or.accumulate(solved[::-1])[::-1])
     # frames between must stay, or neighbours would not be neighbours; their markers show no pose
