@@ -14,14 +14,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from itertools import combinations, pairwise
-from math import comb
 
 import numpy as np
 
-_MOST_COMPONENTS = 4096
-"""Ways to be sound or faulty that are looked at: all of eleven or twelve instruments, few faults of more."""
+_MOST_WAYS = 1024
+"""To be sound or faulty, that are looked at with as many faults: all of twelve instruments, the likeliest of more."""
+_MOST_NUMBERS = 2**21
+"""In the covariances of these ways: of a hundred instruments and more, fewer ways are looked at."""
+_FEWEST_WAYS = 32
+_UNLIKELY = -20.0
+"""Logarithm of a way's chance over that of the likeliest: where none with as many faults has more, the search ends."""
 
 
 @dataclass(frozen=True)
@@ -99,82 +101,95 @@ class GaussianPrior:
         """
         information = np.linalg.inv(covariance)
         data, right = information - self.precision, information @ mean - self.pull
-        ways = _Ways.of(tuple(priors))
-        spread, log_size = ways.posteriors(data)
-        centres = spread @ right
-        weight = ways.log_chance + 0.5 * (centres @ right + log_size - ways.log_variance)
-        weight = np.exp(weight - weight.max())
-        weight /= weight.sum()
-        middle = weight @ centres
-        apart = centres - middle
-        whole = np.tensordot(weight, spread, 1) + (weight * apart.T) @ apart
+        middle, whole = _posterior(priors, data, right)
         information = np.linalg.inv(whole)
         return GaussianPrior(information - data, information @ middle - right)
 
 
+def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k,), (k, k) mean and covariance of the sum of Gaussians, each weighed by how likely its way to be sound or
+    faulty is after data with this information (k, k) and right-hand side (k,).
+
+    The likeliest ways with one fault more are searched among those that add one to the likeliest so far.
+    """
+    change, log_odds = _faults(priors)
+    ways = _Ways.sound(priors, data, right)
+    likeliest = float(ways.log_weight[0])
+    weight, first, second = 0.0, np.zeros(len(right)), np.zeros_like(data)
+    while len(ways.log_weight) and ways.log_weight.max() > likeliest + _UNLIKELY:
+        now = max(likeliest, float(ways.log_weight.max()))
+        before, own = np.exp(likeliest - now), np.exp(ways.log_weight - now)
+        weight = before * weight + own.sum()
+        first = before * first + own @ ways.centres
+        second = before * second + np.tensordot(own, ways.spread, 1) + (own * ways.centres.T) @ ways.centres
+        likeliest, ways = now, ways.one_fault_more(change, log_odds)
+    middle = first / weight
+    return middle, second / weight - np.outer(middle, middle)
+
+
+def _faults(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) what a fault of each quantity adds to its precision, and to the logarithm of a way's prior chance, with what
+    the components' deviations take; no chance where there is only one component.
+    """
+    change = np.array([prior.faulty_sd**-2.0 - prior.sound_sd**-2.0 for prior in priors])
+    share = np.array([prior.faulty_share for prior in priors])
+    shorter = np.log([prior.sound_sd / prior.faulty_sd for prior in priors])
+    with np.errstate(divide="ignore"):
+        return change, np.log(share / (1.0 - share)) + shorter
+
+
 @dataclass(frozen=True, eq=False)
 class _Ways:
-    """The likeliest n ways for k instruments to be sound or faulty: all, or those of few faults.
+    """Ways for k instruments to be sound or faulty, n with the same number of faults, and the posterior of each.
 
     Attributes:
-        sound, faulty: (k,) variances of either component.
-        before, fault: (n,) the way with the same faults but one, and the instrument of that one; all sound comes first.
-        begins: where the ways with one fault, with two, ... begin, and where the last end.
-        log_chance, log_variance: (n,) logarithms of the chance, and of the product of the variances.
+        off: (n, k) what is faulty.
+        log_weight: (n,) logarithm of each way's chance, but for a constant that all have.
+        centres, spread: (n, k), (n, k, k) mean and covariance of its Gaussian.
     """
 
-    sound: np.ndarray
-    faulty: np.ndarray
-    before: np.ndarray
-    fault: np.ndarray
-    begins: tuple[int, ...]
-    log_chance: np.ndarray
-    log_variance: np.ndarray
+    off: np.ndarray
+    log_weight: np.ndarray
+    centres: np.ndarray
+    spread: np.ndarray
 
     @classmethod
-    @cache
-    def of(cls, priors: tuple[SoundOrFaulty, ...]) -> _Ways:
-        """Of these priors."""
-        uncertain = [i for i, prior in enumerate(priors) if prior.faulty_share > 0.0]
-        places: dict[tuple[int, ...], int] = {(): 0}
-        begins = [1]
-        for faults in range(1, len(uncertain) + 1):
-            if len(places) + comb(len(uncertain), faults) > _MOST_COMPONENTS:
-                break
-            for own in combinations(uncertain, faults):
-                places[own] = len(places)
-            begins.append(len(places))
-        off = np.zeros((len(places), len(priors)), dtype=bool)
-        for own, row in places.items():
-            off[row, list(own)] = True
-        sound, faulty, share = (
-            np.array([getattr(prior, name) for prior in priors]) for name in ("sound_sd", "faulty_sd", "faulty_share")
-        )
-        sound, faulty = np.square(sound), np.square(faulty)
-        return cls(
-            sound,
-            faulty,
-            np.array([places[own[:-1]] for own in places]),
-            np.array([own[-1] if own else -1 for own in places]),
-            tuple(begins),
-            np.log(np.where(off, share, 1.0 - share).prod(axis=1)),
-            np.log(np.where(off, faulty, sound)).sum(axis=1),
+    def sound(cls, priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> _Ways:
+        """The one without a fault."""
+        spread = np.linalg.inv(data + np.diag([prior.sound_sd**-2.0 for prior in priors]))
+        centre = spread @ right
+        log_weight = 0.5 * (centre @ right + np.linalg.slogdet(spread)[1])
+        return cls(np.zeros((1, len(right)), dtype=bool), np.array([log_weight]), centre[None], spread[None])
+
+    def one_fault_more(self, change: np.ndarray, log_odds: np.ndarray) -> _Ways:
+        """The likeliest that add a fault (`_faults`) to one of these: a change of rank one (Sherman and Morrison)."""
+        k = len(change)
+        left = np.where(self.off, 1.0, 1.0 + change * np.diagonal(self.spread, axis1=1, axis2=2))
+        log_weight = self.log_weight[:, None] + log_odds
+        log_weight -= 0.5 * (np.log(left) + change / left * np.square(self.centres))
+        log_weight[self.off] = -np.inf
+        before, fault = self._likeliest(log_weight, min(_MOST_WAYS, max(_FEWEST_WAYS, _MOST_NUMBERS // k**2)))
+        column, share = self.spread[before, :, fault], (change / left)[before, fault]
+        return _Ways(
+            self.off[before] | np.eye(k, dtype=bool)[fault],
+            log_weight[before, fault],
+            self.centres[before] - (share * self.centres[before, fault])[:, None] * column,
+            self.spread[before] - share[:, None, None] * column[:, :, None] * column[:, None, :],
         )
 
-    def posteriors(self, data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, k, k) covariance of every way after data with this information (k, k), and the logarithms of their
-        determinants; one fault more is a change of rank one (Sherman and Morrison).
+    def _likeliest(self, log_weight: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """(m,), (m,) the likeliest ways after one fault more, as the way before (n) and its fault (k), each way once:
+        it is met as often as it has faults.
         """
-        n, k = len(self.before), len(data)
-        spread, log_size = np.empty((n, k, k)), np.empty(n)
-        information = data + np.diag(1.0 / self.sound)
-        spread[0], log_size[0] = np.linalg.inv(information), -np.linalg.slogdet(information)[1]
-        change = 1.0 / self.faulty - 1.0 / self.sound
-        for own in (slice(*ends) for ends in pairwise(self.begins)):
-            before, fault = self.before[own], self.fault[own]
-            column = spread[before, :, fault]
-            left = 1.0 + change[fault] * column[np.arange(len(column)), fault]
-            across = column[:, :, None] * column[:, None, :]
-            spread[own] = spread[before] - (change[fault] / left)[:, None, None] * across
-            log_size[own] = log_size[before] - np.log(left)
-        return spread, log_size
+        n, k = log_weight.shape
+        met = min(most * (1 + int(self.off[0].sum())), n * k)
+        order = np.argpartition(log_weight, n * k - met, axis=None)[n * k - met :]
+        order = order[log_weight.ravel()[order] > log_weight.max() + _UNLIKELY]
+        before, fault = np.divmod(order[np.argsort(-log_weight.ravel()[order])], k)
+        faulty = np.packbits(self.off[before] | np.eye(k, dtype=bool)[fault], axis=1)
+        words = np.ascontiguousarray(np.pad(faulty, ((0, 0), (0, -faulty.shape[1] % 8)))).view(np.uint64)
+        same = np.lexsort(words.T)
+        new = np.ones(len(same), dtype=bool)
+        new[1:] = (words[same[1:]] != words[same[:-1]]).any(axis=1)
+        once = np.sort(same[new])[:most]
+        return before[once], fault[once]
