@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
@@ -64,6 +65,30 @@ def test_exchanged_labels(name, pairs, where, measured_recording):
     assert where in joined
     assert {one, two} & set(other)
     assert "correct the labels" in trouble
+
+
+def with_soft_thigh(measured_recording):
+    """A walk with a thigh marker that skin takes along with the hip's angle, so that the distance to the knee's changes
+    by more than 60 mm.
+    """
+    markers, marker_set = read(measured_recording, "rajagopal_walk/motion_capture_walk.trc")
+    places = markers.positions.copy()
+    thigh, knee, ankle = (markers.labels.index(name) for name in ("R.TH1", "R.Knee", "R.Ankle"))
+    along = places[:, knee] - places[:, ankle]
+    swing = along[:, 0] / np.linalg.norm(along, axis=1)
+    places[:, thigh, 0] += 0.09 * (swing - swing.mean()) / np.ptp(swing)
+    return replace(markers, positions=places), marker_set
+
+
+def test_soft_thighs_are_no_exchanged_labels(measured_recording):
+    markers, marker_set = with_soft_thigh(measured_recording)
+    place = markers.positions
+    apart = [
+        np.linalg.norm(place[:, markers.labels.index("R.TH1")] - place[:, markers.labels.index(k)], axis=1)
+        for k in ("R.Knee", "R.TH2", "R.TH3")
+    ]
+    assert max(np.ptp(np.nanquantile(one, [0.1, 0.9])) for one in apart) > 0.06
+    assert torn_segments_trouble(markers, marker_set) == ""
 
 
 def test_what_a_marker_goes_with_instead(measured_recording):

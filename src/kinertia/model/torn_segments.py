@@ -2,7 +2,9 @@
 
 On twelve sound trials, from squats to runs, distances within pelvis, thighs, shanks, feet and arms change by up to
 39 mm (from the tenth to the ninetieth percentile of the frames; 20 mm in walks), and those between landmarks that one
-joint joins by up to 38 mm. Markers on the other leg, or on the segment above, change theirs by 70 to 500 mm.
+joint joins by up to 38 mm. Markers on the other leg, or on the segment above, change theirs by 70 to 500 mm. Soft
+thighs may come up to 75 mm, but then their markers go with no other segment. Of 1867 exchanges of two labels of pelvis
+and legs in eight of these trials which change a distance by more than 60 mm, this tells all but six.
 """
 
 from __future__ import annotations
@@ -18,7 +20,11 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers
 
 _TORN_M, _APART_M = 0.06, 0.10
-"""Of one segment; of landmarks on both sides of a joint."""
+"""Of one segment, if one of the markers goes with another; of landmarks on both sides of a joint, and in any case."""
+_ELSEWHERE = 0.35
+"""Change of the distances to the markers of the segment with which a marker goes, over that to those of its own."""
+_OWN_WAY = ("torso", "head", "upper_arm", "forearm", "hand")
+"""Arms swing with the other leg, and seem to go with it."""
 _TOGETHER_M, _MUCH_BETTER = 0.04, 0.4
 _MOST_LOWEST = (0.1, 0.9)
 _FEWEST_FRAMES = 11
@@ -49,9 +55,9 @@ def torn_segments_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         marker_set: which marker is on which segment.
     """
     far = [pair for pair in _pairs(markers, marker_set) if pair.change_m > _limit_m(pair)]
-    if not far:
+    worst = max(far, default=None)
+    if worst is None or worst.change_m < _APART_M and not _elsewhere(markers, marker_set, far):
         return _crossed(markers, marker_set)
-    worst = max(far)
     usual = "less than 40 mm are usual"
     involved = list(dict.fromkeys(label for pair in sorted(far, reverse=True) for label in (pair.one, pair.other)))
     shown = ", ".join(involved[:8]) + (f" and {len(involved) - 8} more" if len(involved) > 8 else "")
@@ -61,6 +67,21 @@ def torn_segments_trouble(markers: Markers, marker_set: MarkerSet) -> str:
         f"labels are swapped, or the marker set has markers on the wrong segment (look at {shown}): correct the "
         "labels, in the static trial as well, or the marker set"
     )
+
+
+def _elsewhere(markers: Markers, marker_set: MarkerSet, far: Sequence[_Pair]) -> bool:
+    """Does any marker of these pairs go with another segment of the legs or the pelvis?"""
+    segments = {name: [one for one in own if one in markers.labels] for name, own in marker_set.segments.items()}
+    for odd in {label for pair in far for label in (pair.one, pair.other)}:
+        changes = {
+            name: np.median([_change_m(markers, odd, mate) for mate in own if mate != odd])
+            for name, own in segments.items()
+            if set(own) - {odd} and (odd in own or not name.startswith(_OWN_WAY))
+        }
+        mine = max((change for name, change in changes.items() if odd in segments[name]), default=0.0)
+        if any(change < _ELSEWHERE * mine for change in changes.values()):
+            return True
+    return False
 
 
 def _crossed(markers: Markers, marker_set: MarkerSet) -> str:
