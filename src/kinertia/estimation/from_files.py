@@ -26,6 +26,7 @@ from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, 
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.stadium_body import expect_yeadon
 from kinertia.trial.data import Recording
+from kinertia.trial.plate_names import plate_of_trial
 
 
 def read_inputs(
@@ -172,7 +173,7 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
         plates = recording.plates
         apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
         if plates is not None and apart:
-            plates = replace(plates, names=tuple(f"{name} ({files.name})" for name in plates.names))
+            plates = replace(plates, names=tuple(plate_of_trial(name, files.name) for name in plates.names))
         recording = replace(recording, name=files.name, plates=plates, belt=read_belt(files.belt_speed_m_s))
         inputs.append(TrialInput(recording, files.window_s, seconds))
     return inputs

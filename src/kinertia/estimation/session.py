@@ -81,7 +81,7 @@ def session_instruments(people: Sequence[PersonInstruments], stated: Instruments
 def _values(people: Sequence[PersonInstruments], stated: Instruments) -> InstrumentValues:
     plates = tuple(dict.fromkeys(name for person in people for name in person.plates))
     prior = InstrumentPrior.stated(stated, [_information(person) for person in people])
-    shown, unknowns = prior.of_session(plates), prior.of_unknowns(len(plates))
+    shown, unknowns = prior.of_session(plates), prior.of_unknowns(plates)
     before = GaussianPrior.of(unknowns)
     covariance = np.linalg.inv(shown.information + before.precision)
     after = before.updated(unknowns, covariance @ (shown.right + before.pull), covariance)

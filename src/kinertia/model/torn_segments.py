@@ -56,7 +56,7 @@ def torn_segments_trouble(markers: Markers, marker_set: MarkerSet) -> str:
     """
     far = [pair for pair in _pairs(markers, marker_set) if pair.change_m > _limit_m(pair)]
     worst = max(far, default=None)
-    if worst is None or worst.change_m < _APART_M and not _elsewhere(markers, marker_set, far):
+    if worst is None or (worst.change_m < _APART_M and not _elsewhere(markers, marker_set, far)):
         return _crossed(markers, marker_set)
     usual = "less than 40 mm are usual"
     involved = list(dict.fromkeys(label for pair in sorted(far, reverse=True) for label in (pair.one, pair.other)))

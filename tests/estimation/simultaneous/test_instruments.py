@@ -5,6 +5,7 @@ import pytest
 from tests.small_problem import INSTRUMENTS, small_problem
 
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.settings import Instruments
 
 PRIOR = InstrumentPrior()
@@ -62,6 +63,21 @@ def test_what_the_laboratory_states_replaces_the_literature():
     assert (
         InstrumentPrior.stated(Instruments()) == replace(PRIOR) or InstrumentPrior.stated(Instruments()).session == ()
     )
+
+
+def test_columns_of_the_same_name_have_faults_in_common():
+    prior = InstrumentPrior()
+    names = ("right (walk)", "left (walk)", "right (stand)", "left (stand)")
+    covariance = prior.of_unknowns(names).covariance
+    correlation = covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
+    for unknown in range(len(PLATE_UNKNOWNS)):
+        right, left, again = (unknown + len(PLATE_UNKNOWNS) * plate for plate in (0, 1, 2))
+        assert correlation[right, again] == pytest.approx(0.5, abs=0.03)
+        assert correlation[right, left] == 0.0
+    assert prior.of_unknowns(("plate 1", "plate 2")).common == ()
+    assert InstrumentPrior.stated(Instruments(plate_sd_mm=1.0, gain_sd_percent=0.5)).of_unknowns(names).covariance[
+        0, 8
+    ] == pytest.approx(0.0)
 
 
 def test_the_session_counts_in_the_normal_equations():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty
 
 PLATE = SoundOrFaulty(0.001, 0.015, 0.1)
 
@@ -36,7 +36,7 @@ def test_one_quantity_has_the_mean_and_deviation_of_the_product(mean, sd):
 
 
 def test_a_certain_prior_stays_what_it_is():
-    priors = [SoundOrFaulty.certain(0.01), SoundOrFaulty.certain(0.2)]
+    priors = ErrorPriors((SoundOrFaulty.certain(0.01), SoundOrFaulty.certain(0.2)))
     covariance = np.array([[2e-5, 1e-5], [1e-5, 0.01]])
     updated = GaussianPrior.of(priors).updated(priors, np.array([0.02, -0.1]), covariance)
     np.testing.assert_allclose(updated.precision, np.diag([1e4, 25.0]), atol=1e-6)
@@ -45,6 +45,7 @@ def test_a_certain_prior_stays_what_it_is():
 
 def posterior(priors, data, right):
     """Mean and covariance of quantities that data (k, k) and right (k,) tell of."""
+    priors = priors if isinstance(priors, ErrorPriors) else ErrorPriors(tuple(priors))
     sites = GaussianPrior.of(priors)
     for _ in range(3):
         covariance = np.linalg.inv(data + sites.precision)
@@ -126,6 +127,23 @@ def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
     got, spread = posterior(priors, data, right)
     np.testing.assert_allclose(got, mean, atol=1e-7)
     np.testing.assert_allclose(spread, covariance, atol=1e-9)
+
+
+def test_plates_that_are_mostly_one_share_a_fault():
+    """Three trials show an error of one plate that is hardly enough; each error alone counts as chance."""
+    data = np.full((3, 3), 1.0 / 0.0045**2) + np.eye(3) / 0.001**2
+    truth = np.full(3, -0.015)
+    apart, _ = posterior([PLATE] * 3, data, data @ truth)
+    together, covariance = posterior(ErrorPriors((PLATE,) * 3, ((PLATE, (0, 1, 2)),)), data, data @ truth)
+    assert (np.abs(together - truth) < 0.7 * np.abs(apart - truth)).all()
+    assert (np.abs(together - truth) < np.sqrt(np.diag(covariance))).all()
+
+
+def test_of_plates_that_are_mostly_one_any_may_be_off_alone():
+    data = np.eye(3) / 0.001**2
+    truth = np.array([0.0, 0.03, 0.0])
+    mean, _ = posterior(ErrorPriors((PLATE,) * 3, ((PLATE, (0, 1, 2)),)), data, data @ truth)
+    np.testing.assert_allclose(mean, truth, atol=0.002)
 
 
 def test_drawn_instruments_have_the_prior_s_deviation():

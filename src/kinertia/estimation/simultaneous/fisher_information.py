@@ -72,7 +72,7 @@ class Information:
         for _ in range(_ROUNDS):
             result[places, places] = gaussian.precision
             covariance = np.linalg.inv(rest + result)[places, places]
-            gaussian = gaussian.updated(priors, np.zeros(len(priors)), covariance)
+            gaussian = gaussian.updated(priors, np.zeros(len(priors.own)), covariance)
         result[places, places] = gaussian.precision
         return result
 

@@ -11,8 +11,9 @@ from types import MappingProxyType
 import numpy as np
 
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
 from kinertia.settings import Instruments
+from kinertia.trial.plate_names import columns_of_several_trials
 
 FAULTY_SHARE = 0.05
 PLATE_PRIOR = MappingProxyType(
@@ -142,10 +143,21 @@ class InstrumentPrior:
             result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
         return result
 
-    def of_unknowns(self, n_plates: int) -> list[SoundOrFaulty]:
-        """Priors of all plates' unknowns, the floor's and the clock's."""
-        plates = [self.plate[name] for _ in range(n_plates) for name in PLATE_UNKNOWNS]
-        return [*plates, *(self.floor[name] for name in FLOOR_UNKNOWNS), self.clock_s]
+    def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
+        """Priors of all plates' unknowns, the floor's and the clock's.
+
+        Columns of the same name in the force files of several trials are plates of their own, but mostly the same one:
+        what a fault of theirs has in common has a prior, too.
+        """
+        names = list(PLATE_UNKNOWNS)
+        own = [self.plate[name] for _ in plates for name in names]
+        common = [
+            (SoundOrFaulty(_HARDLY * prior.sound_sd, prior.faulty_sd, prior.faulty_share), tuple(places))
+            for column in columns_of_several_trials(plates)
+            for k, prior in enumerate(self.plate[name] for name in names)
+            if (places := [len(names) * plate + k for plate in column]) and prior.faulty_share > 0.0
+        ]
+        return ErrorPriors((*own, *(self.floor[name] for name in FLOOR_UNKNOWNS), self.clock_s), tuple(common))
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """What the others have shown of these plates, all together."""
@@ -158,6 +170,8 @@ class InstrumentPrior:
         return InstrumentInformation(tuple(plates), information, right)
 
 
+_HARDLY = 0.1
+"""Columns of sound plates have hardly anything in common that they do not have with all plates."""
 _PLACE = ("x", "z")
 _NO_FLOOR_MM = 0.1
 """Deviation of the floor's place where that of the plates has been checked against the cameras."""

@@ -189,7 +189,7 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        self.instruments = calibration.instruments.of_unknowns(len(self.plates))
+        self.instruments = calibration.instruments.of_unknowns(self.plates)
         self.session = calibration.instruments.of_session(self.plates)
         self.weight = 1.0 / np.square(deviation)
         self.skin_information = self.skin[0].information()

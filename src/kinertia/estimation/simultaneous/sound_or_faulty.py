@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -73,6 +74,44 @@ class SoundOrFaulty:
         return float(rng.normal(0.0, self.faulty_sd if faulty else self.sound_sd))
 
 
+@dataclass(frozen=True)
+class ErrorPriors:
+    """Priors of k errors, each the sum of one of its own and of those that it has in common with others.
+
+    Attributes:
+        own: of each alone.
+        common: of what several have in common, and which these are.
+
+    >>> plate = SoundOrFaulty(0.001, 0.015, 0.2)
+    >>> ErrorPriors((plate, plate), ((plate, (0, 1)),)).covariance.round(6)
+    array([[9.2e-05, 4.6e-05],
+           [4.6e-05, 9.2e-05]])
+    """
+
+    own: tuple[SoundOrFaulty, ...]
+    common: tuple[tuple[SoundOrFaulty, tuple[int, ...]], ...] = ()
+
+    @cached_property
+    def parts(self) -> tuple[SoundOrFaulty, ...]:
+        """Priors of all parts, which are independent: (k + c)."""
+        return (*self.own, *(prior for prior, _ in self.common))
+
+    @cached_property
+    def of_parts(self) -> np.ndarray:
+        """(k, k + c) from the parts to the errors."""
+        shared = np.zeros((len(self.own), len(self.common)))
+        for column, (_, members) in zip(shared.T, self.common, strict=True):
+            column[list(members)] = 1.0
+        return np.hstack([np.eye(len(self.own)), shared])
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(k, k) of the errors."""
+        scaled = self.of_parts * [part.sd for part in self.parts]
+        result: np.ndarray = scaled @ scaled.T
+        return result
+
+
 @dataclass(frozen=True, eq=False)
 class GaussianPrior:
     """A joint Gaussian in place of the priors of k quantities.
@@ -87,22 +126,23 @@ class GaussianPrior:
     pull: np.ndarray
 
     @classmethod
-    def of(cls, priors: Sequence[SoundOrFaulty]) -> GaussianPrior:
-        """Where the data have said nothing: mean and variance of each prior."""
-        return cls(np.diag([prior.sd**-2.0 for prior in priors]), np.zeros(len(priors)))
+    def of(cls, priors: ErrorPriors) -> GaussianPrior:
+        """Where the data have said nothing: mean and covariance of the priors."""
+        return cls(np.linalg.inv(priors.covariance), np.zeros(len(priors.own)))
 
     def cost(self, values: np.ndarray) -> float:
         """Half the squared departure of values (k,) from the mean over its covariance, but for a constant."""
         return float(0.5 * values @ self.precision @ values - self.pull @ values)
 
-    def updated(self, priors: Sequence[SoundOrFaulty], mean: np.ndarray, covariance: np.ndarray) -> GaussianPrior:
+    def updated(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray) -> GaussianPrior:
         """The Gaussian that gives the posterior of these priors the mean and covariance that it has, given the
         posterior (k,), (k, k) that was found with the present one.
         """
         information = np.linalg.inv(covariance)
         data, right = information - self.precision, information @ mean - self.pull
-        middle, whole = _posterior(priors, data, right)
-        information = np.linalg.inv(whole)
+        parts = priors.of_parts
+        middle, whole = _posterior(priors.parts, parts.T @ data @ parts, parts.T @ right)
+        middle, information = parts @ middle, np.linalg.inv(parts @ whole @ parts.T)
         return GaussianPrior(information - data, information @ middle - right)
 
 

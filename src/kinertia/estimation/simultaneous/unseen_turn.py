@@ -35,7 +35,7 @@ def unseen_turn_note(shown: InstrumentInformation, prior: InstrumentPrior) -> st
 def least_turn_rad(shown: InstrumentInformation, prior: InstrumentPrior) -> float:
     """The smallest turn by which the trials make turned plates likelier than sound ones."""
     place = len(shown.right) - 1 - len(FLOOR_UNKNOWNS) + list(FLOOR_UNKNOWNS).index("turn")
-    unknowns = prior.of_unknowns(len(shown.plates))
+    unknowns = prior.of_unknowns(shown.plates).own
     precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
     information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)
     deviation = float(np.sqrt(np.linalg.inv(information)[place, place]))
