@@ -72,7 +72,7 @@ def test_columns_of_the_same_name_have_faults_in_common():
     correlation = covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     for unknown in range(len(PLATE_UNKNOWNS)):
         right, left, again = (unknown + len(PLATE_UNKNOWNS) * plate for plate in (0, 1, 2))
-        assert correlation[right, again] == pytest.approx(0.5, abs=0.03)
+        assert 0.4 < correlation[right, again] < 0.5
         assert correlation[right, left] == 0.0
     assert prior.of_unknowns(("plate 1", "plate 2")).common == ()
     assert InstrumentPrior.stated(Instruments(plate_sd_mm=1.0, gain_sd_percent=0.5)).of_unknowns(names).covariance[
