@@ -19,6 +19,7 @@ from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.estimation.simultaneous.unlike import unlikeness
+from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
@@ -232,6 +233,7 @@ def _warnings(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
     warnings += instrument_warnings(posterior.calibration)
+    warnings += which_plate_warnings(posterior.calibration, result.instruments, uncertainty.instruments)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)

@@ -33,7 +33,7 @@ def instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) ->
     mirrored = mirrored_free_moments(calibration)
     for name, entry in calibration.items():
         instrument, colon, what = name.partition(":")
-        if colon and _notable(entry) and not (mirrored and what.strip() == FREE_MOMENT):
+        if colon and notable(entry) and not (mirrored and what.strip() == FREE_MOMENT):
             scale, unit = SHOWN_UNIT[str(entry["unit"])]
             value, sd = float(entry["value"]), float(entry["prior_sd"])
             said = f"{what}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit})"
@@ -45,12 +45,13 @@ def mirrored_free_moments(calibration: Mapping[str, Mapping[str, float | str]]) 
     """What the plates' free moments lack, N m/N, if it is notable and goes to both sides alike; else nothing."""
     entries = {name.partition(":")[0]: e for name, e in calibration.items() if name.endswith(f": {FREE_MOMENT}")}
     lacking = {plate: float(entry["value"]) for plate, entry in entries.items()}
-    notable = [lacking[plate] for plate, entry in entries.items() if _notable(entry)]
-    if not notable or not min(notable) < 0.0 < max(notable):
+    off = [lacking[plate] for plate, entry in entries.items() if notable(entry)]
+    if not off or not min(off) < 0.0 < max(off):
         return {}
     alike = abs(sum(lacking.values())) <= _ONE_SIDED * sum(map(abs, lacking.values()))
     return lacking if alike else {}
 
 
-def _notable(entry: Mapping[str, float | str]) -> bool:
+def notable(entry: Mapping[str, float | str]) -> bool:
+    """Whether what a fit found is more than an instrument is usually off."""
     return abs(float(entry["value"])) > _NOTABLE * float(entry["prior_sd"])
