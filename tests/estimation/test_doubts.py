@@ -39,3 +39,10 @@ def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(measure
     assert len(kept) < len(walk.markers.labels)
     feet = {side: [one for one in own if one in kept] for side, own in marker_set.foot_labels().items()}
     assert trial_doubts(replace(walk, markers=walk.markers.select(kept)), marker_set, None, feet) == []
+
+
+def test_a_single_frame_is_no_motion(measured_recording):
+    walk = measured_recording("gait2354/subject01_walk1.trc")
+    (doubt,) = trial_doubts(replace(walk, markers=walk.markers.cut(0.0, 0.0)), None, None, None)
+    assert doubt.refused
+    assert "a single frame shows no motion" in doubt.sentence

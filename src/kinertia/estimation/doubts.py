@@ -83,6 +83,8 @@ def trial_doubts(
         feet: labels of the markers on each foot; None where they are not known.
     """
     markers = recording.markers
+    if len(markers.time) < 2:
+        return _refused("a single frame shows no motion: export the whole trial, or leave it out")
     own = _worn(markers, marker_set)
     trouble = (
         axes_trouble(extent_m(own))
