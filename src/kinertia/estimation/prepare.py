@@ -38,6 +38,7 @@ from kinertia.model.gait27 import (
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet, check_marker_set
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.exchanged_forces import exchanged_forces
 from kinertia.motion.kinematics import Kinematics, facing, solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.swapped_markers import check_labels
@@ -185,7 +186,7 @@ def prepare(
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [(with_upright_trunk(model.skeleton, trial), angle) for trial, angle in turned]
     trials = [trial for trial, _ in turned]
-    warnings += uneven_delays(trials, marker_set.segments)
+    warnings += exchanged_forces(trials, marker_set.segments) or uneven_delays(trials, marker_set.segments)
     carried = CarriedMass.of(known(subject.mass_kg), attached)
     skeleton, notes = calibrate(model, trials, carried)
     warnings += unseen_body(skeleton)

@@ -32,6 +32,7 @@ from kinertia.model.model_markers import markers_of_model
 from kinertia.model.model_on_person import moved_doubts
 from kinertia.model.person_size import size_trouble
 from kinertia.model.skeleton import Axis, Skeleton
+from kinertia.motion.exchanged_forces import exchanged_forces
 from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.range_ends import clamped_doubts
@@ -72,7 +73,8 @@ def prepare_osim(
         trial, doubts = _looked_at(model, item, feet)
         warnings += doubts
         trials.append(trial)
-    warnings += uneven_delays(trials, markers_of_model(model).segments)
+    segments = markers_of_model(model).segments
+    warnings += exchanged_forces(trials, segments) or uneven_delays(trials, segments)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
     carried = CarriedMass.of(known(subject.mass_kg), attached)
