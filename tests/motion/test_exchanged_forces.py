@@ -1,6 +1,5 @@
 """Exchanged force files of two trials of a person are named; those of sound trials, and late ones, never are."""
 
-from dataclasses import replace
 from itertools import combinations
 
 import pytest
@@ -8,7 +7,7 @@ import pytest
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
 from kinertia.motion.exchanged_forces import exchanged_forces
-from kinertia.trial.plate_assignment import build_trial
+from subject4_trials import trial_of_subject4
 
 TRIALS = ("walking1", "walking2", "squats1")
 
@@ -19,16 +18,11 @@ def of_subject4(measured_file, measured_recording):
     marker_set = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
 
     def made(late_s=0.0, **forces):
-        trials = []
-        for name, of in forces.items():
-            recording = measured_recording(f"subject4/{name}.trc", f"subject4/{of}_grf.mot")
-            feet = {
-                side: [one for one in own if one in recording.markers.labels]
-                for side, own in marker_set.foot_labels().items()
-            }
-            plates = replace(recording.plates, time=recording.plates.time + late_s * (name == "walking2"))
-            trials.append(build_trial(replace(recording, plates=plates, name=name), feet))
-        return trials, marker_set.segments
+        late = {"walking2": late_s}
+        return [
+            trial_of_subject4(measured_recording, marker_set, name, of, late.get(name, 0.0))
+            for name, of in forces.items()
+        ], marker_set.segments
 
     return made
 

@@ -12,7 +12,7 @@ from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
 from kinertia.motion.trial_delays import TrialDelay, trial_delay, trial_delays_doubts, uneven_delays
 from kinertia.settings import Settings, Subject
-from kinertia.trial.plate_assignment import build_trial
+from subject4_trials import trial_of_subject4
 
 TRIALS = ("walking1", "walking2", "squats1")
 
@@ -23,16 +23,9 @@ def of_subject4(measured_file, measured_recording):
     marker_set = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
 
     def made(**late_s):
-        trials = []
-        for name, late in late_s.items():
-            recording = measured_recording(f"subject4/{name}.trc", f"subject4/{name}_grf.mot")
-            feet = {
-                side: [one for one in own if one in recording.markers.labels]
-                for side, own in marker_set.foot_labels().items()
-            }
-            plates = replace(recording.plates, time=recording.plates.time + late)
-            trials.append(build_trial(replace(recording, plates=plates), feet))
-        return trials, marker_set.segments
+        return [
+            trial_of_subject4(measured_recording, marker_set, name, late_s=late) for name, late in late_s.items()
+        ], marker_set.segments
 
     return made
 
