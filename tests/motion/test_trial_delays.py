@@ -12,6 +12,7 @@ from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
 from kinertia.motion.trial_delays import TrialDelay, trial_delay, trial_delays_doubts, uneven_delays
 from kinertia.settings import Settings, Subject
+from kinertia.trial.data import within
 from subject4_trials import trial_of_subject4
 
 TRIALS = ("walking1", "walking2", "squats1")
@@ -67,6 +68,26 @@ def test_both_ways_to_tell_have_to_agree():
     assert trial_delays_doubts([first, TrialDelay("b", 0.03, 0.01)]) == []
     assert trial_delays_doubts([first, TrialDelay("b", 0.03, -0.03)]) == []
     assert [name for name, _ in trial_delays_doubts([first, TrialDelay("b", 0.02, 0.013)])] == ["b"]
+
+
+def test_short_windows_tell_longer_delays_only():
+    first = TrialDelay("a", 0.0, 0.0)
+    for late_s, named in ((0.015, []), (0.02, ["b"])):
+        doubts = trial_delays_doubts([first, TrialDelay("b", late_s, late_s, short=True)])
+        assert [name for name, _ in doubts] == named
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.025, -0.025])
+def test_walks_of_less_than_a_second(of_subject4, late_s):
+    trials, segments = of_subject4(walking1=0.0, walking2=late_s)
+    short = []
+    for trial in trials:
+        ((start_s, end_s),) = trial.windows()
+        middle_s = (start_s + end_s) / 2
+        inside = within(trial.markers.time, middle_s - 0.45, middle_s + 0.45)
+        short.append(replace(trial, measured=trial.measured & inside))
+    assert all(trial_delay(trial, segments).short for trial in short)
+    assert len(uneven_delays(short, segments)) == (late_s != 0.0)
 
 
 def test_said_by_a_fit(measured_file, measured_recording):

@@ -3,7 +3,7 @@
 The body goes up and down by its markers as the forces cause, but for a delay: that of the forces' clock, and some ms
 that skin, trunk and arms add, alike whenever somebody moves. Of one person's trials (two walks, squats, parts of walks
 and runs) either way to tell it differs by up to 8 ms, but both in one direction by at most 4 ms; even those of eight
-people with skin motion of their own differ by at most 10 ms so.
+people with skin motion of their own differ by at most 10 ms so. Parts of less than a second differ by up to 15 ms.
 """
 
 from __future__ import annotations
@@ -15,19 +15,24 @@ import numpy as np
 
 from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import FloatArray, Trial, span_s
+from kinertia.trial.data import Trial, span_s
 
-_LEAST_WINDOW_S, _MOST_LEFT = 1.0, 0.22
-"""In shorter windows trials of different laboratories differ by 30 ms."""
-_APART_S = 0.012
+_LEAST_WINDOW_S, _MOST_LEFT = 0.8, 0.22
+"""Parts of half a second of one trial differ by up to 40 ms."""
+_SHORT_S = 1.0
+_APART_S, _SHORT_APART_S = 0.012, 0.018
+"""In longer windows, and in shorter ones."""
 
 
 class TrialDelay(NamedTuple):
-    """By how much the forces of a trial are late (s): by the pelvis, and by the centre of all markers."""
+    """By how much the forces of a trial are late (s): by the pelvis, and by the centre of all markers; and whether only
+    short windows tell.
+    """
 
     name: str
     by_pelvis_s: float
     by_centre_s: float
+    short: bool = False
 
     def shown(self) -> str:
         """The name, and both delays in ms."""
@@ -53,7 +58,7 @@ def trial_delay(trial: Trial, segments: Mapping[str, Sequence[str]]) -> TrialDel
     if not found:
         return None
     pelvis, centre = np.average(found, axis=0, weights=spans)
-    return TrialDelay(trial.name, float(pelvis), float(centre))
+    return TrialDelay(trial.name, float(pelvis), float(centre), max(spans) < _SHORT_S)
 
 
 def uneven_delays(trials: Sequence[Trial], segments: Mapping[str, Sequence[str]]) -> list[str]:
@@ -70,7 +75,8 @@ def trial_delays_doubts(delays: Sequence[TrialDelay | None]) -> list[tuple[str, 
     known = sorted((one for one in delays if one is not None), key=lambda one: one.by_pelvis_s + one.by_centre_s)
     if len(known) < 2:
         return []
-    values = np.array([one[1:] for one in known])
+    values = np.array([[one.by_pelvis_s, one.by_centre_s] for one in known])
+    limit_s = _SHORT_APART_S if any(one.short for one in known) else _APART_S
     if len(known) == 2:
         usual, apart, against = values[0], [1], f"than those of {known[0].shown()}"
     else:
@@ -78,7 +84,9 @@ def trial_delays_doubts(delays: Sequence[TrialDelay | None]) -> list[tuple[str, 
         against = f"than those of the other trials (medians {1e3 * usual[0]:+.0f} and {1e3 * usual[1]:+.0f} ms)"
     late_s = values - usual
     return [
-        (known[k].name, _sentence(known[k], float(late_s[k].mean()), against)) for k in apart if _apart_s(late_s[k])
+        (known[k].name, _sentence(known[k], float(late_s[k].mean()), against))
+        for k in apart
+        if np.abs(late_s[k]).min() > limit_s and late_s[k].prod() > 0
     ]
 
 
@@ -91,8 +99,3 @@ def _sentence(one: TrialDelay, late_s: float, against: str) -> str:
         "and plates of sound trials are accused: correct the start of the forces that are late or early, or leave "
         "that trial out"
     )
-
-
-def _apart_s(difference: FloatArray) -> bool:
-    """Whether delays (2,) s differ by more than is usual, both in one direction."""
-    return bool(np.abs(difference).min() > _APART_S and difference.prod() > 0)
