@@ -6,10 +6,7 @@ rather than plates: those of each trial are plates of their own, until somebody 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-
-_OF_TRIAL = re.compile(r"(?P<column>.+) \((?P<trial>[^()]+)\)$")
 
 
 def plate_of_trial(column: str, trial: str) -> str:
@@ -20,11 +17,21 @@ def plate_of_trial(column: str, trial: str) -> str:
 def columns_of_several_trials(plates: Sequence[str]) -> tuple[tuple[int, ...], ...]:
     """Which of these plates are columns of the same name, of different trials.
 
-    >>> columns_of_several_trials(["right (walk 1)", "left (walk 1)", "right (walk 2)", "plate 3"])
+    >>> columns_of_several_trials(["right (walk)", "left (walk)", "right (walk (2))", "plate 3"])
     ((0, 2),)
     """
     columns: dict[str, list[int]] = {}
     for place, plate in enumerate(plates):
-        if named := _OF_TRIAL.match(plate):
-            columns.setdefault(named["column"], []).append(place)
+        if column := _column(plate):
+            columns.setdefault(column, []).append(place)
     return tuple(tuple(places) for places in columns.values() if len(places) > 1)
+
+
+def _column(plate: str) -> str:
+    """What `plate_of_trial` was given; empty if it was not asked. Columns and trials may have brackets, too."""
+    unopened = 0
+    for place in range(len(plate) - 1, 0, -1):
+        unopened += (plate[place] == ")") - (plate[place] == "(")
+        if unopened == 0:
+            return plate[: place - 1] if plate[place - 1 : place + 1] == " (" else ""
+    return ""
