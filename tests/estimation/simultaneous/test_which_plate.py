@@ -5,6 +5,7 @@ import pytest
 
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
+from kinertia.settings import Instruments
 
 OFF = {"plate left: x": {"value": -0.018, "prior_sd": 0.0036, "sd": 0.005, "unit": "m"}}
 SOUND = {"plate left: x": {"value": -0.003, "prior_sd": 0.0036, "sd": 0.005, "unit": "m"}}
@@ -48,3 +49,8 @@ def test_what_other_people_of_the_session_tell_counts():
     plates = ("right", "left")
     prior = InstrumentPrior(session=(shown(plates, 0.002),))
     assert which_plate_warnings(OFF, shown(plates, 0.011), prior) == []
+
+
+def test_nothing_is_said_where_the_laboratory_has_checked_its_plates():
+    stated = InstrumentPrior.stated(Instruments(plate_sd_mm=2.0))
+    assert which_plate_warnings(OFF, shown(("right", "left"), 0.011), stated) == []

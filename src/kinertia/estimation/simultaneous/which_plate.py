@@ -37,7 +37,8 @@ def which_plate_warnings(
     sentences = []
     for axis in _PLACES:
         off = [entry for name, entry in calibration.items() if name.startswith("plate ") and name.endswith(f": {axis}")]
-        if not any(map(notable, off)):
+        checked = prior.plate[axis].faulty_share == 0.0
+        if checked or not any(map(notable, off)):
             continue
         apart_m, each_m = _deviations(shown, prior, axis)
         if each_m > _HARDLY_M and apart_m < _BETTER * each_m:
