@@ -151,7 +151,7 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
             along = [next(coefficient) for _ in range(3)]
             positions[:, m] += skin.values[:, pattern, None] * (pose.rotation[:, segment] @ along)
     errors = whitened(trial.markers - positions, *trial.marker_process)
-    loads = trial.ground.loads(trial.time + static[layout.clock]).reshape(len(trial.time), 2, 6)
+    loads = trial.ground.loads(trial.time + static[layout.late(k)].sum()).reshape(len(trial.time), 2, 6)
     *floor, angle = static[layout.plates][-3:]
     of_plates = np.add(static[layout.plates][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
     values = dict(zip(problem.plates, of_plates, strict=True))

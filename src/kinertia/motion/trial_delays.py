@@ -1,4 +1,5 @@
-"""Are the forces of all trials of a person equally late? One clock is estimated for all of them.
+"""Are the forces of all trials of a person equally late? The simultaneous estimate finds each trial's delay; nothing
+else does, and whoever is late may have lost more than time.
 
 The body goes up and down by its markers as the forces cause, but for a delay: that of the forces' clock, and some ms
 that skin, trunk and arms add, alike whenever somebody moves. Of one person's trials (two walks, squats, parts of walks
@@ -95,7 +96,7 @@ def _sentence(one: TrialDelay, late_s: float, against: str) -> str:
     return (
         f"the forces of {one.shown()} come {1e3 * abs(late_s):.0f} ms {word} {against}, by when "
         "the pelvis and the middle of all markers go up and down (4 ms are usual): in one of the trials "
-        "cameras and plates did not start together, or one was filtered with a delay; one delay is estimated for all, "
-        "and plates of sound trials are accused: correct the start of the forces that are late or early, or leave "
-        "that trial out"
+        "cameras and plates did not start together, or one was filtered with a delay; the simultaneous estimate finds "
+        "the delay of each trial and puts it right, nothing else does: correct the start of the forces that are late "
+        "or early"
     )

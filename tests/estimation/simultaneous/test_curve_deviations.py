@@ -174,6 +174,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
     trials = [replace(trial, displacement_sd_m=sd).repeated(2.0), replace(trial, displacement_sd_m=sd[::-1].copy())]
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials)
+    static = point(pair)[1]
     rng = np.random.default_rng(0)
     here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
     here = here.under(GaussianPrior.of(pair.instruments), pair.layout.instruments)
@@ -189,16 +190,16 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     assert promised == pytest.approx(0.5 * right @ covariance @ right, rel=1e-6)
 
     in_trial = pair.in_trial(0, here.point)
-    by = dense_derivatives(problem, coefficients, in_trial)["moments"]
+    by = dense_derivatives(pair, coefficients, in_trial)["moments"]
     n = coefficients.size
     motion = inverse(dense_band(here.normals[0].last.band))
     carried = -motion @ here.normals[0].last.border.reshape(n, s)
     through = by[..., n:] + by[..., :n] @ carried
-    shaken = dense_derivatives(problem, coefficients, in_trial, np.sqrt(noise))["moments"][..., :n]
+    shaken = dense_derivatives(pair, coefficients, in_trial, np.sqrt(noise))["moments"][..., :n]
     expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
-    expected = np.sqrt(expected + of_impacts(problem, coefficients, in_trial))
+    expected = np.sqrt(expected + of_impacts(pair, coefficients, in_trial))
     np.testing.assert_allclose(sds[0].moments, expected, rtol=1e-3)
 
 

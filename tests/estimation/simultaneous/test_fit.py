@@ -286,6 +286,37 @@ def test_measured_walk_meets_residuals_and_markers(measured):
     assert measured.estimate.physically_consistent().all()
 
 
+def test_forces_of_one_of_two_trials_are_late(trial):
+    """The delay is that trial's: neither the other one nor the plates are accused."""
+
+    def fit_of(*late_frames):
+        kinematics = []
+        for seed, late in enumerate(late_frames):
+            positions = camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions
+            loads = np.roll(trial.foot_loads, late, axis=0)
+            kinematics.append(kinematics_of(trial, replace(trial.markers, positions=positions), loads))
+        prior = literature_prior(walking_subject().literature)
+        with threadpool_limits(1, user_api="blas"):
+            return fit_simultaneous(trial.skeleton, prior, kinematics)
+
+    sound, late = fit_of(0, 0), fit_of(0, 1)
+    frame_s = trial.time[1] - trial.time[0]
+    for fit, expected in ((sound, 0.0), (late, frame_s)):
+        (first, first_sd), (second, second_sd) = fit.result.delays_s
+        assert first == pytest.approx(0.0, abs=0.0002)
+        assert second == pytest.approx(expected, abs=3.0 * second_sd)
+        assert second_sd < 0.001
+        assert fit.result.clock_s[0] == pytest.approx(0.0, abs=0.0005)
+    assert sound.warnings == ()
+    (warning,) = late.warnings
+    assert "forces later than in the other trials by: +" in warning
+    # and others of the session are told of the clock, which is on time
+    ours, theirs = (fit.result.instruments for fit in (sound, late))
+    assert ours.information.shape == theirs.information.shape == (12, 12)
+    for shown in (ours, theirs):
+        assert abs(shown.right[-1] / shown.information[-1, -1]) < 0.001
+
+
 def test_files_of_a_simultaneous_fit(measured, tmp_path):
     folder = save_fit(measured, tmp_path / "out")
     bsp = pd.read_csv(folder / "bsp.csv")

@@ -52,6 +52,28 @@ def test_plates_that_are_not_there_are_marginalised(plates):
     np.testing.assert_allclose(own @ narrow.right, mean[kept], rtol=1e-6, atol=1e-12)
 
 
+def test_delays_are_marginalised():
+    """Against the dense posterior of everything."""
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(10, 10))
+    whole = InstrumentInformation(("a",), root @ root.T, rng.normal(size=10))
+    precision, pull = np.diag([2.0, 3.0]), np.array([0.5, -1.0])
+    without = whole.without_delays(precision, pull)
+    before = np.diag([*[1.0] * 8, 2.0, 3.0])
+    covariance = np.linalg.inv(whole.information + before)
+    own = np.linalg.inv(without.information + np.eye(8))
+    np.testing.assert_allclose(own, covariance[:8, :8])
+    mean = covariance @ (whole.right + np.append(np.zeros(8), pull))
+    np.testing.assert_allclose(own @ without.right, mean[:8])
+
+
+def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own():
+    priors = InstrumentPrior().of_unknowns(("plate 1",), 3).own
+    clock, *delays = priors[-4:]
+    assert (clock.sound_sd, clock.faulty_sd) == (0.0003, 0.010)
+    assert all((one.sound_sd, one.faulty_sd) == (pytest.approx(0.00003), 0.010) for one in delays)
+
+
 def test_what_the_laboratory_states_replaces_the_literature():
     stated = InstrumentPrior.stated(Instruments(plate_sd_mm=2.0, clock_sd_ms=1.0))
     assert (stated.plate["x"].sd, stated.plate["z"].faulty_share, stated.clock_s.sd) == (0.002, 0.0, 0.001)

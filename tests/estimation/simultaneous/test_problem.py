@@ -50,6 +50,20 @@ def test_gradient_of_static_unknowns(problem, here, kind):
     assert -right @ step == pytest.approx(slope, rel=1e-5)
 
 
+def test_gradient_of_delays():
+    """Those of a trial say nothing of another."""
+    pair = small_problem(2)
+    coefficients, static = point(pair)
+    delays = np.arange(len(static))[pair.layout.delays]
+    assert len(delays) == 2
+    for k in range(2):
+        normal = pair.normal(k, coefficients[k], static)
+        assert normal.static_right[delays[1 - k]] == 0.0
+        step = np.eye(len(static))[delays[k]]
+        slope = sloped(lambda h, k=k, step=step: pair.normal(k, coefficients[k], static + h * step).cost, 1e-6)
+        assert -normal.static_right[delays[k]] == pytest.approx(slope, rel=1e-5)
+
+
 @pytest.mark.parametrize("coordinate", ["pelvis_tx", "pelvis_list", "hip_flexion_r", "ankle_angle_l", "arm_add_l"])
 def test_gradient_of_the_motion(problem, here, coordinate):
     coefficients, static = here
@@ -177,10 +191,11 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     displaced = replace(trial, displacement_sd_m=sd)
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial])
     own = np.random.default_rng(0).normal(size=(len(sd), 3))
-    at = Point((coefficients, coefficients), static, (own.ravel(), np.zeros(own.size)))
-    moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - static[pair.layout.locals].reshape(-1, 3)
+    on_time = np.insert(static, [pair.layout.delays.start] * 2, 0.0)
+    at = Point((coefficients, coefficients), on_time, (own.ravel(), np.zeros(own.size)))
+    moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - on_time[pair.layout.locals].reshape(-1, 3)
     np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
-    np.testing.assert_array_equal(pair.in_trial(1, at), static)
+    np.testing.assert_array_equal(pair.in_trial(1, at), on_time)
     together = pair.at(at)
     assert together.normals[1].cost == pytest.approx(problem.normal(0, coefficients, static).cost)
     expected = sum(normal.cost for normal in together.normals) + problem.prior_terms(static)[2]

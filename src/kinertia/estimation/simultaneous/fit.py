@@ -138,7 +138,7 @@ def fit_simultaneous(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, uncertainty, result),
+        _calibration(used, uncertainty, result, [each.trial.name for each in trials]),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -196,7 +196,7 @@ def calibration_prior(
 
 
 def _calibration(
-    skeleton: Skeleton, uncertainty: ModelUncertainty, result: SimultaneousResult
+    skeleton: Skeleton, uncertainty: ModelUncertainty, result: SimultaneousResult, trials: Sequence[str]
 ) -> dict[str, dict[str, float | str]]:
     calibration: dict[str, dict[str, float | str]] = {}
     known = uncertainty.instruments
@@ -217,6 +217,9 @@ def _calibration(
             calibration[f"{name}: {unknown}"] = {**entry, "unit": unit}
     clock, clock_sd = result.clock_s
     calibration["clock: forces late by"] = {"value": clock, "prior_sd": known.clock_s.sd, "sd": clock_sd, "unit": "s"}
+    for trial, (later, later_sd) in zip(trials, result.delays_s, strict=False):
+        entry = {"value": later, "prior_sd": known.delay_s.sd, "sd": later_sd}
+        calibration[f"clock of {trial}: forces later than in the other trials by"] = {**entry, "unit": "s"}
     return calibration
 
 

@@ -79,6 +79,20 @@ class InstrumentInformation:
         kept = vectors[:, values > 0.0]
         return cls(tuple(plates), information, scale * (kept @ (kept.T @ (right / scale))))
 
+    def without_delays(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
+        """The same without the delays of t trials, which stand behind everything else, where this much was known of
+        them before: (t, t), (t,).
+        """
+        size = len(self.right) - len(pull)
+        across = self.information[:size, size:]
+        own = self.information[size:, size:] + precision
+        through = np.linalg.solve(own, np.column_stack([across.T, self.right[size:] + pull]))
+        return InstrumentInformation(
+            self.plates,
+            self.information[:size, :size] - across @ through[:, :-1],
+            self.right[:size] - across @ through[:, -1],
+        )
+
     def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
         """The same about these plates. Of one that is not among them no more is known than its prior."""
         every = tuple(dict.fromkeys([*plates, *self.plates]))
@@ -143,8 +157,8 @@ class InstrumentPrior:
             result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
         return result
 
-    def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
-        """Priors of all plates' unknowns, the floor's and the clock's.
+    def of_unknowns(self, plates: Sequence[str], n_delays: int = 0) -> ErrorPriors:
+        """Priors of all plates' unknowns, the floor's, the clock's, and the delays of so many trials.
 
         Columns of the same name in the force files of several trials are plates of their own, but mostly the same one:
         what a fault of theirs has in common has a prior, too.
@@ -157,7 +171,13 @@ class InstrumentPrior:
             for k, prior in enumerate(self.plate[name] for name in names)
             if (places := [len(names) * plate + k for plate in column]) and prior.faulty_share > 0.0
         ]
-        return ErrorPriors((*own, *(self.floor[name] for name in FLOOR_UNKNOWNS), self.clock_s), tuple(common))
+        floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
+        return ErrorPriors((*own, *floor, self.clock_s, *[self.delay_s] * n_delays), tuple(common))
+
+    @property
+    def delay_s(self) -> SoundOrFaulty:
+        """Prior of how much later than by the clock of all the forces of one of several trials are."""
+        return replace(self.clock_s, sound_sd=_HARDLY * self.clock_s.sound_sd)
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """What the others have shown of these plates, all together."""
@@ -171,7 +191,8 @@ class InstrumentPrior:
 
 
 _HARDLY = 0.1
-"""Columns of sound plates have hardly anything in common that they do not have with all plates."""
+"""Columns of sound plates have hardly anything in common that they do not have with all plates, and trials that began
+as they should hardly a delay of their own."""
 _PLACE = ("x", "z")
 _NO_FLOOR_MM = 0.1
 """Deviation of the floor's place where that of the plates has been checked against the cameras."""

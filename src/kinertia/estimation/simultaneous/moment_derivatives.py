@@ -79,10 +79,10 @@ def moment_derivatives(
         by_plate = ground.by_plate(only, ground.carrier[frames], problem.plate_values(static))
         by_plate = by_plate @ problem.to_plates
         by_static[:, :, layout.plates] -= jacobian @ by_plate
-        by_static[:, :, layout.clock] -= (jacobian @ rates[:, foot, :, None])[..., 0]
+        by_static[:, :, layout.late(k)] -= jacobian @ rates[:, foot, :, None]
         tau -= (jacobian @ loads[:, foot, :, None])[..., 0]
         by_ground[:, foot, :, layout.plates] = by_plate[:, :3]
-        by_ground[:, foot, :, layout.clock] = rates[:, foot, :3]
+        by_ground[:, foot][..., layout.late(k)] = rates[:, foot, :3, None]
         impact -= (jacobian @ fast[:, foot, :, None])[..., 0]
         dq -= _load_derivative(pose, moves, loads[:, foot])
     by_q, by_qd, by_qdd = (

@@ -2,8 +2,8 @@
 
 Each plate may stand off its recorded place in the floor's plane, have a wrong gain, and read a vertical moment that is
 not there, in proportion to the vertical force (crosstalk of its channels); all plates may be turned about the vertical
-against the cameras; forces may be recorded late. The plates are the laboratory's: their offsets are in its axes and are
-shared by all trials, as is the clock.
+against the cameras; forces may be recorded late, those of all trials or of one. The plates are the laboratory's: their
+offsets are in its axes and are shared by all trials.
 """
 
 from __future__ import annotations

@@ -177,7 +177,7 @@ class MapProblem:
         self.to_plates = plates_with_floor(len(self.plates))
         count = len(skeleton.markers)
         self.skin = [trial.skin or SkinPatterns.none(len(trial.time), count) for trial in trials]
-        unknowns = (len(self.still), count, len(self.plates), self.skin[0].size)
+        unknowns = (len(self.still), count, len(self.plates), len(trials), self.skin[0].size)
         self.layout = Layout.of(10 * len(self.segments), *unknowns)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
@@ -189,7 +189,8 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        self.instruments = calibration.instruments.of_unknowns(self.plates)
+        own_delays = self.layout.delays.stop - self.layout.delays.start
+        self.instruments = calibration.instruments.of_unknowns(self.plates, own_delays)
         self.session = calibration.instruments.of_session(self.plates)
         self.weight = 1.0 / np.square(deviation)
         self.skin_information = self.skin[0].information()
@@ -257,11 +258,11 @@ class MapProblem:
         information = np.diag(self.weight)
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))
-        theta, skin, instruments = self.layout.theta, self.layout.skin, self.layout.instruments
-        by_session = self.session.information @ static[instruments]
-        information[instruments, instruments] += self.session.information
-        right[instruments] += self.session.right - by_session
-        cost += float(static[instruments] @ (by_session - 2.0 * self.session.right))
+        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
+        by_session = self.session.information @ static[laboratory]
+        information[laboratory, laboratory] += self.session.information
+        right[laboratory] += self.session.right - by_session
+        cost += float(static[laboratory] @ (by_session - 2.0 * self.session.right))
         information[skin, skin] += self.skin_information
         pulled = self.skin_information @ static[skin]
         right[skin] -= pulled
@@ -302,12 +303,16 @@ class MapProblem:
         self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
     ) -> np.ndarray:
         """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
-        ground, at = self.grounds[k], self.trials[k].time[frames] + static[self.layout.clock]
+        ground, at = self.grounds[k], self.trials[k].time[frames] + self.late_s(k, static)
         return ground.corrected(at, ground.carrier[frames], self.plate_values(static), derivative)
 
     def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
         """The loads for the joint moments of trial k, of instruments put right."""
-        return self.grounds[k].corrected_reactions(self.plate_values(static), float(static[self.layout.clock]))
+        return self.grounds[k].corrected_reactions(self.plate_values(static), self.late_s(k, static))
+
+    def late_s(self, k: int, static: np.ndarray) -> float:
+        """By how much the forces of trial k are late."""
+        return float(static[self.layout.late(k)].sum())
 
     def trial_normal(self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0) -> TrialNormal:
         """Normal equations of trial k, to be solved with this damping."""
@@ -364,7 +369,8 @@ class MapProblem:
         rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
         by_instrument = np.concatenate([by_plate, rates[:, :, None]], axis=2)
         by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
-        by_static[:, :, layout.instruments] = -by_instrument
+        by_static[:, :, layout.plates] = -by_instrument[:, :, :-1]
+        by_static[:, :, layout.late(k)] = -by_instrument[:, :, -1:]
         sd = self.root_sd(trial)[:, None]
         by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by.q, by.qd, by.qdd))
         return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[:, 0])

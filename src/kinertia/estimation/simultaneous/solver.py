@@ -3,7 +3,8 @@
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
 how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate
-(`plates.PLATE_ERRORS`), and the time offset of the forces. Minimised is the sum of squares, each over its
+(`plates.PLATE_ERRORS`), the time offset of the forces, and by how much more they are late in each of several trials.
+Minimised is the sum of squares, each over its
 deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are Gaussians
 that change with what the data say of them (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives
 analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its
@@ -45,6 +46,7 @@ class SimultaneousResult:
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
         plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
         clock_s: the time offset and its posterior deviation, s.
+        delays_s: of several trials, how much later the forces of each are, and the posterior deviation, s.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
         reactions: per trial the loads for the joint moments, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
@@ -62,6 +64,7 @@ class SimultaneousResult:
     coordinates: dict[str, tuple[float, float]]
     plates: dict[str, tuple[np.ndarray, np.ndarray]]
     clock_s: tuple[float, float]
+    delays_s: tuple[tuple[float, float], ...]
     foot_loads: tuple[np.ndarray, ...]
     reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
@@ -260,6 +263,7 @@ def _result(
         coordinates,
         dict(zip(problem.plates, plates, strict=True)),
         (float(values[layout.clock]), float(sd[layout.clock])),
+        tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
@@ -277,7 +281,12 @@ def _result(
 def _shown(
     problem: MapProblem, prior: GaussianPrior, mean: np.ndarray, covariance: np.ndarray
 ) -> InstrumentInformation:
-    """What the trials say of the instruments, without what was known before."""
-    session = problem.session
-    before = ((prior.precision, prior.pull), (session.information, session.right))
-    return InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)
+    """What the trials say of the laboratory's instruments, without what was known before."""
+    session, own = problem.session, slice(problem.layout.laboratory.stop - problem.layout.laboratory.start, len(mean))
+    delays = own.stop - own.start
+    before = (
+        (prior.precision, prior.pull),
+        (np.pad(session.information, (0, delays)), np.pad(session.right, (0, delays))),
+    )
+    shown = InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)
+    return shown.without_delays(prior.precision[own, own], prior.pull[own])
