@@ -302,7 +302,7 @@ def test_forces_of_one_of_two_trials_are_late(trial):
     sound, late = fit_of(0, 0), fit_of(0, 1)
     frame_s = trial.time[1] - trial.time[0]
     for fit, expected in ((sound, 0.0), (late, frame_s)):
-        (first, first_sd), (second, second_sd) = fit.result.delays_s
+        (first, _), (second, second_sd) = fit.result.delays_s
         assert first == pytest.approx(0.0, abs=0.0002)
         assert second == pytest.approx(expected, abs=3.0 * second_sd)
         assert second_sd < 0.001
