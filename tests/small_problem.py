@@ -32,7 +32,8 @@ KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow",
 PLATES = {name: SoundOrFaulty.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
 FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3), "turn": SoundOrFaulty.certain(0.03)}
 CLOCK = SoundOrFaulty.certain(0.01)
-INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK)
+ZERO_N = SoundOrFaulty(2.0, 9.0, 0.2)
+INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK, ZERO_N)
 SWITCH_S = 0.1
 """When the right foot steps from one plate to another, without a flight."""
 NOISE_N = 0.7
@@ -87,7 +88,8 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
     turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
     reactions = GroundReactions(fine, wrench, at_samples, impact, None, NOISE_N)
     middles = np.array([[0.2, 0.0, 0.1], [0.9, 0.0, -0.2], [1.5, 0.0, 0.3]])
-    return FootPlates(loads, reactions, ("first", "second", "third"), at_frames, turn, middles)
+    loaded = smooth(trial.time, np.stack([trial.time > 0.1, trial.time < SWITCH_S], axis=1), 15.0)
+    return FootPlates(loads, loaded, reactions, ("first", "second", "third"), at_frames, turn, middles)
 
 
 def small_problem(n_trials: int = 1) -> MapProblem:
@@ -112,6 +114,7 @@ def curved_problem(path: Path) -> MapProblem:
     time, motion = smooth_motion(skeleton, 13, 50.0)
     rng = np.random.default_rng(0)
     markers = skeleton.marker_positions(skeleton.pose(motion.q))
+    upward = 400.0 * np.isin(np.arange(12), [1, 7])
     observation = Observation(
         time=time,
         markers=markers + rng.normal(0.0, 0.01, markers.shape),
@@ -120,7 +123,7 @@ def curved_problem(path: Path) -> MapProblem:
         q=motion.q,
         spacing_s=0.1,
         dynamic=np.arange(13) > 1,
-        ground=FootPlates.one_per_foot(smooth(time, rng.normal(0.0, 50.0, (13, 12)), 15.0), 13),
+        ground=FootPlates.one_per_foot(smooth(time, rng.normal(upward, 50.0, (13, 12)), 15.0), 13),
         force_sd=6.0,
         moment_sd=2.0,
         skin=small_skin(skeleton, 13),
@@ -157,7 +160,13 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     values = dict(zip(problem.plates, of_plates, strict=True))
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
     x, z, gain, free_moment = np.moveaxis(here, -1, 0)
+    zeros = iter(static[layout.zeros].reshape(-1, 2))
+    own_zeros = [np.array([next(zeros) for _ in each.ground.plates]) for each in problem.trials][k]
+    zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.carrier], -1, 0)
     middle = trial.ground.middles[trial.ground.carrier]
+    zero = np.stack([zero_x, np.zeros_like(x), zero_z], axis=-1) @ trial.ground.turn.T
+    zero *= trial.ground.loaded(trial.time + static[layout.late(k)].sum())[..., None]
+    loads -= np.concatenate([zero, np.cross(middle, zero)], axis=-1)
     back = Rotation.from_rotvec([0.0, -angle, 0.0]).as_matrix()
     about = (loads[..., 3:] - np.cross(middle, loads[..., :3])) @ back.T
     loads[..., :3] = loads[..., :3] @ back.T

@@ -76,6 +76,11 @@ class GroundReactions:
         """RMS length of the impact's force."""
         return rms_length(self.impact[..., :3].sum(axis=1))
 
+    @property
+    def loaded(self) -> np.ndarray:
+        """(k, 2) 1 where somebody stands, else 0."""
+        return (self.wrench[..., 1] > LOAD_THRESHOLD_N).astype(float)
+
     @cached_property
     def point(self) -> np.ndarray:
         """(k, 2, 3) m: centres of pressure, held where there is next to no load."""
@@ -122,6 +127,10 @@ class GroundReactions:
     def impact_at(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) `impact` at the samples nearest to these times."""
         return self.impact[nearest_samples(self.time, time)]
+
+    def loaded_at(self, time: np.ndarray) -> np.ndarray:
+        """(n, 2) `loaded` at the samples nearest to these times."""
+        return self.loaded[nearest_samples(self.time, time)]
 
 
 def measured_reactions(kinematics: Kinematics) -> GroundReactions:

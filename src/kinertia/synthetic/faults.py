@@ -24,7 +24,7 @@ from kinertia.settings import Instruments
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
 from kinertia.synthetic.skin_clusters import ClusterMotion
 from kinertia.synthetic.walk import SyntheticTrial
-from kinertia.trial.data import FootLoads, Markers, Trial
+from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads, Markers, Trial
 
 CAMERA_SD_M = 0.0005
 LINEAR_SHARE = {"artefact": 1.0, "mixed": 2.0 / 3.0, "clusters": 0.0}
@@ -130,14 +130,15 @@ def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
 
 @dataclass(frozen=True, eq=False)
 class _Instruments:
-    """Plates and clock of a laboratory: how late forces are, and per foot's plate its offset (2, 3) m, gain (2, 1), and
-    crosstalk (2,) to the free moment; both are turned about the vertical.
+    """Plates and clock of a laboratory: how late forces are, and per foot's plate its offset (2, 3) m, gain (2, 1),
+    crosstalk (2,) to the free moment, and zero (2, 3) N; both are turned about the vertical.
     """
 
     late_s: float
     offset_m: np.ndarray
     gain: np.ndarray
     free_moment: np.ndarray
+    zero_n: np.ndarray
     turn_rad: float = 0.0
 
     @classmethod
@@ -147,7 +148,8 @@ class _Instruments:
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         late_s = prior.clock_s.draw(rng)
-        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], prior.floor["turn"].draw(rng))
+        zero = np.array([[prior.zero_n.draw(rng), 0.0, prior.zero_n.draw(rng)] for _ in range(2)])
+        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], zero, prior.floor["turn"].draw(rng))
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:
@@ -155,7 +157,7 @@ class _Instruments:
         if not (faults.gain or faults.plate_m or faults.late_s):
             return None
         offset = np.array([[0.0, 0.0, 0.0], [faults.plate_m, 0.0, 0.0]])
-        return cls(faults.late_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2))
+        return cls(faults.late_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2), np.zeros((2, 3)))
 
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """What they make of true loads (n, 2, 6)."""
@@ -164,6 +166,8 @@ class _Instruments:
         wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
         wrong *= self.gain
         wrong[..., 4] += self.free_moment * wrong[..., 1]
+        push = np.concatenate([self.zero_n, np.cross(middles, self.zero_n)], axis=-1)
+        wrong += (wrong[..., 1:2] > LOAD_THRESHOLD_N) * push
         return wrong
 
 

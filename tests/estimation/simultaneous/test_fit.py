@@ -19,6 +19,7 @@ from kinertia.report.files import save_fit
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from synthetic_walks import kinematics_of
 
 
@@ -225,6 +226,45 @@ def test_a_wrong_gain_is_named(trial):
     outcome = fitted(trial, disturb=weaken)
     assert any(w.startswith("plate right foot: gain: +") and "check the instruments" in w for w in outcome.warnings)
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_horizontal_zero_is_named_and_put_right(trial, plain, axis):
+    """No place, gain or clock is to blame for it."""
+
+    def push(positions, loads):
+        force = np.zeros((len(loads), 3))
+        force[loads[:, 1, 1] > 20.0, axis] = 8.0
+        point = centre_of_pressure(loads[:, 1])
+        loads[:, 1] += np.concatenate([force, np.cross(point, force)], axis=1)
+
+    outcome = fitted(trial, disturb=push)
+    entry = outcome.posterior.calibration[f"plate left foot: zero {'xyz'[axis]}"]
+    assert entry["value"] == pytest.approx(8.0, abs=3.0 * entry["sd"])
+    assert entry["sd"] < 1.5
+    (warning,) = outcome.warnings
+    assert warning.startswith(f"plate left foot: zero {'xyz'[axis]}: +")
+    expected, found = (fit.foot_loads[0][10:-10, 1, axis] for fit in (plain, outcome))
+    assert np.abs(found.mean() - expected.mean()) < 2.0
+
+
+def test_zeros_of_a_plate_that_two_trials_share_are_each_trial_s_own(trial):
+    """An amplifier drifts from one to the next; the plate stays where it is."""
+    kinematics = []
+    for seed, zero_n in enumerate((0.0, -8.0)):
+        positions = camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions
+        loads = trial.foot_loads.copy()
+        force = np.where(loads[:, 1, 1:2] > 20.0, [zero_n, 0.0, 0.0], 0.0)
+        loads[:, 1] += np.concatenate([force, np.cross(centre_of_pressure(loads[:, 1]), force)], axis=1)
+        one = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
+        kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
+    with threadpool_limits(1, user_api="blas"):
+        outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
+    calibration = outcome.posterior.calibration
+    own = [calibration[f"plate left foot (walk {k}): zero x"] for k in range(2)]
+    assert own[0]["value"] == pytest.approx(0.0, abs=1.0)
+    assert own[1]["value"] == pytest.approx(-8.0, abs=3.0 * own[1]["sd"])
+    assert abs(calibration["plate left foot: x"]["value"]) < 0.002
 
 
 def test_a_free_moment_that_is_not_there_is_named(trial):

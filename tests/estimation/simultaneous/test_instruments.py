@@ -52,13 +52,13 @@ def test_plates_that_are_not_there_are_marginalised(plates):
     np.testing.assert_allclose(own @ narrow.right, mean[kept], rtol=1e-6, atol=1e-12)
 
 
-def test_delays_are_marginalised():
+def test_what_trials_have_of_their_own_is_marginalised():
     """Against the dense posterior of everything."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(10, 10))
     whole = InstrumentInformation(("a",), root @ root.T, rng.normal(size=10))
     precision, pull = np.diag([2.0, 3.0]), np.array([0.5, -1.0])
-    without = whole.without_delays(precision, pull)
+    without = whole.without_own(precision, pull)
     before = np.diag([*[1.0] * 8, 2.0, 3.0])
     covariance = np.linalg.inv(whole.information + before)
     own = np.linalg.inv(without.information + np.eye(8))
@@ -108,7 +108,7 @@ def test_the_session_counts_in_the_normal_equations():
     session = shown(problem.plates)
     calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(session, session)))
     with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials)
-    places, static = problem.layout.instruments, problem.start_static.copy()
+    places, static = problem.layout.laboratory, problem.start_static.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
     (before, right_before, cost_before), (information, right, cost) = (
         each.prior_terms(static) for each in (problem, with_session)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
 from kinertia.estimation.simultaneous.unlike import unlikeness
@@ -26,6 +27,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.trial.plate_names import plate_of_trial
 
 _STAYING_SD_M = 1e-4
 """At least, of markers that stay where a model has them."""
@@ -220,6 +222,13 @@ def _calibration(
     for trial, (later, later_sd) in zip(trials, result.delays_s, strict=False):
         entry = {"value": later, "prior_sd": known.delay_s.sd, "sd": later_sd}
         calibration[f"clock of {trial}: forces later than in the other trials by"] = {**entry, "unit": "s"}
+    trials_of = Counter(plate for zeros in result.zeros_n for plate in zeros)
+    for trial, zeros in zip(trials, result.zeros_n, strict=True):
+        for plate, (values, sds) in zeros.items():
+            name = plate if trials_of[plate] == 1 else plate_of_trial(plate, trial)
+            for (unknown, unit), value, deviation in zip(ZERO_UNKNOWNS.items(), values, sds, strict=True):
+                entry = {"value": float(value), "prior_sd": known.zero_n.sd, "sd": float(deviation)}
+                calibration[f"plate {name.removeprefix('plate ')}: {unknown}"] = {**entry, "unit": unit}
     return calibration
 
 

@@ -16,6 +16,7 @@ SHOWN_UNIT = {
     "m": (1e3, "mm"),
     "s": (1e3, "ms"),
     "1": (1e2, "%"),
+    "N": (1.0, "N"),
     "rad": (180.0 / np.pi, "degrees"),
     "N m/N": (1e3, "N m/kN"),
 }

@@ -39,6 +39,9 @@ FLOOR_PRIOR = MappingProxyType(
 half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
 """Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""
+ZERO_PRIOR_N = SoundOrFaulty(1.0, 10.0, FAULTY_SHARE)
+"""Of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N; under people
+who stand still, two plates together read 2 N."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,7 @@ class InstrumentInformation:
         information: (k, k) of normal equations in m, 1, N m/N, rad and s.
         right: (k,) their right-hand side: information times the values that these trials show.
 
-    >>> shown = InstrumentInformation(("left",), np.diag([1e6, 1e6, 1e4, 1e6, 1e6, 1e6, 1e4, 1e8]), np.zeros(8))
+    >>> shown = InstrumentInformation(("left",), np.eye(8), np.zeros(8))
     >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
     (12, 12)
     """
@@ -79,9 +82,9 @@ class InstrumentInformation:
         kept = vectors[:, values > 0.0]
         return cls(tuple(plates), information, scale * (kept @ (kept.T @ (right / scale))))
 
-    def without_delays(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
-        """The same without the delays of t trials, which stand behind everything else, where this much was known of
-        them before: (t, t), (t,).
+    def without_own(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
+        """The same without the t unknowns that trials have of their own, which stand behind everything else, where this
+        much was known of them before: (t, t), (t,).
         """
         size = len(self.right) - len(pull)
         across = self.information[:size, size:]
@@ -123,6 +126,7 @@ class InstrumentPrior:
         plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
         floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
         clock_s: prior of the time between forces and markers.
+        zero_n: prior of the zeros of each plate's horizontal forces in each trial.
         session: what other people have shown, measured with the same instruments.
 
     >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
@@ -133,6 +137,7 @@ class InstrumentPrior:
     plate: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: PLATE_PRIOR)
     floor: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: FLOOR_PRIOR)
     clock_s: SoundOrFaulty = CLOCK_PRIOR_S
+    zero_n: SoundOrFaulty = ZERO_PRIOR_N
     session: tuple[InstrumentInformation, ...] = ()
 
     @classmethod
@@ -157,8 +162,8 @@ class InstrumentPrior:
             result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
         return result
 
-    def of_unknowns(self, plates: Sequence[str], n_delays: int = 0) -> ErrorPriors:
-        """Priors of all plates' unknowns, the floor's, the clock's, and the delays of so many trials.
+    def of_unknowns(self, plates: Sequence[str], n_delays: int = 0, n_zeros: int = 0) -> ErrorPriors:
+        """Priors of all plates' unknowns, the floor's, the clock's, and so many delays and zeros of single trials.
 
         Columns of the same name in the force files of several trials are plates of their own, but mostly the same one:
         what a fault of theirs has in common has a prior, too.
@@ -172,7 +177,8 @@ class InstrumentPrior:
             if (places := [len(names) * plate + k for plate in column]) and prior.faulty_share > 0.0
         ]
         floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
-        return ErrorPriors((*own, *floor, self.clock_s, *[self.delay_s] * n_delays), tuple(common))
+        of_trials = [self.delay_s] * n_delays + [self.zero_n] * n_zeros
+        return ErrorPriors((*own, *floor, self.clock_s, *of_trials), tuple(common))
 
     @property
     def delay_s(self) -> SoundOrFaulty:

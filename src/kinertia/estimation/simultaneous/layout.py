@@ -2,37 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, ZERO_UNKNOWNS
 
 
 @dataclass(frozen=True)
 class Layout:
     """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's. Of several
-    trials each has a delay of its own besides the clock's; a single one has none.
+    trials each has a delay of its own besides the clock's; a single one has none. Zeros are those of each trial's
+    plates.
     """
 
     theta: slice
     plates: slice
     clock: int
     delays: slice
+    zeros: slice
     coordinates: slice
     locals: slice
     skin: slice
+    plates_of_trials: tuple[int, ...]
 
     @classmethod
-    def of(cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int, n_trials: int, n_skin: int) -> Layout:
-        """The layout for these numbers of unknowns."""
+    def of(
+        cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int, plates_of_trials: Sequence[int], n_skin: int
+    ) -> Layout:
+        """The layout for these numbers of unknowns; of trials, how many plates each has."""
         n_instruments = len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS)
-        counts = [n_bsp, n_instruments, 1, n_trials if n_trials > 1 else 0, n_coordinates, 3 * n_markers, n_skin]
+        n_delays = len(plates_of_trials) if len(plates_of_trials) > 1 else 0
+        n_zeros = len(ZERO_UNKNOWNS) * sum(plates_of_trials)
+        counts = [n_bsp, n_instruments, 1, n_delays, n_zeros, n_coordinates, 3 * n_markers, n_skin]
         ends = np.cumsum(counts).tolist()
-        theta, plates, clock, delays, coordinates, places, skin = (
+        theta, plates, clock, delays, zeros, coordinates, places, skin = (
             slice(end - count, end) for end, count in zip(ends, counts, strict=True)
         )
-        return cls(theta, plates, clock.start, delays, coordinates, places, skin)
+        return cls(theta, plates, clock.start, delays, zeros, coordinates, places, skin, tuple(plates_of_trials))
 
     @property
     def laboratory(self) -> slice:
@@ -41,12 +49,18 @@ class Layout:
 
     @property
     def instruments(self) -> slice:
-        """The same, and the delays of single trials."""
-        return slice(self.plates.start, self.delays.stop)
+        """The same, and what each trial has of its own: a delay, and its plates' zeros."""
+        return slice(self.plates.start, self.zeros.stop)
 
     def late(self, trial: int) -> list[int]:
         """Which unknowns add up to the time by which the forces of a trial are late."""
         return [self.clock, *range(self.delays.start, self.delays.stop)[trial : trial + 1]]
+
+    def zeros_of(self, trial: int) -> np.ndarray:
+        """(q, 2) where the zeros of the q plates of a trial stand."""
+        each = len(ZERO_UNKNOWNS)
+        first = self.zeros.start + each * sum(self.plates_of_trials[:trial])
+        return np.arange(first, first + each * self.plates_of_trials[trial]).reshape(-1, each)
 
     @property
     def in_root(self) -> slice:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.problem import MapProblem, by_body
-from kinertia.model.log_cholesky import dynamic_jacobian
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
@@ -64,6 +64,7 @@ def moment_derivatives(
     (d, axes), chain = tau.shape, dynamic_jacobian(static[layout.theta])
     time = trial.time[frames]
     loads, rates, fast = reactions.at(time), reactions.rate(time), reactions.impact_at(time)
+    loaded = reactions.loaded_at(time)
     pose = skeleton.pose(q)
     rows = [skeleton.segments.index(segment) for segment in problem.segments]
     by_static, impact = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
@@ -74,15 +75,15 @@ def moment_derivatives(
     for foot, name in enumerate(skeleton.feet):
         moves = skeleton.support[skeleton.segments.index(name)]
         jacobian = pose.axes * moves[:, None]
-        only = np.where(np.arange(2)[:, None] == foot, loads, 0.0)
+        only, standing = (np.where(np.arange(2)[:, None] == foot, each, 0.0) for each in (loads, loaded[..., None]))
         ground = problem.grounds[k]
-        by_plate = ground.by_plate(only, ground.carrier[frames], problem.plate_values(static))
-        by_plate = by_plate @ problem.to_plates
-        by_static[:, :, layout.plates] -= jacobian @ by_plate
-        by_static[:, :, layout.late(k)] -= jacobian @ rates[:, foot, :, None]
+        by_load = np.zeros((d, 6, layout.in_root.stop))
+        by_plates = ground.by_plate(only, standing[..., 0], ground.carrier[frames], problem.plates_in(k, static))
+        problem.add_by_plates(k, by_load, by_plates)
+        by_load[:, :, layout.late(k)] = rates[:, foot, :, None]
+        by_static[:, :, layout.instruments] -= jacobian @ by_load[:, :, layout.instruments]
         tau -= (jacobian @ loads[:, foot, :, None])[..., 0]
-        by_ground[:, foot, :, layout.plates] = by_plate[:, :3]
-        by_ground[:, foot][..., layout.late(k)] = rates[:, foot, :3, None]
+        by_ground[:, foot] = by_load[:, :3]
         impact -= (jacobian @ fast[:, foot, :, None])[..., 0]
         dq -= _load_derivative(pose, moves, loads[:, foot])
     by_q, by_qd, by_qdd = (

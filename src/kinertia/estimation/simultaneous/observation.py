@@ -30,6 +30,7 @@ from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
+from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.data import nearest_samples, within
 
@@ -229,6 +230,7 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cu
     places = places.reshape(-1, 2)
     return FootPlates(
         kinematics.smoothed_loads(cutoff_hz),
+        smooth(reactions.time, reactions.loaded, cutoff_hz),
         replace(reactions, carrier=places[len(time) :]),
         tuple(loads.plates[i] for i in used),
         places[: len(time)],

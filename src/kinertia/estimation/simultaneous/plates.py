@@ -1,9 +1,10 @@
 """What force plates and clock may have wrong, and the ground reactions once that is put right.
 
-Each plate may stand off its recorded place in the floor's plane, have a wrong gain, and read a vertical moment that is
-not there, in proportion to the vertical force (crosstalk of its channels); all plates may be turned about the vertical
+Each plate may stand off its recorded place in the floor's plane, have a wrong gain, read a vertical moment that is not
+there, in proportion to the vertical force (crosstalk of its channels), and have a zero of its horizontal forces that is
+off: whoever stands on it is pushed as much more, at its middle. All plates may be turned about the vertical
 against the cameras; forces may be recorded late, those of all trials or of one. The plates are the laboratory's: their
-offsets are in its axes and are shared by all trials.
+offsets are in its axes and are shared by all trials; their zeros are not.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.smoothing import SmoothedSpline
+from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
 
@@ -26,7 +27,13 @@ FLOOR_UNKNOWNS = {"x": "m", "z": "m", "turn": "rad"}
 against its axes about the vertical, each through its middle. Single plates are mounted square; the cameras' axes are
 laid out by hand."""
 PLATE_ERRORS = {**PLATE_UNKNOWNS, **FLOOR_UNKNOWNS}
-"""All that is wrong with a plate: its own and the floor's."""
+"""All that is wrong with a plate in all trials: its own and the floor's."""
+ZERO_UNKNOWNS = {"zero x": "N", "zero z": "N"}
+"""Of each plate in one trial, and its unit: what it reads too much of horizontal force while somebody stands on it.
+Amplifiers drift and are reset, so that the next trial has other zeros."""
+_PLANE = (0, 2)
+"""Axes of the floor's plane, to which places and zeros belong."""
+_TURN, *_ZEROS = (list({**PLATE_ERRORS, **ZERO_UNKNOWNS}).index(name) for name in ("turn", *ZERO_UNKNOWNS))
 _UP = np.array([0.0, 1.0, 0.0])
 _FIRM_N = 5 * LOAD_THRESHOLD_N
 
@@ -73,8 +80,8 @@ class FootPlates:
 
     Attributes:
         loads: time -> (12) force and moment about the ground origin under the right foot, then the left, of the
-        motion's
-            bandwidth: what the root equations take.
+            motion's bandwidth: what the root equations take.
+        loaded: time -> (2) whether somebody stands under the right foot, then the left, of the same bandwidth.
         reactions: what joint moments take, by the plates' clock; its `carrier` counts the same `plates`.
         plates: names.
         carrier: (n, 2) index into `plates` of the plate that each foot stands on, at the frames of the trial.
@@ -83,6 +90,7 @@ class FootPlates:
     """
 
     loads: SmoothedSpline
+    loaded: SmoothedSpline
     reactions: GroundReactions
     plates: tuple[str, ...]
     carrier: np.ndarray
@@ -97,7 +105,8 @@ class FootPlates:
         on = [np.tile([0, 1], (count, 1)) for count in (len(wrench), n_frames)]
         reactions = GroundReactions(loads.time, wrench, on[0], np.zeros_like(wrench), None)
         middles = plate_middles(FootLoads(loads.time, wrench[..., :3], wrench[..., 3:]), np.arange(2))
-        return cls(loads, reactions, ("right foot", "left foot"), on[1], np.eye(3), middles)
+        loaded = smooth(loads.time, reactions.loaded, float(np.median(loads.cutoff_hz)))
+        return cls(loads, loaded, reactions, ("right foot", "left foot"), on[1], np.eye(3), middles)
 
     def among(self, plates: Sequence[str]) -> FootPlates:
         """The same with these plates (a session's), of which its own are some."""
@@ -113,47 +122,64 @@ class FootPlates:
         Args:
             time: (n,) by the plates' clock.
             carrier: (n, 2) index of the plate under each foot.
-            plates: (p, 5) what is wrong with the plates (PLATE_ERRORS).
+            plates: (p, 7) what is wrong with the plates: PLATE_ERRORS, ZERO_UNKNOWNS.
         """
-        return self._put_right(self.loads(time, derivative).reshape(len(time), 2, 6), carrier, plates)
+        loads = self.loads(time, derivative).reshape(len(time), 2, 6)
+        return self._put_right(loads, self.loaded(time, derivative), carrier, plates)
 
     def corrected_reactions(self, plates: np.ndarray, late_s: float) -> GroundReactions:
-        """The loads for the joint moments, of plates (p, 5) put right, by the clock of the markers.
+        """The loads for the joint moments, of plates (p, 7) put right, by the clock of the markers.
 
         Args:
             plates: what is wrong with each of `self.plates`.
             late_s: by how much forces are recorded late.
         """
-        raw = self.reactions
-        wrench, impact = (self._put_right(part, raw.carrier, plates) for part in (raw.wrench, raw.impact))
+        raw, nobody = self.reactions, np.zeros(self.reactions.carrier.shape)
+        wrench, impact = (
+            self._put_right(part, loaded, raw.carrier, plates)
+            for part, loaded in ((raw.wrench, raw.loaded), (raw.impact, nobody))
+        )
         return replace(raw, time=raw.time - late_s, wrench=wrench, impact=impact)
 
-    def _put_right(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """Loads (k, 2, 6) of plates (k, 2) with errors (p, 5)."""
+    def _put_right(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """Loads (k, 2, 6), where somebody stands (k, 2), of plates (k, 2) with errors (p, 7)."""
         here = plates[carrier]
-        loads = turned_loads(loads, self.middles[carrier], -here[..., 4])
+        for zero, axis in zip(_ZEROS, _PLANE, strict=True):
+            loads = loads - (loaded * here[..., zero])[..., None] * self._push(axis, carrier)
+        loads = turned_loads(loads, self.middles[carrier], -here[..., _TURN])
         moment = loads[..., 3:] + np.cross(self._ground_offset(here), loads[..., :3])
         moment[..., 1] += here[..., 3] * loads[..., 1]
         result: np.ndarray = (1.0 + here[..., 2:3]) * np.concatenate([loads[..., :3], moment], axis=-1)
         return result
 
-    def by_plate(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """(n, 6, 5 p) derivative of the sum of corrected loads (n, 2, 6) with respect to the plates (p, 5)."""
+    def _push(self, axis: int, carrier: np.ndarray) -> np.ndarray:
+        """(k, 2, 6) load of 1 N along an axis of the laboratory at the middle of each plate."""
+        along = np.broadcast_to(self.turn[:, axis], (*carrier.shape, 3))
+        return np.concatenate([along, np.cross(self.middles[carrier], along)], axis=-1)
+
+    def by_plate(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """(n, 6, p, 7) derivative of the sum of corrected loads (n, 2, 6), where somebody stands (n, 2), by what is
+        wrong with the plates (p, 7).
+        """
         result = np.zeros((len(loads), 6, *plates.shape))
         here = plates[carrier]
         raw = loads / (1.0 + here[..., 2:3])
         turning = turning_loads(loads, self.middles[carrier] + self._ground_offset(here))
+        nobody = np.zeros(carrier.shape)
+        pushes = [self._put_right(-self._push(axis, carrier), nobody, carrier, plates) for axis in _PLANE]
         for foot in range(2):
             under = carrier[:, foot, None] == np.arange(len(plates))
-            for j, axis in enumerate((0, 2)):
+            for zero, push in zip(_ZEROS, pushes, strict=True):
+                result[..., zero] += (loaded[:, foot, None] * push[:, foot])[:, :, None] * under[:, None, :]
+            for j, axis in enumerate(_PLANE):
                 moment = np.cross(self.turn[:, axis], loads[:, foot, :3])
                 result[:, 3:, :, j] += moment[:, :, None] * under[:, None, :]
             result[..., 2] += raw[:, foot, :, None] * under[:, None, :]
             result[:, 4, :, 3] += loads[:, foot, 1, None] * under
-            result[..., 4] -= turning[:, foot, :, None] * under[:, None, :]
-        return result.reshape(len(loads), 6, plates.size)
+            result[..., _TURN] -= turning[:, foot, :, None] * under[:, None, :]
+        return result
 
     def _ground_offset(self, plates: np.ndarray) -> np.ndarray:
-        """(..., 3) m: offsets of plates (..., 5) in the trial's axes."""
+        """(..., 3) m: offsets of plates (..., 7) in the trial's axes."""
         result: np.ndarray = plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]
         return result

@@ -21,7 +21,7 @@ from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
-from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.range_terms import add_ranges
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -29,6 +29,7 @@ from kinertia.estimation.simultaneous.start_terms import add_start
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
+    by_body,
     dynamic_jacobian,
     from_log_cholesky,
     nearest_consistent,
@@ -177,7 +178,8 @@ class MapProblem:
         self.to_plates = plates_with_floor(len(self.plates))
         count = len(skeleton.markers)
         self.skin = [trial.skin or SkinPatterns.none(len(trial.time), count) for trial in trials]
-        unknowns = (len(self.still), count, len(self.plates), len(trials), self.skin[0].size)
+        self.own_plates = [[self.plates.index(name) for name in trial.ground.plates] for trial in trials]
+        unknowns = (len(self.still), count, len(self.plates), list(map(len, self.own_plates)), self.skin[0].size)
         self.layout = Layout.of(10 * len(self.segments), *unknowns)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
@@ -189,8 +191,8 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        own_delays = self.layout.delays.stop - self.layout.delays.start
-        self.instruments = calibration.instruments.of_unknowns(self.plates, own_delays)
+        counts = (part.stop - part.start for part in (self.layout.delays, self.layout.zeros))
+        self.instruments = calibration.instruments.of_unknowns(self.plates, *counts)
         self.session = calibration.instruments.of_session(self.plates)
         self.weight = 1.0 / np.square(deviation)
         self.skin_information = self.skin[0].information()
@@ -289,13 +291,13 @@ class MapProblem:
         """(6,) deviations of the root residual: N, N m."""
         return np.repeat([trial.force_sd, trial.moment_sd], 3)
 
-    def plate_values(self, static: np.ndarray) -> np.ndarray:
-        """(p, 5) what is wrong with every plate, in the order of PLATE_ERRORS."""
+    def plate_errors(self, static: np.ndarray) -> np.ndarray:
+        """(p, 5) what is wrong with every plate in all trials, in the order of PLATE_ERRORS."""
         result: np.ndarray = (self.to_plates @ static[self.layout.plates]).reshape(-1, len(PLATE_ERRORS))
         return result
 
     def plate_sd(self, covariance: np.ndarray) -> np.ndarray:
-        """(p, 5) deviations of `plate_values` for this covariance (S, S) of the static unknowns."""
+        """(p, 5) deviations of `plate_errors` for this covariance (S, S) of the static unknowns."""
         own = covariance[self.layout.plates, self.layout.plates]
         return np.sqrt(np.diag(self.to_plates @ own @ self.to_plates.T)).reshape(-1, len(PLATE_ERRORS))
 
@@ -304,11 +306,26 @@ class MapProblem:
     ) -> np.ndarray:
         """(n, 2, 6) loads on the feet at the frames of trial k, of instruments put right; or their time derivatives."""
         ground, at = self.grounds[k], self.trials[k].time[frames] + self.late_s(k, static)
-        return ground.corrected(at, ground.carrier[frames], self.plate_values(static), derivative)
+        return ground.corrected(at, ground.carrier[frames], self.plates_in(k, static), derivative)
 
     def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
         """The loads for the joint moments of trial k, of instruments put right."""
-        return self.grounds[k].corrected_reactions(self.plate_values(static), self.late_s(k, static))
+        return self.grounds[k].corrected_reactions(self.plates_in(k, static), self.late_s(k, static))
+
+    def plates_in(self, k: int, static: np.ndarray) -> np.ndarray:
+        """(p, 7) what is wrong with every plate in trial k: PLATE_ERRORS, ZERO_UNKNOWNS."""
+        zeros = np.zeros((len(self.plates), len(ZERO_UNKNOWNS)))
+        zeros[self.own_plates[k]] = static[self.layout.zeros_of(k)]
+        return np.hstack([self.plate_errors(static), zeros])
+
+    def add_by_plates(self, k: int, by_static: np.ndarray, by_plates: np.ndarray) -> None:
+        """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k to those by the static unknowns that
+        root equations depend on (n, r, s).
+        """
+        n, rows, *_ = by_plates.shape
+        errors = len(PLATE_ERRORS)
+        by_static[:, :, self.layout.plates] += by_plates[..., :errors].reshape(n, rows, -1) @ self.to_plates
+        by_static[:, :, self.layout.zeros_of(k)] += by_plates[:, :, self.own_plates[k], errors:]
 
     def late_s(self, k: int, static: np.ndarray) -> float:
         """By how much the forces of trial k are late."""
@@ -365,22 +382,13 @@ class MapProblem:
         by_static[:, :, layout.theta] = by_body(shown, dynamic_jacobian(static[layout.theta]))
         by_static[:, :, layout.coordinates] = by.q[:, :, self.still]
         ground = self.grounds[k]
-        by_plate = ground.by_plate(loads, ground.carrier[frames], self.plate_values(static)) @ self.to_plates
-        rates = self.foot_loads(k, static, 1, frames).sum(axis=1)
-        by_instrument = np.concatenate([by_plate, rates[:, :, None]], axis=2)
+        loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
+        self.add_by_plates(
+            k, by_static, -ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static))
+        )
+        by_static[:, :, layout.late(k)] = -self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
+        by_instrument = by_static[:, :, layout.instruments]
         by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
-        by_static[:, :, layout.plates] = -by_instrument[:, :, :-1]
-        by_static[:, :, layout.late(k)] = -by_instrument[:, :, -1:]
         sd = self.root_sd(trial)[:, None]
         by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by.q, by.qd, by.qdd))
         return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[:, 0])
-
-
-def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
-    """(d, r, 10 s) derivative by the body's unknowns, from a regressor (d, r, 10 s) and `chain` (s, 10, 10), the
-    derivative of each segment's parameters in it by the segment's own ten.
-    """
-    d, r, wide = regressor.shape
-    by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain
-    result: np.ndarray = by_segment.transpose(1, 0, 2).reshape(d, r, wide)
-    return result

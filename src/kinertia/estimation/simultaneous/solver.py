@@ -2,13 +2,13 @@
 
 Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
-how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate
-(`plates.PLATE_ERRORS`), the time offset of the forces, and by how much more they are late in each of several trials.
-Minimised is the sum of squares, each over its
-deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are Gaussians
-that change with what the data say of them (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives
-analytic. The normal matrix is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its
-Schur complement is the information on them, and its inverse their covariance.
+how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate in all trials
+and in each (`plates.PLATE_ERRORS`, `ZERO_UNKNOWNS`), the time offset of the forces, and by how much more they are late
+in each of several trials. Minimised is the sum of squares, each over its deviation, of: marker errors, root residuals,
+and departures from the priors. Those of the instruments are Gaussians that change with what the data say of them
+(`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives analytic. The normal matrix is block
+tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur complement is the information on
+them, and its inverse their covariance.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ class SimultaneousResult:
         plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
         clock_s: the time offset and its posterior deviation, s.
         delays_s: of several trials, how much later the forces of each are, and the posterior deviation, s.
+        zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
+            deviations (2,).
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
         reactions: per trial the loads for the joint moments, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
@@ -65,6 +67,7 @@ class SimultaneousResult:
     plates: dict[str, tuple[np.ndarray, np.ndarray]]
     clock_s: tuple[float, float]
     delays_s: tuple[tuple[float, float], ...]
+    zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
     foot_loads: tuple[np.ndarray, ...]
     reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
@@ -255,7 +258,8 @@ def _result(
     }
     markers = problem.placed(values).markers
     skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in coordinates.items()})
-    plates = zip(problem.plate_values(values), problem.plate_sd(covariance), strict=True)
+    plates = zip(problem.plate_errors(values), problem.plate_sd(covariance), strict=True)
+    zeros = [(layout.zeros_of(k), trial.ground.plates) for k, trial in enumerate(problem.trials)]
     return SimultaneousResult(
         bsp,
         chain @ covariance[layout.theta, layout.theta] @ chain.T,
@@ -264,6 +268,7 @@ def _result(
         dict(zip(problem.plates, plates, strict=True)),
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
+        tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
         tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
@@ -283,10 +288,7 @@ def _shown(
 ) -> InstrumentInformation:
     """What the trials say of the laboratory's instruments, without what was known before."""
     session, own = problem.session, slice(problem.layout.laboratory.stop - problem.layout.laboratory.start, len(mean))
-    delays = own.stop - own.start
-    before = (
-        (prior.precision, prior.pull),
-        (np.pad(session.information, (0, delays)), np.pad(session.right, (0, delays))),
-    )
+    more = (0, own.stop - own.start)
+    before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.right, more)))
     shown = InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)
-    return shown.without_delays(prior.precision[own, own], prior.pull[own])
+    return shown.without_own(prior.precision[own, own], prior.pull[own])
