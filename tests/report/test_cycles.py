@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from kinertia.estimation.cycles import cycle_curves
 from kinertia.io.norms_file import Norm
@@ -305,12 +306,13 @@ def test_curves_of_opensims_motion_are_opensims(next_to_opensim):
 
 @pytest.mark.slow
 def test_estimated_curves_are_near_opensims(next_to_opensim):
-    """The estimate is within 95 % of the usual curves; from OpenSim's it is further by what the two motions differ.
+    """The estimate is as near to the usual curves as its deviations say: all six in 95 of 100 cases (Bonferroni). From
+    OpenSim's curves it is further by what the two motions differ.
 
     OpenSim's example weighs the markers of the pelvis tenfold, which turns it by 8 degrees.
     """
     one = next_to_opensim
-    assert (along((one.estimate - one.usual) / one.sd) < 1.96).all()
+    assert (along((one.estimate - one.usual) / one.sd) < stats.norm.isf(0.025 / len(LEGS))).all()
     motion = along(one.usual - one.on_their_motion)
     assert (along(one.estimate - one.theirs) < 1.96 * along(one.sd) + motion).all()
     assert (motion < 2.0 * along(one.sd)).all(), "the share of the motion is no licence"

@@ -69,14 +69,14 @@ def measured(
 ) -> tuple[Skeleton, list[Kinematics]]:
     """The skeleton that the laboratory believes in, and the kinematics by that skeleton of all trials of one person.
 
-    Skin that goes with the joints, skeleton and instruments are the same in all trials; the study's noise is not.
-    Sizes of skin motion are those of the first.
+    Skin that goes with the joints, skeleton, plates and clock are the same in all trials; the study's noise, zeros of
+    plates and delays of single trials are not. Sizes of skin motion are those of the first.
     """
     markers, skeleton = _disturbed(trials, faults, rng), trials[0].skeleton
-    instruments = _Instruments.with_faults(faults)
+    instruments, prior = _Instruments.with_faults(faults), InstrumentPrior.stated(faults.instruments)
     if faults.calibration:
         skeleton = _misplaced(skeleton, rng)
-        instruments = _Instruments.draw(rng, InstrumentPrior.stated(faults.instruments))
+        instruments = _Instruments.draw(rng, prior)
     if faults.hips_m:
         skeleton = skeleton.lock({name: faults.hips_m for name in HIP_OFFSETS if "_x_" in name})
     if faults.axes_rad:
@@ -87,7 +87,8 @@ def measured(
         if faults.wobbling:
             loads += _wobbled(trial, faults.wobbling)
         if instruments is not None:
-            loads = instruments.read(trial.time, loads)
+            own = instruments.in_trial(rng, prior, len(trials) > 1) if faults.calibration else instruments
+            loads = own.read(trial.time, loads)
         kinematics.append(_kinematics(skeleton, trial.time, seen, loads))
     return skeleton, kinematics
 
@@ -148,8 +149,13 @@ class _Instruments:
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         late_s = prior.clock_s.draw(rng)
+        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), prior.floor["turn"].draw(rng))
+
+    def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
+        """The same with what a trial has of its own: zeros, and of several trials a delay."""
         zero = np.array([[prior.zero_n.draw(rng), 0.0, prior.zero_n.draw(rng)] for _ in range(2)])
-        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], zero, prior.floor["turn"].draw(rng))
+        later_s = prior.delay_s.draw(rng) if one_of_several else 0.0
+        return replace(self, zero_n=zero, late_s=self.late_s + later_s)
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:
