@@ -33,7 +33,7 @@ PLATES = {name: SoundOrFaulty.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0
 FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3), "turn": SoundOrFaulty.certain(0.03)}
 CLOCK = SoundOrFaulty.certain(0.01)
 ZERO_N = SoundOrFaulty(2.0, 9.0, 0.2)
-INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK, ZERO_N)
+INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK, zero_n=ZERO_N)
 SWITCH_S = 0.1
 """When the right foot steps from one plate to another, without a flight."""
 NOISE_N = 0.7

@@ -17,8 +17,8 @@ def of_subject4(measured_file, measured_recording):
     """Trials of one person with the forces of others, late by so much (s), and the labels on each segment."""
     marker_set = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
 
-    def made(late_s=0.0, **forces):
-        late = {"walking2": late_s}
+    def made(late_s=0.0, early_s=0.0, **forces):
+        late = {"walking1": -early_s, "walking2": late_s}
         return [
             trial_of_subject4(measured_recording, marker_set, name, of, late.get(name, 0.0))
             for name, of in forces.items()
@@ -32,6 +32,11 @@ def of_subject4(measured_file, measured_recording):
 def test_sound_and_late_trials(of_subject4, count, late_s):
     for some in combinations(TRIALS, count):
         assert exchanged_forces(*of_subject4(late_s, **dict(zip(some, some, strict=True)))) == []
+
+
+def test_one_late_and_the_other_early(of_subject4):
+    for late_s in (0.01, 0.015, -0.01, -0.015):
+        assert exchanged_forces(*of_subject4(late_s, late_s, walking1="walking1", walking2="walking2")) == []
 
 
 def test_exchanged_force_files(of_subject4):

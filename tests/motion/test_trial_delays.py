@@ -105,7 +105,7 @@ def test_said_by_a_fit(measured_file, measured_recording):
 
 
 def test_said_by_check(measured_file, tmp_path):
-    """Of the trial that is late, by its files."""
+    """Of the trial that is late, by its name."""
     for name in ("walking1", "walking2"):
         for end in (".trc", "_grf.mot"):
             text = measured_file(f"subject4/{name}{end}").read_text()
@@ -116,7 +116,10 @@ def test_said_by_check(measured_file, tmp_path):
                 text = f"{head}endheader\n{labels}\n" + "\n".join(late) + "\n"
             (tmp_path / f"{name}{end}").write_text(text)
     model = measured_file("subject4/addbiomechanics_scaled.osim")
-    trials = "".join(f'[[trial]]\nmarkers = "{n}.trc"\nforces = "{n}_grf.mot"\n' for n in ("walking1", "walking2"))
+    trials = "".join(
+        f'[[trial]]\nname = "{n[-1]}. walk"\nmarkers = "{n}.trc"\nforces = "{n}_grf.mot"\n'
+        for n in ("walking1", "walking2")
+    )
     (tmp_path / "subject.toml").write_text(f'[subject]\nmass_kg = 60.0\n[model]\nosim = "{model.as_posix()}"\n{trials}')
     shown = " ".join(run("check", tmp_path / "subject.toml").out.split())
-    assert shown.count("caution: the forces of walking2 (+26 and +23 ms) come 20 ms later than those of walking1") == 1
+    assert shown.count("caution: the forces of 2. walk (+26 and +23 ms) come 20 ms later than those of 1. walk") == 1

@@ -34,7 +34,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     exact = SoundOrFaulty.certain(1e-9)
     known = calibration.instruments
     plate, floor = (dict.fromkeys(names, exact) for names in (known.plate, known.floor))
-    calibration = replace(calibration, instruments=InstrumentPrior(plate, floor, exact, exact))
+    calibration = replace(calibration, instruments=InstrumentPrior(plate, floor, exact, exact, exact))
     own = Information(
         MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white]),
         np.ones((1, 1)),

@@ -29,7 +29,7 @@ from kinertia.trial.marker_quality import travel
 
 @dataclass(frozen=True)
 class RecordingFiles:
-    """The files of one recording, and the window that the user vouches for."""
+    """The files of one recording, the window that the user vouches for, and what the trial is called."""
 
     markers: Path
     forces: Path | None = None
@@ -37,6 +37,7 @@ class RecordingFiles:
     window_s: tuple[float, float] | None = None
     length_unit: str | None = None
     belt_speed_m_s: float | tuple[float, float] | Path | None = None
+    name: str | None = None
 
     @property
     def title(self) -> str:
@@ -71,7 +72,13 @@ def files_of_subject(subject: SubjectFile) -> PersonFiles:
     named = subject.model.markers
     trials = [
         RecordingFiles(
-            trial.markers, trial.forces, trial.loads, trial.window_s, trial.length_unit, trial.belt_speed_m_s
+            trial.markers,
+            trial.forces,
+            trial.loads,
+            trial.window_s,
+            trial.length_unit,
+            trial.belt_speed_m_s,
+            trial.name,
         )
         for trial in subject.trials
     ]
@@ -187,7 +194,8 @@ def _read(
         progress(k / len(wanted))
         try:
             recording = read_recording(one.markers, one.forces, one.loads, one.length_unit)
-            recordings.append((one, replace(recording, belt=read_belt(one.belt_speed_m_s))))
+            name = one.name or recording.name
+            recordings.append((one, replace(recording, name=name, belt=read_belt(one.belt_speed_m_s))))
         except KinertiaError as error:
             mistakes.append(str(error))
     return recordings, mistakes

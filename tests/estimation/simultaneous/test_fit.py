@@ -357,6 +357,31 @@ def test_forces_of_one_of_two_trials_are_late(trial):
         assert abs(shown.right[-1] / shown.information[-1, -1]) < 0.001
 
 
+@pytest.mark.slow
+def test_the_only_trial_of_a_person_is_one_of_several_of_the_session(trial):
+    """Late by two frames, where others of the session were on time: the delay is its own, not the clock's."""
+
+    def fit_of(seed, late=0, session=()):
+        positions = camera_noise(trial.markers, 0.004, np.random.default_rng(seed)).positions
+        loads = np.roll(trial.foot_loads, late, axis=0)
+        instruments = replace(GAIT27_UNCERTAINTY.instruments, session=session)
+        kinematics = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
+        with threadpool_limits(1, user_api="blas"):
+            return fit_simultaneous(
+                trial.skeleton,
+                literature_prior(walking_subject().literature),
+                [kinematics],
+                uncertainty=replace(GAIT27_UNCERTAINTY, instruments=instruments),
+            )
+
+    others = tuple(fit_of(seed).result.instruments for seed in (1, 2))
+    late = fit_of(0, 2, others)
+    ((value, sd),) = late.result.delays_s
+    assert value == pytest.approx(2 * (trial.time[1] - trial.time[0]), abs=3.0 * sd)
+    assert late.result.clock_s[0] == pytest.approx(0.0, abs=0.001)
+    assert fit_of(0).result.delays_s == ()
+
+
 def test_files_of_a_simultaneous_fit(measured, tmp_path):
     folder = save_fit(measured, tmp_path / "out")
     bsp = pd.read_csv(folder / "bsp.csv")

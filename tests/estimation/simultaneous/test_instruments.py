@@ -67,11 +67,20 @@ def test_what_trials_have_of_their_own_is_marginalised():
     np.testing.assert_allclose(own @ without.right, mean[:8])
 
 
-def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own():
-    priors = InstrumentPrior().of_unknowns(("plate 1",), 3).own
-    clock, *delays = priors[-4:]
-    assert (clock.sound_sd, clock.faulty_sd) == (0.0003, 0.010)
-    assert all((one.sound_sd, one.faulty_sd) == (pytest.approx(0.00003), 0.010) for one in delays)
+@pytest.mark.parametrize("clock_sd_ms", [None, 1.0, 10.0])
+def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own(clock_sd_ms):
+    """Whoever has tested the clock has not tested every trial."""
+    prior = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
+    clock, *delays = prior.of_unknowns(("plate 1",), 3).own[-4:]
+    assert clock.sound_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
+    assert all((one.sound_sd, one.faulty_sd, one.faulty_share) == (0.00003, 0.010, 0.05) for one in delays)
+
+
+def test_what_is_left_without_the_trials_own_says_nothing_negative():
+    information = np.diag([*[1.0] * 8, 2.0])
+    information[0, 8] = information[8, 0] = 1.2
+    left = InstrumentInformation(("a",), information, np.ones(9)).without_own(np.array([[-1.0]]), np.zeros(1))
+    assert np.linalg.eigvalsh(left.information).min() > -1e-12
 
 
 def test_what_the_laboratory_states_replaces_the_literature():

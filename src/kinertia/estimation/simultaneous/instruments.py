@@ -39,6 +39,9 @@ FLOOR_PRIOR = MappingProxyType(
 half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
 """Recorded by one system: half a sample of the plates; by two: a camera frame (no source)."""
+DELAY_PRIOR_S = SoundOrFaulty(0.00003, 0.010, FAULTY_SHARE)
+"""Of one trial among several, besides the clock's: cameras and plates that start together do so in every trial (no
+source). Who has tested the clock has not tested every trial."""
 ZERO_PRIOR_N = SoundOrFaulty(1.0, 10.0, FAULTY_SHARE)
 """Of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N; under people
 who stand still, two plates together read 2 N."""
@@ -74,13 +77,7 @@ class InstrumentInformation:
         after = np.linalg.inv(covariance)
         information = after - sum(each for each, _ in before)
         right = after @ mean - sum(each for _, each in before)
-        # rounding, and what one Gaussian cannot say of two components, may leave directions below zero
-        scale = np.sqrt(np.diag(after))
-        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        scaled = vectors[:, values > 0.0] * scale[:, None]
-        information = scaled * values[values > 0.0] @ scaled.T
-        kept = vectors[:, values > 0.0]
-        return cls(tuple(plates), information, scale * (kept @ (kept.T @ (right / scale))))
+        return cls(tuple(plates), *_never_negative(information, right, np.sqrt(np.diag(after))))
 
     def without_own(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
         """The same without the t unknowns that trials have of their own, which stand behind everything else, where this
@@ -90,10 +87,10 @@ class InstrumentInformation:
         across = self.information[:size, size:]
         own = self.information[size:, size:] + precision
         through = np.linalg.solve(own, np.column_stack([across.T, self.right[size:] + pull]))
+        information = self.information[:size, :size] - across @ through[:, :-1]
+        scale = np.sqrt(np.maximum(np.diag(self.information)[:size], np.finfo(float).tiny))
         return InstrumentInformation(
-            self.plates,
-            self.information[:size, :size] - across @ through[:, :-1],
-            self.right[:size] - across @ through[:, -1],
+            self.plates, *_never_negative(information, self.right[:size] - across @ through[:, -1], scale)
         )
 
     def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
@@ -118,6 +115,16 @@ class InstrumentInformation:
         )
 
 
+def _never_negative(information: np.ndarray, right: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same without directions in which the information, over its scale, is below zero: rounding, and what one
+    Gaussian cannot say of two components, may leave such.
+    """
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = vectors[:, values > 0.0]
+    scaled = kept * scale[:, None]
+    return scaled * values[values > 0.0] @ scaled.T, scale * (kept @ (kept.T @ (right / scale)))
+
+
 @dataclass(frozen=True, eq=False)
 class InstrumentPrior:
     """What is known of plates and clock before a person's trials are looked at.
@@ -126,6 +133,7 @@ class InstrumentPrior:
         plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
         floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
         clock_s: prior of the time between forces and markers.
+        delay_s: prior of how much later than by the clock of all the forces of one of several trials are.
         zero_n: prior of the zeros of each plate's horizontal forces in each trial.
         session: what other people have shown, measured with the same instruments.
 
@@ -137,6 +145,7 @@ class InstrumentPrior:
     plate: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: PLATE_PRIOR)
     floor: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: FLOOR_PRIOR)
     clock_s: SoundOrFaulty = CLOCK_PRIOR_S
+    delay_s: SoundOrFaulty = DELAY_PRIOR_S
     zero_n: SoundOrFaulty = ZERO_PRIOR_N
     session: tuple[InstrumentInformation, ...] = ()
 
@@ -180,11 +189,6 @@ class InstrumentPrior:
         of_trials = [self.delay_s] * n_delays + [self.zero_n] * n_zeros
         return ErrorPriors((*own, *floor, self.clock_s, *of_trials), tuple(common))
 
-    @property
-    def delay_s(self) -> SoundOrFaulty:
-        """Prior of how much later than by the clock of all the forces of one of several trials are."""
-        return replace(self.clock_s, sound_sd=_HARDLY * self.clock_s.sound_sd)
-
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """What the others have shown of these plates, all together."""
         size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
@@ -197,8 +201,7 @@ class InstrumentPrior:
 
 
 _HARDLY = 0.1
-"""Columns of sound plates have hardly anything in common that they do not have with all plates, and trials that began
-as they should hardly a delay of their own."""
+"""Columns of sound plates have hardly anything in common that they do not have with all plates."""
 _PLACE = ("x", "z")
 _NO_FLOOR_MM = 0.1
 """Deviation of the floor's place where that of the plates has been checked against the cameras."""

@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 @dataclass(frozen=True)
 class Layout:
     """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's. Of several
-    trials each has a delay of its own besides the clock's; a single one has none. Zeros are those of each trial's
+    trials each has a delay of its own besides the clock's. Zeros are those of each trial's
     plates.
     """
 
@@ -29,11 +29,17 @@ class Layout:
 
     @classmethod
     def of(
-        cls, n_bsp: int, n_coordinates: int, n_markers: int, n_plates: int, plates_of_trials: Sequence[int], n_skin: int
+        cls,
+        n_bsp: int,
+        n_coordinates: int,
+        n_markers: int,
+        n_plates: int,
+        n_delays: int,
+        plates_of_trials: Sequence[int],
+        n_skin: int,
     ) -> Layout:
         """The layout for these numbers of unknowns; of trials, how many plates each has."""
         n_instruments = len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS)
-        n_delays = len(plates_of_trials) if len(plates_of_trials) > 1 else 0
         n_zeros = len(ZERO_UNKNOWNS) * sum(plates_of_trials)
         counts = [n_bsp, n_instruments, 1, n_delays, n_zeros, n_coordinates, 3 * n_markers, n_skin]
         ends = np.cumsum(counts).tolist()

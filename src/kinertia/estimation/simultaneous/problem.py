@@ -179,7 +179,10 @@ class MapProblem:
         count = len(skeleton.markers)
         self.skin = [trial.skin or SkinPatterns.none(len(trial.time), count) for trial in trials]
         self.own_plates = [[self.plates.index(name) for name in trial.ground.plates] for trial in trials]
-        unknowns = (len(self.still), count, len(self.plates), list(map(len, self.own_plates)), self.skin[0].size)
+        # one trial of a session is one of several
+        n_delays = len(trials) if len(trials) > 1 or calibration.instruments.session else 0
+        plates_of_trials = list(map(len, self.own_plates))
+        unknowns = (len(self.still), count, len(self.plates), n_delays, plates_of_trials, self.skin[0].size)
         self.layout = Layout.of(10 * len(self.segments), *unknowns)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)

@@ -46,7 +46,7 @@ def which_plate_warnings(
                 f"which of the plates is off along {axis} these trials hardly tell: they know to "
                 f"{1e3 * apart_m:.1f} mm that plates differ, and to {1e3 * each_m:.1f} mm only where all of them "
                 "stand; a walk in the other direction, fitted with these, tells, or a check of the plates' places "
-                "([instruments] plate_sd_mm)"
+                "([instruments] plate_sd_mm), and whether horizontal zeros of several plates are off instead"
             )
     return sentences
 
