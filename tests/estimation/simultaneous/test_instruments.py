@@ -113,7 +113,7 @@ def test_columns_of_the_same_name_have_faults_in_common():
 
 def test_the_session_counts_in_the_normal_equations():
     """Cost, right-hand side and information go together: by finite differences."""
-    problem = small_problem()
+    problem = small_problem(2)
     session = shown(problem.plates)
     calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(session, session)))
     with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials)
