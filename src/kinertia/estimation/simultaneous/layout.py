@@ -13,8 +13,7 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 @dataclass(frozen=True)
 class Layout:
     """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's. Of several
-    trials each has a delay of its own besides the clock's. Zeros are those of each trial's
-    plates.
+    trials each has a delay of its own besides the clock's. Zeros are those of each trial's plates.
     """
 
     theta: slice

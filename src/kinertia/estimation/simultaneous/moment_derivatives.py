@@ -64,7 +64,8 @@ def moment_derivatives(
     (d, axes), chain = tau.shape, dynamic_jacobian(static[layout.theta])
     time = trial.time[frames]
     loads, rates, fast = reactions.at(time), reactions.rate(time), reactions.impact_at(time)
-    loaded = reactions.loaded_at(time)
+    ground = problem.grounds[k]
+    by_plate = ground.by_plate(loads, reactions.loaded_at(time), ground.carrier[frames], problem.plates_in(k, static))
     pose = skeleton.pose(q)
     rows = [skeleton.segments.index(segment) for segment in problem.segments]
     by_static, impact = np.zeros((d, axes, layout.in_root.stop)), np.zeros((d, axes))
@@ -75,11 +76,8 @@ def moment_derivatives(
     for foot, name in enumerate(skeleton.feet):
         moves = skeleton.support[skeleton.segments.index(name)]
         jacobian = pose.axes * moves[:, None]
-        only, standing = (np.where(np.arange(2)[:, None] == foot, each, 0.0) for each in (loads, loaded[..., None]))
-        ground = problem.grounds[k]
         by_load = np.zeros((d, 6, layout.in_root.stop))
-        by_plates = ground.by_plate(only, standing[..., 0], ground.carrier[frames], problem.plates_in(k, static))
-        problem.add_by_plates(k, by_load, by_plates)
+        problem.add_by_plates(k, by_load, by_plate[:, foot])
         by_load[:, :, layout.late(k)] = rates[:, foot, :, None]
         by_static[:, :, layout.instruments] -= jacobian @ by_load[:, :, layout.instruments]
         tau -= (jacobian @ loads[:, foot, :, None])[..., 0]

@@ -2,9 +2,9 @@
 
 Each plate may stand off its recorded place in the floor's plane, have a wrong gain, read a vertical moment that is not
 there, in proportion to the vertical force (crosstalk of its channels), and have a zero of its horizontal forces that is
-off: whoever stands on it is pushed as much more, at its middle. All plates may be turned about the vertical
-against the cameras; forces may be recorded late, those of all trials or of one. The plates are the laboratory's: their
-offsets are in its axes and are shared by all trials; their zeros are not.
+off: whoever stands on it is pushed as much more, at its middle. All plates may be turned about the vertical against the
+cameras; forces may be recorded late, those of all trials or of one. The plates are the laboratory's: their offsets are
+in its axes and are shared by all trials; their zeros are not.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class FootPlates:
             plates: (p, 7) what is wrong with the plates: PLATE_ERRORS, ZERO_UNKNOWNS.
         """
         loads = self.loads(time, derivative).reshape(len(time), 2, 6)
-        return self._put_right(loads, self.loaded(time, derivative), carrier, plates)
+        return self._put_right(self._zeroed(loads, self.loaded(time, derivative), carrier, plates), carrier, plates)
 
     def corrected_reactions(self, plates: np.ndarray, late_s: float) -> GroundReactions:
         """The loads for the joint moments, of plates (p, 7) put right, by the clock of the markers.
@@ -134,18 +134,20 @@ class FootPlates:
             plates: what is wrong with each of `self.plates`.
             late_s: by how much forces are recorded late.
         """
-        raw, nobody = self.reactions, np.zeros(self.reactions.carrier.shape)
-        wrench, impact = (
-            self._put_right(part, loaded, raw.carrier, plates)
-            for part, loaded in ((raw.wrench, raw.loaded), (raw.impact, nobody))
-        )
+        raw = self.reactions
+        wrench = self._zeroed(raw.wrench, raw.loaded, raw.carrier, plates)
+        wrench, impact = (self._put_right(part, raw.carrier, plates) for part in (wrench, raw.impact))
         return replace(raw, time=raw.time - late_s, wrench=wrench, impact=impact)
 
-    def _put_right(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """Loads (k, 2, 6), where somebody stands (k, 2), of plates (k, 2) with errors (p, 7)."""
-        here = plates[carrier]
+    def _zeroed(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """Loads (k, 2, 6) without what plates (k, 2) with errors (p, 7) read too much where somebody stands (k, 2)."""
         for zero, axis in zip(_ZEROS, _PLANE, strict=True):
-            loads = loads - (loaded * here[..., zero])[..., None] * self._push(axis, carrier)
+            loads = loads - (loaded * plates[carrier, zero])[..., None] * self._push(axis, carrier)
+        return loads
+
+    def _put_right(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """Loads (k, 2, 6) of plates (k, 2) with errors (p, 7), but for their zeros."""
+        here = plates[carrier]
         loads = turned_loads(loads, self.middles[carrier], -here[..., _TURN])
         moment = loads[..., 3:] + np.cross(self._ground_offset(here), loads[..., :3])
         moment[..., 1] += here[..., 3] * loads[..., 1]
@@ -158,25 +160,20 @@ class FootPlates:
         return np.concatenate([along, np.cross(self.middles[carrier], along)], axis=-1)
 
     def by_plate(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """(n, 6, p, 7) derivative of the sum of corrected loads (n, 2, 6), where somebody stands (n, 2), by what is
-        wrong with the plates (p, 7).
+        """(n, 2, 6, p, 7) derivative of the corrected loads (n, 2, 6), where somebody stands (n, 2), by what is wrong
+        with the plates (p, 7).
         """
-        result = np.zeros((len(loads), 6, *plates.shape))
         here = plates[carrier]
-        raw = loads / (1.0 + here[..., 2:3])
-        turning = turning_loads(loads, self.middles[carrier] + self._ground_offset(here))
-        nobody = np.zeros(carrier.shape)
-        pushes = [self._put_right(-self._push(axis, carrier), nobody, carrier, plates) for axis in _PLANE]
-        for foot in range(2):
-            under = carrier[:, foot, None] == np.arange(len(plates))
-            for zero, push in zip(_ZEROS, pushes, strict=True):
-                result[..., zero] += (loaded[:, foot, None] * push[:, foot])[:, :, None] * under[:, None, :]
-            for j, axis in enumerate(_PLANE):
-                moment = np.cross(self.turn[:, axis], loads[:, foot, :3])
-                result[:, 3:, :, j] += moment[:, :, None] * under[:, None, :]
-            result[..., 2] += raw[:, foot, :, None] * under[:, None, :]
-            result[:, 4, :, 3] += loads[:, foot, 1, None] * under
-            result[..., _TURN] -= turning[:, foot, :, None] * under[:, None, :]
+        by_own = np.zeros((*loads.shape, plates.shape[1]))
+        for j, axis in enumerate(_PLANE):
+            by_own[..., 3:, j] = np.cross(self.turn[:, axis], loads[..., :3])
+        by_own[..., 2] = loads / (1.0 + here[..., 2:3])
+        by_own[..., 4, 3] = loads[..., 1]
+        by_own[..., _TURN] = -turning_loads(loads, self.middles[carrier] + self._ground_offset(here))
+        for zero, axis in zip(_ZEROS, _PLANE, strict=True):
+            by_own[..., zero] = -loaded[..., None] * self._put_right(self._push(axis, carrier), carrier, plates)
+        under = carrier[..., None] == np.arange(len(plates))
+        result: np.ndarray = by_own[..., None, :] * under[:, :, None, :, None]
         return result
 
     def _ground_offset(self, plates: np.ndarray) -> np.ndarray:

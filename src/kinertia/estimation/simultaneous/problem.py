@@ -194,8 +194,8 @@ class MapProblem:
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
-        counts = (part.stop - part.start for part in (self.layout.delays, self.layout.zeros))
-        self.instruments = calibration.instruments.of_unknowns(self.plates, *counts)
+        n_zeros = self.layout.zeros.stop - self.layout.zeros.start
+        self.instruments = calibration.instruments.of_unknowns(self.plates, n_delays, n_zeros)
         self.session = calibration.instruments.of_session(self.plates)
         self.weight = 1.0 / np.square(deviation)
         self.skin_information = self.skin[0].information()
@@ -386,9 +386,8 @@ class MapProblem:
         by_static[:, :, layout.coordinates] = by.q[:, :, self.still]
         ground = self.grounds[k]
         loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
-        self.add_by_plates(
-            k, by_static, -ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static))
-        )
+        by_plate = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
+        self.add_by_plates(k, by_static, -by_plate)
         by_static[:, :, layout.late(k)] = -self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
         by_instrument = by_static[:, :, layout.instruments]
         by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
