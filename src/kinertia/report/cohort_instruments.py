@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_warnings import CLOCK_OF, SHOWN_UNIT
 from kinertia.estimation.simultaneous.plates import ZERO_UNKNOWNS
 from kinertia.report import style
 from kinertia.report.panels import Panel, plain, small_multiples
@@ -32,7 +32,7 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
         rows: of the table of instruments, `COLUMNS`. Fits that knew what others of their session say are left out: days
             would count people twice. So are delays and zeros, which are each trial's own.
     """
-    own = rows["instrument"].str.startswith("clock of ") | rows["unknown"].isin(ZERO_UNKNOWNS)
+    own = rows["instrument"].str.startswith(CLOCK_OF) | rows["unknown"].isin(ZERO_UNKNOWNS)
     rows = rows[~rows["with_session"] & ~own]
     dated = rows.dropna(subset=["date"])
     if not len(dated):

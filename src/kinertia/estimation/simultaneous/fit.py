@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.instrument_warnings import instrument_warnings
+from kinertia.estimation.simultaneous.instrument_warnings import CLOCK_OF, instrument_warnings
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -203,33 +203,37 @@ def _calibration(
     calibration: dict[str, dict[str, float | str]] = {}
     known = uncertainty.instruments
     for name, (value, sd) in result.coordinates.items():
-        change = value - skeleton.locked[name]
-        entry = {"value": change, "prior_sd": uncertainty.coordinates[name], "sd": sd}
-        calibration[name] = {**entry, "unit": "rad" if name in uncertainty.axes else "m"}
+        unit = "rad" if name in uncertainty.axes else "m"
+        calibration[name] = _entry(value - skeleton.locked[name], uncertainty.coordinates[name], sd, unit)
     # whoever is turned is displaced a little, too: the cause first
     for values, sds in list(result.plates.values())[:1]:
-        entry = {"value": float(values[-1]), "prior_sd": known.floor["turn"].sd, "sd": float(sds[-1])}
-        calibration["plates: turned about the vertical by"] = {**entry, "unit": "rad"}
+        turn = _entry(values[-1], known.floor["turn"].sd, sds[-1], "rad")
+        calibration["plates: turned about the vertical by"] = turn
     for plate, (values, sds) in result.plates.items():
-        name = f"plate {plate.removeprefix('plate ')}"
-        for (unknown, unit), value, deviation in zip(PLATE_UNKNOWNS.items(), values, sds, strict=False):
+        for (unknown, unit), value, sd in zip(PLATE_UNKNOWNS.items(), values, sds, strict=False):
             floor = known.floor[unknown].sd if unknown in known.floor else 0.0
             expected = float(np.hypot(known.plate[unknown].sd, floor))
-            entry = {"value": float(value), "prior_sd": expected, "sd": float(deviation)}
-            calibration[f"{name}: {unknown}"] = {**entry, "unit": unit}
-    clock, clock_sd = result.clock_s
-    calibration["clock: forces late by"] = {"value": clock, "prior_sd": known.clock_s.sd, "sd": clock_sd, "unit": "s"}
-    for trial, (later, later_sd) in zip(trials, result.delays_s, strict=False):
-        entry = {"value": later, "prior_sd": known.delay_s.sd, "sd": later_sd}
-        calibration[f"clock of {trial}: forces later than in the other trials by"] = {**entry, "unit": "s"}
+            calibration[f"{_plate(plate)}: {unknown}"] = _entry(value, expected, sd, unit)
+    late_s, sd = result.clock_s
+    calibration["clock: forces late by"] = _entry(late_s, known.clock_s.sd, sd, "s")
+    for trial, (later_s, sd) in zip(trials, result.delays_s, strict=False):
+        name = f"{CLOCK_OF}{trial}: forces later than in the other trials by"
+        calibration[name] = _entry(later_s, known.delay_s.sd, sd, "s")
     trials_of = Counter(plate for zeros in result.zeros_n for plate in zeros)
     for trial, zeros in zip(trials, result.zeros_n, strict=True):
         for plate, (values, sds) in zeros.items():
-            name = plate if trials_of[plate] == 1 else plate_of_trial(plate, trial)
-            for (unknown, unit), value, deviation in zip(ZERO_UNKNOWNS.items(), values, sds, strict=True):
-                entry = {"value": float(value), "prior_sd": known.zero_n.sd, "sd": float(deviation)}
-                calibration[f"plate {name.removeprefix('plate ')}: {unknown}"] = {**entry, "unit": unit}
+            name = _plate(plate if trials_of[plate] == 1 else plate_of_trial(plate, trial))
+            for (unknown, unit), value, sd in zip(ZERO_UNKNOWNS.items(), values, sds, strict=True):
+                calibration[f"{name}: {unknown}"] = _entry(value, known.zero_n.sd, sd, unit)
     return calibration
+
+
+def _entry(value: float, prior_sd: float, sd: float, unit: str) -> dict[str, float | str]:
+    return {"value": float(value), "prior_sd": prior_sd, "sd": float(sd), "unit": unit}
+
+
+def _plate(name: str) -> str:
+    return f"plate {name.removeprefix('plate ')}"
 
 
 def _warnings(

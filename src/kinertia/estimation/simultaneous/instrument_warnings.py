@@ -9,6 +9,8 @@ import numpy as np
 _NOTABLE = 2.0
 FREE_MOMENT = "free moment"
 """What a plate adds to the vertical moment, among what is calibrated."""
+CLOCK_OF = "clock of "
+"""Before the name of a trial, what it has of its own besides the clock of all."""
 _ONE_SIDED = 0.5
 """Share of the free moments' sizes above which their sum is not that of mirror images."""
 
