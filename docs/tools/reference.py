@@ -79,7 +79,7 @@ def _table(model: type[Table]) -> str:
         if field.is_required():
             default = "" if name == "name" else "is an error"
         else:
-            default = "" if field.default is None else f"`{str(field.default).lower()}`"
+            default = "" if name == "name" or field.default is None else f"`{str(field.default).lower()}`"
         rows.append(f"| `{name}` | {(field.description or '')} | {default} |")
     return "\n".join(rows)
 

@@ -123,9 +123,19 @@ ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_
 
 
 class Table(BaseModel):
-    """A table of the subject file: unknown keys are errors, types are never converted, nothing changes afterwards."""
+    """A table of the subject file: unknown keys are errors, types are never converted, nothing changes afterwards.
+
+    NumPy's numbers and arrays are those of Python.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_numpy(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        return {key: each.tolist() if hasattr(each, "dtype") else each for key, each in data.items()}
 
 
 class Subject(Table):
@@ -138,7 +148,9 @@ class Subject(Table):
         61.5
     """
 
-    name: str = Field(min_length=1, description="name in files and report; left out: the folder's name")
+    name: str = Field(
+        default="subject", min_length=1, description="name in files and report; left out: the folder's name"
+    )
     sex: Annotated[Literal["male", "female"] | None, BeforeValidator(sex_of)] = Field(
         default=None, description='"male" or "female": which table of the literature'
     )

@@ -34,9 +34,8 @@ def ready(*attached):
     subject = walking_subject()
     prior = literature_prior(subject.literature)
     person = Subject(name="A", mass_kg=MASS_KG)
-    return Prepared(
-        person, subject.skeleton, prior.mean, prior, GAIT27_UNCERTAINTY, None, (), (), (), (), attached=attached
-    )
+    known = (prior.mean, prior, GAIT27_UNCERTAINTY, None)
+    return Prepared(person, Settings(), subject.skeleton, *known, (), (), (), (), attached=attached)
 
 
 @pytest.mark.parametrize(

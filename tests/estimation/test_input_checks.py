@@ -4,10 +4,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.errors import SubjectError, TrialError
+from kinertia.errors import SettingsError, SubjectError, TrialError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import force_mass
-from kinertia.estimation.input_checks import check_same_person, complete_subject
+from kinertia.estimation.input_checks import check_same_person, check_trials, complete_subject
 from kinertia.estimation.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.settings import Subject
 from kinertia.synthetic.walk import walk, walking_subject
@@ -46,6 +46,33 @@ def test_nobody_tells(field, option):
     with pytest.raises(SubjectError, match=option) as caught:
         complete_subject(Subject(name="a", sex="male", **known), [WALK])
     assert caught.value.field == field
+
+
+def test_without_sex_there_is_no_table():
+    with pytest.raises(SubjectError, match=r"male or female.*--sex") as caught:
+        complete_subject(Subject(name="a", mass_kg=60.0, height_m=1.7), [WALK])
+    assert caught.value.field == "sex"
+    assert complete_subject(Subject(name="a", mass_kg=60.0), [WALK], mass_only=True)[0].sex is None
+
+
+@pytest.mark.parametrize(
+    ("names", "problem"),
+    [
+        (("walk", "walk"), "trial 'walk': trial 'walk' is there already; results have a folder for each"),
+        (("walk", "Walk"), "Windows and macOS take both for one folder"),
+        (("walk", "../walk"), "must be a name that a folder can have on every system"),
+        (("walk", "bsp.csv"), "the results have a file bsp.csv"),
+    ],
+)
+def test_several_trials_have_names_of_their_own(names, problem):
+    with pytest.raises(TrialError, match=problem):
+        check_trials([replace(WALK, name=name) for name in names])
+    check_trials([replace(WALK, name="../walk")])
+
+
+def test_no_trial():
+    with pytest.raises(SettingsError, match="no trial"):
+        check_trials([])
 
 
 def test_a_file_with_an_impossible_mass():

@@ -24,7 +24,7 @@ def ready():
     """As much of a prepared person as is looked at."""
     literature = walking_subject().literature
     prior = literature_prior(literature)
-    return Prepared(None, None, literature, prior, None, None, (), (), (), ())
+    return Prepared(None, None, None, literature, prior, None, None, (), (), (), ())
 
 
 def informed(ready, settings=None, earlier=None, **segments):

@@ -185,10 +185,20 @@ def test_results_replace_older_ones_and_leave_other_files_alone(saved, tmp_path)
     fit, _ = saved
     (tmp_path / "fit.json").write_text("old")
     (tmp_path / "mine.txt").write_text("kept")
-    save_fit(fit, tmp_path)
+    save_fit(fit, tmp_path, force=True)
     assert json.loads((tmp_path / "fit.json").read_text())["kinertia"] == version("kinertia")
     assert (tmp_path / "mine.txt").read_text() == "kept"
     assert {path.name for path in tmp_path.glob("[!.]*")} == RESULTS | {"mine.txt"}
+
+
+def test_files_of_others_are_kept_unless_asked(short_fit, tmp_path):
+    (tmp_path / "model.osim").write_text("mine")
+    with pytest.raises(FileError, match=r"holds files that are not results of Kinertia \(model.osim\).*force=True"):
+        short_fit.save(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["model.osim"]
+    assert (tmp_path / "model.osim").read_text() == "mine"
+    short_fit.save(tmp_path, force=True)
+    assert "<OpenSimDocument" in (tmp_path / "model.osim").read_text()
 
 
 def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
@@ -199,7 +209,7 @@ def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
         raise OSError(28, "No space left on device", str(path))
 
     monkeypatch.setattr("kinertia.report.files.write_table", full_disk)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(FileError, match=r"out: cannot be written \(No space left on device\)"):
         save_fit(fit, tmp_path / "deep" / "out")
     assert list(tmp_path.iterdir()) == []
 

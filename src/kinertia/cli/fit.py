@@ -167,7 +167,7 @@ def _fitted(one: _Run) -> Fit:
     """The fit, which is in its folder."""
     with shown_progress() as progress:
         result = fit_subject(one.wanted, progress)
-    save_fit(result, one.folder, provenance_of(one.wanted, one.command))
+    save_fit(result, one.folder, provenance_of(one.wanted, one.command), force=True)
     return result
 
 

@@ -33,5 +33,5 @@ def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, sha
         wanted = read_subject(work / "lab" / "subject.toml")
         fit = fit_subject(wanted, progress)
         command = command_line(["kinertia", "demo", "--measured", "-o", str(folder)])
-        save_fit(fit, work, provenance_of(wanted, command))
+        save_fit(fit, work, provenance_of(wanted, command), force=True)
     return fit

@@ -113,7 +113,7 @@ def run_demo(
         for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
             settings = with_settings(wanted, method=method).settings
             fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-            save_fit(fits[-1], results, provenance, truth_of(trial, fits[-1]))
+            save_fit(fits[-1], results, provenance, truth_of(trial, fits[-1]), force=True)
         demo = Demo(fits[0], fits[1], trial, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

@@ -64,8 +64,8 @@ def estimate_bsp(
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
-    ready = prepare(subject, static, inputs, settings or Settings(), marker_set, progress, attached)
-    return estimate(ready if prior is None else replace(ready, prior=prior), settings, progress)
+    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached)
+    return estimate(ready if prior is None else replace(ready, prior=prior), progress)
 
 
 @one_blas_thread
@@ -94,24 +94,22 @@ def estimate_bsp_of_model(
     """
     from kinertia.estimation.prepare_osim import prepare_osim
 
-    settings = settings or Settings()
     ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached)
-    return estimate(ready, settings, progress)
+    return estimate(ready, progress)
 
 
 @one_blas_thread
-def estimate(ready: Prepared, settings: Settings | None = None, progress: Progress = lambda stage, share: None) -> Fit:
-    """Body segment parameters of a prepared person: the last step of `estimate_bsp`.
+def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) -> Fit:
+    """Body segment parameters of a prepared person: the last step of `estimate_bsp`, with the settings of the others.
 
     Args:
         ready: as `prepare` or `prepare_osim` makes it.
-        settings: those it was prepared with; defaults if None.
         progress: called as the work goes on.
 
     Raises:
         KinertiaError: the trials contradict each other, or the scale.
     """
-    settings, ready = settings or Settings(), with_attached(ready)
+    settings, ready = ready.settings, with_attached(ready)
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd

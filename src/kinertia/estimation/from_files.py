@@ -145,7 +145,7 @@ def fit_subject(subject: str | Path | SubjectFile, progress: Progress = lambda s
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
-    return estimate(prepare_subject(wanted, progress), wanted.settings, progress)
+    return estimate(prepare_subject(wanted, progress), progress)
 
 
 def _static(wanted: SubjectFile) -> Path:

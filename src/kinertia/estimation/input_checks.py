@@ -8,7 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from kinertia.errors import SubjectError, TrialError
+from kinertia.errors import SettingsError, SubjectError, TrialError
+from kinertia.io.file_names import trouble_as_folders
 from kinertia.model.anthropometry import check_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -28,6 +29,22 @@ def known(value: T | None) -> T:
     return value
 
 
+def check_trials(recordings: Sequence[Recording]) -> None:
+    """Raise unless there are trials, and several have names by which results can tell them apart.
+
+    Raises:
+        SettingsError: there is none.
+        TrialError: a name that cannot be that of a folder beside the others'.
+    """
+    if not recordings:
+        raise SettingsError("there is no trial to estimate from; give at least one")
+    names = [recording.name for recording in recordings]
+    if trouble := trouble_as_folders(names):
+        index, problem = trouble
+        advice = "results have a folder for each trial: give this one's recording another name (dataclasses.replace)"
+        raise TrialError(names[index], f"{problem}; {advice}")
+
+
 def complete_subject(
     subject: Subject, recordings: Sequence[Recording], mass_only: bool = False
 ) -> tuple[Subject, list[str]]:
@@ -38,7 +55,7 @@ def complete_subject(
         mass_only: height and sex may stay unknown.
 
     Raises:
-        SubjectError: neither the user nor a file gives mass or height, or the value cannot be true.
+        SubjectError: neither the user nor a file gives mass or height, the user no sex, or a value cannot be true.
     """
     warnings = []
     values: dict[str, float] = {}
@@ -55,6 +72,11 @@ def complete_subject(
         for name, value in stated:
             if abs(value - values[quantity]) > 0.01 * values[quantity]:
                 warnings.append(f"{quantity} is taken as {values[quantity]:g}, but the file of '{name}' says {value:g}")
+    if subject.sex is None and not mass_only:
+        problem = (
+            "give male or female, by which the table of the literature is chosen, with --sex or as sex under [subject]"
+        )
+        raise SubjectError("sex", None, problem)
     check_subject(values["mass_kg"], values.get("height_m", 1.7), subject.sex or "male")
     return subject.model_copy(update=values), warnings
 

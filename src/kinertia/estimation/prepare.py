@@ -14,6 +14,7 @@ from kinertia.estimation.doubts import motion_doubts, static_doubts, trial_doubt
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import (
     check_same_person,
+    check_trials,
     check_visible,
     complete_subject,
     known,
@@ -80,6 +81,7 @@ class Prepared:
 
     Attributes:
         subject: with mass and height filled in.
+        settings: those that it was prepared with, and is estimated with.
         skeleton: calibrated model.
         literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
         prior: how far the person's may be from them.
@@ -97,6 +99,7 @@ class Prepared:
     """
 
     subject: Subject
+    settings: Settings
     skeleton: Skeleton
     literature: BodySegmentParameters
     prior: BspPrior
@@ -165,6 +168,7 @@ def prepare(
     if attached and settings.method == "two-level":
         raise SettingsError("two-level knows the body only; where something is attached, use the default method")
     recordings = [item.recording for item in inputs]
+    check_trials(recordings)
     subject, warnings = complete_subject(subject, [static, *recordings])
     warnings += repeated_trials(recordings, [item.window_s for item in inputs])
     if marker_set is None:
@@ -212,6 +216,7 @@ def prepare(
     notes += [*expected.notes, *(note for k in kinematics for note in k.notes)]
     return Prepared(
         subject=subject,
+        settings=settings,
         skeleton=skeleton,
         literature=expected.prior.mean,
         prior=expected.prior,

@@ -17,7 +17,7 @@ from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
-from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.model_doubts import model_doubts
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Prepared, Progress, TrialInput
@@ -62,8 +62,10 @@ def prepare_osim(
         KinertiaError: the subject, the model or a trial cannot be used.
     """
     settings = settings or Settings()
-    subject, warnings = complete_subject(subject, [item.recording for item in inputs], mass_only=True)
-    warnings += repeated_trials([item.recording for item in inputs], [item.window_s for item in inputs])
+    recordings = [item.recording for item in inputs]
+    check_trials(recordings)
+    subject, warnings = complete_subject(subject, recordings, mass_only=True)
+    warnings += repeated_trials(recordings, [item.window_s for item in inputs])
     warnings += _doubted(model)
     feet = _feet(model)
     progress("calibration", 0.0)
@@ -113,6 +115,7 @@ def prepare_osim(
     ]
     return Prepared(
         subject=subject,
+        settings=settings,
         skeleton=skeleton,
         literature=uncertainty.whole(prior.mean),
         prior=prior,

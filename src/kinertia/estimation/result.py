@@ -300,9 +300,17 @@ class Fit:
         rows = zip(self.estimate.segments, self.estimate.mass_kg.tolist(), strict=True)
         return float(sum(mass for segment, mass in rows if segment not in own))
 
-    def save(self, folder: str | Path) -> Path:
-        """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder."""
-        return display.save(self, folder)
+    def save(self, folder: str | Path, force: bool = False) -> Path:
+        """Write all result files into a folder, as `kinertia.save_fit` does; returns the folder.
+
+        Args:
+            folder: is made if need be.
+            force: also among files that are not results of Kinertia; those of the same names are replaced.
+
+        Raises:
+            FileError: the folder holds such files, or cannot be written to.
+        """
+        return display.save(self, folder, force=force)
 
     def figure(self, name: str, path: str | Path, trial: str | None = None) -> Path:
         """Draw a figure for a paper into a file: 180 mm wide, three panels in a row; returns the file.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import unicodedata
+from collections.abc import Sequence
 from pathlib import Path
 
 _DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
@@ -30,6 +32,24 @@ def same_folder(one: str, other: str) -> bool:
 def same_name_key(name: str) -> str:
     """What names have in common that are one folder's on some system."""
     return unicodedata.normalize("NFC", name).casefold()
+
+
+def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
+    """The first of several trials whose name cannot be that of a folder beside those before, and why."""
+    for index, name in enumerate(trials if len(trials) > 1 else ()):
+        if not fits_everywhere(name):
+            quoted = json.dumps(name, ensure_ascii=False)
+            return index, (
+                f'name = {quoted}: must be a name that a folder can have on every system: none of < > : " / \\ | ? *, '
+                "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...)"
+            )
+        if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
+            return index, f"the results have a file {taken}, not a folder"
+        for before in trials[:index]:
+            if same_folder(before, name):
+                same = "" if before == name else "; Windows and macOS take both for one folder"
+                return index, f"trial '{before}' is there already{same}"
+    return None
 
 
 def last_part(written: str) -> str:

@@ -164,12 +164,17 @@ def complete_folder(folder: str | Path, kind: str) -> Iterator[Path]:
     """
     folder = _real(folder)
     check_folder(folder)
-    with working_folder(_existing(folder.parent)) as work:
-        new = work / "new"
-        new.mkdir()
-        yield new
-        with _uninterrupted():
-            _replace(new, folder, kind, work / BEFORE / folder.name)
+    try:
+        with working_folder(_existing(folder.parent)) as work:
+            new = work / "new"
+            new.mkdir()
+            yield new
+            with _uninterrupted():
+                _replace(new, folder, kind, work / BEFORE / folder.name)
+    except OSError as error:
+        said = error.strerror or str(error)
+        problem = f"cannot be written ({said}); nothing in it has changed: make room, or give another folder"
+        raise FileError(folder, problem) from error
 
 
 def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:

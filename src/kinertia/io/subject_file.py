@@ -48,7 +48,7 @@ import difflib
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path, PureWindowsPath
 from typing import Annotated, Any, Literal
@@ -62,7 +62,7 @@ from pydantic import (
 )
 
 from kinertia.errors import FileError, SettingsError, SubjectError
-from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, path_trouble, same_folder
+from kinertia.io.file_names import path_from, path_trouble, trouble_as_folders
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.toml_lines import Location, read_toml
 from kinertia.model.anthropometry import check_subject
@@ -278,29 +278,11 @@ def read_subject(path: str | Path) -> SubjectFile:
         check_subject(mass_kg, height_m, subject.sex or "male")
     except SubjectError as error:
         raise FileError(path, str(error), document.line(("subject", error.field))) from error
-    if trouble := _name_trouble([trial.name for trial in result.trials]):
-        index, sentence = trouble
-        raise FileError(path, sentence, document.line(("trial", index, "name")))
+    if trouble := trouble_as_folders([trial.name for trial in result.trials]):
+        index, problem = trouble
+        advice = 'give this trial a name = "..." of its own'
+        raise FileError(path, f"{problem}; {advice}", document.line(("trial", index, "name")))
     return result
-
-
-def _name_trouble(names: Sequence[str]) -> tuple[int, str] | None:
-    """The first of several trials whose name cannot be that of a folder beside those before, and why."""
-    for index, name in enumerate(names if len(names) > 1 else ()):
-        if not fits_everywhere(name):
-            quoted = json.dumps(name, ensure_ascii=False)
-            return index, (
-                f'name = {quoted}: must be a name that a folder can have on every system: none of < > : " / \\ | ? *, '
-                "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...); "
-                'give the trial a name = "..." of its own'
-            )
-        if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
-            return index, f'the results have a file {taken}, not a folder; give this trial a name = "..." of its own'
-        for before in names[:index]:
-            if same_folder(before, name):
-                same = "" if before == name else "; Windows and macOS take both for one folder"
-                return index, f"trial '{before}' is there already{same}; give this one a name = \"...\" of its own"
-    return None
 
 
 def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:

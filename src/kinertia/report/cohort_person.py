@@ -64,7 +64,7 @@ def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
     folder = Place(job.cohort, job.person).results
     command = command_line(["kinertia", "fit", str(job.subject), "-o", str(folder)])
     with complete_folder(folder, "cohort") as work:
-        save_fit(fit, work, provenance_of(wanted, command))
+        save_fit(fit, work, provenance_of(wanted, command), force=True)
         with_session = wanted.instruments.session is not None
         write_person(work, job.person, fit, session_date(wanted), with_session)
         (work / RECORD).write_text(record.text(), encoding="utf-8")

@@ -22,7 +22,7 @@ from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.warnings import mass_from_force_kg
 from kinertia.io.osim.exporter import export_osim
-from kinertia.io.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.spreadsheet import inert
 from kinertia.io.sto import TimeTable, write_table
@@ -41,15 +41,24 @@ _ALL_DIGITS, _SIX_DIGITS = "%r", "%.6g"
 _RESIDUALS = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
 
 
-def save_fit(fit: Fit, folder: str | Path, provenance: Provenance | None = None, truth: Truth | None = None) -> Path:
+def save_fit(
+    fit: Fit,
+    folder: str | Path,
+    provenance: Provenance | None = None,
+    truth: Truth | None = None,
+    force: bool = False,
+) -> Path:
     """Write all result files of a fit into a folder, which is made if need be; returns the folder.
 
     With one trial its files stand in the folder itself, with several in a sub-folder per trial. The report names
-    command and files where `provenance` tells them, and shows the truth of a synthetic person.
+    command and files where `provenance` tells them, and shows the truth of a synthetic person. With `force` also among
+    files that are not results of Kinertia; those of the same names are replaced.
 
     Raises:
-        FileError: the folder cannot be written to.
+        FileError: the folder holds such files, or cannot be written to.
     """
+    if not force:
+        expect_own_folder(folder, ", or force=True to write among them")
     with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         write_fit(fit, provenance, work / FIT_FILE, truth)

@@ -18,9 +18,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.errors import MarkerSetError
+from kinertia.errors import MarkerSetError, TrialError
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
+from kinertia.trial.impossible_data import marker_trouble, plate_trouble
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -60,6 +61,8 @@ class Markers:
     positions: FloatArray
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "time", np.asarray(self.time))
+        object.__setattr__(self, "labels", tuple(self.labels))
         _expect_shape("positions", self.positions, (len(self.time), len(self.labels), 3))
         if len(set(self.labels)) != len(self.labels):
             raise ValueError("marker labels must differ from each other")
@@ -180,6 +183,8 @@ class PlateLoads:
     torques: tuple[TorqueColumns, ...] | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "time", np.asarray(self.time))
+        object.__setattr__(self, "names", tuple(self.names))
         shape = (len(self.time), len(self.names), 3)
         _expect_shape("force", self.force, shape)
         _expect_shape("moment", self.moment, shape)
@@ -211,6 +216,10 @@ class Recording:
         virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
         belt: of the treadmill, where its speed is stated.
 
+    Raises:
+        TrialError: times that are no clock's, infinite places of markers, forces that are not numbers, two plates of
+            one name.
+
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
         >>> recording.name, recording.plates.names
@@ -228,6 +237,14 @@ class Recording:
     vertical: str = "+Y"
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
+
+    def __post_init__(self) -> None:
+        markers, plates = self.markers, self.plates
+        trouble = marker_trouble(markers.time, markers.labels, markers.positions)
+        if not trouble and plates is not None:
+            trouble = plate_trouble(plates.time, plates.names, plates.declared_feet, plates.wrench)
+        if trouble:
+            raise TrialError(self.name, trouble)
 
     def without_empty_markers(self) -> Recording:
         """The same without markers that no frame shows, and a note that names them."""

@@ -38,10 +38,10 @@ def pictures(thing: object) -> Any:
 
 
 @singledispatch
-def save(thing: object, folder: str | Path) -> Path:
-    """Write `thing` into a folder, and return the folder."""
+def save(thing: object, folder: str | Path, force: bool = False) -> Path:
+    """Write `thing` into a folder, with `force` also among files of others, and return the folder."""
     _load(save, thing)
-    return save(thing, folder)
+    return save(thing, folder, force=force)
 
 
 @singledispatch

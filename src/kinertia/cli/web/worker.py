@@ -57,7 +57,7 @@ def fit(person: Person, progress: Progress) -> None:
     told = words(result)
     command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
     with complete_folder(person.results, "app") as work:
-        save_fit(result, work, provenance_of(wanted, command))
+        save_fit(result, work, provenance_of(wanted, command), force=True)
         (work / SUBJECT).write_bytes(person.subject.read_bytes())
         ended = time.time()
         _write(

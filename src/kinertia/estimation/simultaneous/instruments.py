@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -16,25 +15,21 @@ from kinertia.settings import Instruments
 from kinertia.trial.plate_names import columns_of_several_trials
 
 FAULTY_SHARE = 0.05
-PLATE_PRIOR = MappingProxyType(
-    {
-        "x": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
-        "z": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
-        "gain": SoundOrFaulty(0.002, 0.03, FAULTY_SHARE),
-        "free moment": SoundOrFaulty(0.0003, 0.003, FAULTY_SHARE),
-    }
-)
+PLATE_PRIOR: Mapping[str, SoundOrFaulty] = {
+    "x": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
+    "z": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
+    "gain": SoundOrFaulty(0.002, 0.03, FAULTY_SHARE),
+    "free moment": SoundOrFaulty(0.0003, 0.003, FAULTY_SHARE),
+}
 """Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
 and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
 scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
 the vertical force at 0.3 m, and ten times that (no source)."""
-FLOOR_PRIOR = MappingProxyType(
-    {
-        "x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
-        "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
-        "turn": SoundOrFaulty(float(np.radians(0.1)), float(np.radians(2.0)), FAULTY_SHARE),
-    }
-)
+FLOOR_PRIOR: Mapping[str, SoundOrFaulty] = {
+    "x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
+    "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
+    "turn": SoundOrFaulty(float(np.radians(0.1)), float(np.radians(2.0)), FAULTY_SHARE),
+}
 """Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Turn: corners of a plate of
 half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.010, FAULTY_SHARE)
