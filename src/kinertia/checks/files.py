@@ -19,6 +19,7 @@ from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.io.subject_file import SubjectFile
+from kinertia.model.camera_scale import trial_scales
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_markers import markers_of_model
 from kinertia.motion.trial_delays import trial_delays_doubts
@@ -156,12 +157,17 @@ def check_files(
             recording, own_set, _ = with_widths(recording, others, marker_set, wanted.subject or Subject(name="person"))
         judged = check_recording(recording, own_set, mass_kg, one.window_s, static, height_m, is_static)
         checks.append((one.title, judged))
-    return _with_delays(checks), mistakes
-
-
-def _with_delays(checks: Sequence[tuple[str, RecordingCheck]]) -> list[tuple[str, RecordingCheck]]:
-    """Findings by title, with what the trials' delays say of one another."""
     doubts = trial_delays_doubts([one.delay for _, one in checks])
+    if marker_set is not None:
+        moving = [recording for _, recording in recordings if all(recording is not each for each in statics)]
+        doubts += trial_scales([(one.name, one.markers) for one in moving], marker_set)
+    return _with_doubts(checks, doubts), mistakes
+
+
+def _with_doubts(
+    checks: Sequence[tuple[str, RecordingCheck]], doubts: Sequence[tuple[str, str]]
+) -> list[tuple[str, RecordingCheck]]:
+    """Findings by title, with what trials say of one another: name and sentence."""
     told = {
         name: tuple(Verdict("caution", sentence) for each, sentence in doubts if each == name) for name, _ in doubts
     }

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from kinertia.errors import TrialError
 from kinertia.model.body_sides import sides_trouble, walks_backwards
+from kinertia.model.camera_scale import trial_scales
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_on_person import model_on_person_doubts, model_on_person_trouble
@@ -153,6 +154,11 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
     along = [one for one in along if one] or [offset_trouble(trial, owners)]
     sentences = [*filter(None, along), *gain_doubts(recording, trial, owners)]
     return _told([*rate_doubts(trial, owners), *sentences])
+
+
+def uneven_scales(trials: Sequence[Trial], marker_set: MarkerSet) -> list[str]:
+    """Warnings for a fit of trials of one person that were recorded with different scales of the cameras."""
+    return [f"{name}: {said}" for name, said in trial_scales([(one.name, one.markers) for one in trials], marker_set)]
 
 
 def warnings_of(name: str, doubts: Sequence[Doubt]) -> list[str]:

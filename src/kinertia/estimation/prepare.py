@@ -10,7 +10,7 @@ from kinertia.errors import MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.arm_branch import with_elbows_that_bend_forwards
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled, turn_about
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.doubts import motion_doubts, static_doubts, trial_doubts, warnings_of
+from kinertia.estimation.doubts import motion_doubts, static_doubts, trial_doubts, uneven_scales, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import (
     check_same_person,
@@ -191,6 +191,7 @@ def prepare(
         turned = [(with_upright_trunk(model.skeleton, trial), angle) for trial, angle in turned]
     trials = [trial for trial, _ in turned]
     warnings += exchanged_forces(trials, marker_set.segments) or uneven_delays(trials, marker_set.segments)
+    warnings += uneven_scales(trials, marker_set)
     carried = CarriedMass.of(known(subject.mass_kg), attached)
     skeleton, notes = calibrate(model, trials, carried)
     warnings += unseen_body(skeleton)

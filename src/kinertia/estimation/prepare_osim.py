@@ -15,7 +15,7 @@ import numpy as np
 from kinertia.errors import OsimError, TrialError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.doubts import motion_doubts, trial_doubts, warnings_of
+from kinertia.estimation.doubts import motion_doubts, trial_doubts, uneven_scales, warnings_of
 from kinertia.estimation.force_mass import check_force_masses
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.model_doubts import model_doubts
@@ -75,8 +75,9 @@ def prepare_osim(
         trial, doubts = _looked_at(model, item, feet)
         warnings += doubts
         trials.append(trial)
-    segments = markers_of_model(model).segments
-    warnings += exchanged_forces(trials, segments) or uneven_delays(trials, segments)
+    marker_set = markers_of_model(model)
+    warnings += exchanged_forces(trials, marker_set.segments) or uneven_delays(trials, marker_set.segments)
+    warnings += uneven_scales(trials, marker_set)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
     carried = CarriedMass.of(known(subject.mass_kg), attached)

@@ -18,7 +18,8 @@ import numpy as np
 
 from kinertia.model.anatomy import segment_of
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.same_body import LOWER_BODY, SegmentDistances, swapped_labels, swapped_pairs
+from kinertia.model.same_body import swapped_labels, swapped_pairs
+from kinertia.model.segment_distances import LOWER_BODY, SegmentDistances
 from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import FloatArray, Markers
 

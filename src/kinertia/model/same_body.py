@@ -8,16 +8,15 @@ On ten sound pairs of trials, measured in five laboratories, distances differ by
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinertia.model.camera_scale import scale_trouble
 from kinertia.model.marker_set import MarkerSet
-from kinertia.trial.data import FloatArray, Markers
+from kinertia.model.segment_distances import SegmentDistances
+from kinertia.trial.data import Markers
 
-LOWER_BODY = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
 _OTHER_BODY = 0.05
 """Median share by which the distances may differ."""
 _FEWEST_PAIRS = 6
@@ -29,60 +28,6 @@ _ELSEWHERE_M = 0.03
 _SAME_SESSION_M = 0.009
 """RMS difference of the distances: markers put on anew are 5 to 10 mm elsewhere along each axis, which makes 7 to 14.
 """
-_OTHER_SCALE, _LEFT_OF_SCALE = 0.017, 0.75
-"""On eight sound pairs of trials 0.010 at most; markers put on anew by 5 to 10 mm leave 0.8 and more of it."""
-_FRAMES = 60
-
-
-@dataclass(frozen=True, eq=False)
-class SegmentDistances:
-    """Distances (m, m) m between the markers of the lower body that both trials have, and which of them count.
-
-    Attributes:
-        labels: of the m markers.
-        static, trial: medians over the frames, of the static trial or of a model; NaN for those that are never seen
-            together.
-        pairs: (p, 2) indices of two markers of one segment, both known.
-    """
-
-    labels: tuple[str, ...]
-    static: FloatArray
-    trial: FloatArray
-    pairs: NDArray[np.int_]
-
-    @classmethod
-    def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> SegmentDistances:
-        """Of the markers that the set has on pelvis, legs and feet."""
-        both = set(static.labels) & set(trial.labels)
-        segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in LOWER_BODY]
-        labels = tuple(dict.fromkeys(label for own in segments for label in own))
-        place = {label: k for k, label in enumerate(labels)}
-        before, after = (_medians(markers, labels) for markers in (static, trial))
-        pairs = [(place[a], place[b]) for own in segments for a, b in combinations(own, 2)]
-        known = [(a, b) for a, b in pairs if before[a, b] > 0 and after[a, b] > 0]
-        return cls(labels, before, after, np.array(known, dtype=int).reshape(-1, 2))
-
-    def ratio(self) -> float:
-        """How many times as far apart the pairs are in the trial: the median."""
-        before, after = self.lengths()
-        return float(np.median(after / before))
-
-    def lengths(self) -> tuple[FloatArray, FloatArray]:
-        """(p,) m, of the pairs before, and in the trial."""
-        at = tuple(self.pairs.T)
-        return self.static[at], self.trial[at]
-
-    def worst_pair(self) -> str:
-        """The two labels whose distances differ most, and by how much."""
-        off = self.differences()
-        worst = int(np.argmax(np.abs(off)))
-        return f"{' to '.join(self.labels[k] for k in self.pairs[worst])}, {1e3 * off[worst]:+.0f} mm"
-
-    def differences(self, order: NDArray[np.int_] | None = None) -> FloatArray:
-        """(p,) m, by how much the pairs are farther apart in the trial, with its markers in another order."""
-        trial = self.trial if order is None else self.trial[np.ix_(order, order)]
-        result: FloatArray = trial[tuple(self.pairs.T)] - self.static[tuple(self.pairs.T)]
-        return result
 
 
 def body_trouble(static: Markers, trial: Markers, marker_set: MarkerSet) -> str:
@@ -102,7 +47,7 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
         return []
     off = distances.differences()
     typical = float(np.sqrt(np.square(off).mean()))
-    if scaled := _scaled(distances):
+    if scaled := scale_trouble(distances):
         return [scaled]
     far = np.abs(off) > _ELSEWHERE_M
     # one marker that moved takes all of its distances along
@@ -126,24 +71,6 @@ def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> li
             "with the markers put on anew, or of another person; give the one of this session"
         ]
     return []
-
-
-def _scaled(distances: SegmentDistances) -> str:
-    """All distances are longer, or shorter, by the same share; empty where they are not, or by little."""
-    before, after = distances.lengths()
-    if len(before) < _FEWEST_PAIRS or np.array_equal(before, after):
-        return ""
-    factor = float(before @ after / (before @ before))
-    left = float(np.sqrt(np.square(after - factor * before).mean() / np.square(after - before).mean()))
-    share = distances.ratio() - 1.0
-    if min(abs(factor - 1.0), abs(share)) < _OTHER_SCALE or left > _LEFT_OF_SCALE:
-        return ""
-    return (
-        f"distances between markers of one segment are {100 * abs(share):.1f} % {'longer' if share > 0 else 'shorter'} "
-        f"than in the static trial, all alike (median of {len(before)}; scaled by that, {100 * left:.0f} % of their "
-        "differences are left): the cameras were calibrated anew in between, with another length of the wand in the "
-        "software for one of them; correct the scale of that file, or give a static trial of this calibration"
-    )
 
 
 def swapped_labels(distances: SegmentDistances, there: str = "the static trial") -> str:
@@ -217,11 +144,3 @@ def _another_body(distances: SegmentDistances) -> str:
         f"{1e3 * before[worst]:.0f} mm); the static trial is of another person or in another unit: give the one of "
         f"this person and session"
     )
-
-
-def _medians(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
-    """(m, m) m, median distances over a few frames."""
-    places = markers.select(labels).positions[:: -(-len(markers.time) // _FRAMES)]
-    distances = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
-    seen = np.isfinite(distances).any(axis=0)
-    return np.where(seen, np.nanmedian(np.where(seen, distances, 0.0), axis=0), np.nan)

@@ -1,0 +1,79 @@
+"""Distances between markers of one segment, before and in a trial: what tells a body, its markers and its scale.
+
+Compared are pelvis, legs and feet: medians over the frames. The upper body is left out, whose skin moves with the arms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import FloatArray, Markers
+
+LOWER_BODY = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
+_FRAMES = 60
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentDistances:
+    """Distances (m, m) m between the markers of the lower body that both trials have, and which of them count.
+
+    Attributes:
+        labels: of the m markers.
+        static, trial: medians over the frames, of the static trial or of a model; NaN for those that are never seen
+            together.
+        pairs: (p, 2) indices of two markers of one segment, both known.
+        segments: (p,) index of the pair's segment in `LOWER_BODY`.
+    """
+
+    labels: tuple[str, ...]
+    static: FloatArray
+    trial: FloatArray
+    pairs: NDArray[np.int_]
+    segments: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> SegmentDistances:
+        """Of the markers that the set has on pelvis, legs and feet."""
+        both = set(static.labels) & set(trial.labels)
+        segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in LOWER_BODY]
+        labels = tuple(dict.fromkeys(label for own in segments for label in own))
+        place = {label: k for k, label in enumerate(labels)}
+        before, after = (_medians(markers, labels) for markers in (static, trial))
+        pairs = [(place[a], place[b], k) for k, own in enumerate(segments) for a, b in combinations(own, 2)]
+        known = np.array([one for one in pairs if before[one[:2]] > 0 and after[one[:2]] > 0], dtype=int).reshape(-1, 3)
+        return cls(labels, before, after, known[:, :2], known[:, 2])
+
+    def ratio(self) -> float:
+        """How many times as far apart the pairs are in the trial: the median."""
+        before, after = self.lengths()
+        return float(np.median(after / before))
+
+    def lengths(self) -> tuple[FloatArray, FloatArray]:
+        """(p,) m, of the pairs before, and in the trial."""
+        at = tuple(self.pairs.T)
+        return self.static[at], self.trial[at]
+
+    def worst_pair(self) -> str:
+        """The two labels whose distances differ most, and by how much."""
+        off = self.differences()
+        worst = int(np.argmax(np.abs(off)))
+        return f"{' to '.join(self.labels[k] for k in self.pairs[worst])}, {1e3 * off[worst]:+.0f} mm"
+
+    def differences(self, order: NDArray[np.int_] | None = None) -> FloatArray:
+        """(p,) m, by how much the pairs are farther apart in the trial, with its markers in another order."""
+        trial = self.trial if order is None else self.trial[np.ix_(order, order)]
+        result: FloatArray = trial[tuple(self.pairs.T)] - self.static[tuple(self.pairs.T)]
+        return result
+
+
+def _medians(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
+    """(m, m) m, median distances over a few frames."""
+    places = markers.select(labels).positions[:: -(-len(markers.time) // _FRAMES)]
+    distances = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
+    seen = np.isfinite(distances).any(axis=0)
+    return np.where(seen, np.nanmedian(np.where(seen, distances, 0.0), axis=0), np.nan)
