@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.impacts import impact_factors
 from kinertia.estimation.simultaneous.marker_noise import (
     MarkerNoise,
     WithoutSkin,
@@ -202,6 +203,8 @@ def _observed(
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
+    ground, dynamic = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force), kinematics.inside(time)
+    force = ground.loads(time).reshape(-1, 2, 6)[..., :3].sum(axis=1)
     return (
         Observation(
             time=time,
@@ -210,10 +213,11 @@ def _observed(
             marker_frames=alike,
             q=errors.q,
             spacing_s=bandwidth.spacing_s,
-            dynamic=kinematics.inside(time),
-            ground=_ground(kinematics, time, bandwidth.motion_hz, bandwidth.force),
+            dynamic=dynamic,
+            ground=ground,
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
+            impact=impact_factors(time, force, dynamic, bandwidth.spacing_s, force_sd),
             skin=skin,
             frame_products=products,
         ),

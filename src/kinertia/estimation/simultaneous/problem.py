@@ -55,7 +55,8 @@ class Observation:
         spacing_s: of the splines that its motion is made of (`bandwidth`).
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
-        force_sd, moment_sd: effective deviations of the root residual, N and N m.
+        force_sd, moment_sd: effective deviations of the root residual, N and N m, ...
+        impact: (n,) ... and by how much they are larger in each frame (`impacts`).
         displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
         repeats: by how much errors that come back have raised all variances (`repeated`).
         skin: what the skin may follow; None: it does not move with the joints.
@@ -73,6 +74,7 @@ class Observation:
     ground: FootPlates
     force_sd: float
     moment_sd: float
+    impact: np.ndarray | float = 1.0
     displacement_sd_m: np.ndarray | float = 0.0
     repeats: float = 1.0
     skin: SkinPatterns | None = None
@@ -85,6 +87,12 @@ class Observation:
             return self.marker_sd, ErrorProcess.alike_over(self.marker_frames)
         process, variance = ErrorProcess.read(self.marker_frames, self.frame_products)
         return np.sqrt(variance) * self.marker_sd, process
+
+    def root_sd(self, frames: np.ndarray) -> np.ndarray:
+        """(d, 6) deviations of the root residual in these frames: N, N m."""
+        larger = np.broadcast_to(self.impact, len(self.time))[frames]
+        result: np.ndarray = np.outer(larger, np.repeat([self.force_sd, self.moment_sd], 3))
+        return result
 
     def repeated(self, times: float) -> Observation:
         """The same where its errors come back so many times in all that is estimated from.
@@ -290,10 +298,6 @@ class MapProblem:
         static[self.layout.locals] += self.displacement_sd_m[k] * point.displaced[k]
         return static
 
-    def root_sd(self, trial: Observation) -> np.ndarray:
-        """(6,) deviations of the root residual: N, N m."""
-        return np.repeat([trial.force_sd, trial.moment_sd], 3)
-
     def plate_errors(self, static: np.ndarray) -> np.ndarray:
         """(p, 5) what is wrong with every plate in all trials, in the order of PLATE_ERRORS."""
         result: np.ndarray = (self.to_plates @ static[self.layout.plates]).reshape(-1, len(PLATE_ERRORS))
@@ -391,6 +395,6 @@ class MapProblem:
         by_static[:, :, layout.late(k)] = -self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
         by_instrument = by_static[:, :, layout.instruments]
         by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
-        sd = self.root_sd(trial)[:, None]
+        sd = trial.root_sd(frames)[..., None]
         by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by.q, by.qd, by.qdd))
-        return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[:, 0])
+        return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[..., 0])
