@@ -58,7 +58,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
             or ezc3d is not installed.
     """
     path = Path(path)
-    file, notes = _open(path)
+    file, left_out = _open(path)
     parameters = file["parameters"]
     poses = _poses(file)
     if poses is None:
@@ -67,7 +67,6 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         labels, positions, label_notes = (), np.stack(list(poses.translation.values()), axis=1), []
     unit_name, unit_notes = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
-    notes += unit_notes
     if poses is not None:
         poses = poses.scaled(unit)
         places = virtual_places(poses)
@@ -77,25 +76,37 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
             f"deviation of {POSE_SD_M * 1e3:.0f} mm each" + (", of the person standing upright" if standing else "")
         ]
     time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
-    plates, plate_notes = lab_plates(path, file, unit_name)
+    plates, more_left_out, plate_notes = lab_plates(path, file, unit_name)
+    left_out += more_left_out
     stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
     rotation, up, axis_notes = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
     mass, height, measurements, subject_notes = _subject(path, parameters)
-    notes += [*label_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
+    left_out_notes = [f"{path.name}: {reason}" for reason in left_out]
+    notes = [*unit_notes, *label_notes, *left_out_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
     virtual = {} if poses is None else dict.fromkeys(labels, POSE_SD_M)
     return Recording(
-        path.stem, markers, ground_plates, mass, height, measurements, tuple(notes), unit_name, up, virtual
+        path.stem,
+        markers,
+        ground_plates,
+        mass,
+        height,
+        measurements,
+        tuple(notes),
+        unit_name,
+        up,
+        virtual,
+        left_out=tuple(left_out),
     )
 
 
 def _open(path: Path) -> tuple[C3dContent, list[str]]:
-    """What is in the file, with forces where ezc3d can work them out."""
+    """What is in the file, with forces where ezc3d can work them out, and why plates were left out."""
     expect_file(path)
     expect_ezc3d(path)
     doubt = doubts_about(path)
-    notes = []
+    left_out = []
     try:
         file = read_apart(path) if doubt else read_content(path)
     except C3dTrouble as error:
@@ -104,14 +115,14 @@ def _open(path: Path) -> tuple[C3dContent, list[str]]:
     parameters = file["parameters"]
     if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
         types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))
-        notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
+        left_out.append(f"force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
     if not file["data"]["points"].shape[1] and _poses(file) is None:
         raise FileError(
             path,
             "has no points; expected marker trajectories, or poses of pelvis, thighs, shanks, feet and toes as Theia "
             "has them (forces alone are not enough)",
         )
-    return file, notes
+    return file, left_out
 
 
 def _poses(file: C3dContent) -> Poses | None:

@@ -210,6 +210,7 @@ class Recording:
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
         virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
         belt: of the treadmill, where its speed is stated.
+        left_out: of plates that the file has and that cannot be used, why; among the notes, too.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -228,6 +229,7 @@ class Recording:
     vertical: str = "+Y"
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
+    left_out: tuple[str, ...] = ()
 
     def without_empty_markers(self) -> Recording:
         """The same without markers that no frame shows, and a note that names them."""
