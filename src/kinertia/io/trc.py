@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.io.even_times import rounding_s
 from kinertia.io.number_table import read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject_prefix import without_prefixes
@@ -20,7 +21,6 @@ METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
 _TIME_TOLERANCE_FRAMES = 0.25
-_MOST_DECIMALS = 7
 
 
 def read_trc(path: str | Path) -> Markers:
@@ -190,7 +190,7 @@ def _uniform_time(
     step = (time[-1] - time[0]) / (len(time) - 1)
     at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
     # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
-    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > _rounding_s(time):
+    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > rounding_s(time):
         problem = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
         raise FileError(path, f"{problem}; correct the wrong one", 3)
     frames = np.arange(len(time))
@@ -209,14 +209,6 @@ def _uniform_time(
         f"{1 / (uniform[1] - uniform[0]):.6g} Hz were taken instead"
     )
     return uniform, ((note,) if error.max() > 1e-6 else ())
-
-
-def _rounding_s(time: FloatArray) -> float:
-    """The unit of the last decimal that the times are told to."""
-    for decimals in range(_MOST_DECIMALS):
-        if np.abs(time - time.round(decimals)).max() < 1e-9:
-            return float(10.0**-decimals)
-    return 0.0
 
 
 def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) -> None:
