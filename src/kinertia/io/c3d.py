@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import re
+import tempfile
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.io.c3d_plates import lab_plates, to_ground_plates
-from kinertia.io.c3d_structure import doubts_about
+from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
@@ -108,7 +110,8 @@ def _open(path: Path) -> tuple[C3dContent, list[str]]:
     doubt = doubts_about(path)
     left_out = []
     try:
-        file = read_apart(path) if doubt else read_content(path)
+        with _plain(path) as readable:
+            file = read_apart(readable) if doubt else read_content(readable)
     except C3dTrouble as error:
         problem = f"{doubt}; {error}" if doubt else str(error)
         raise FileError(path, f"broken C3D file ({problem}); export it again") from None
@@ -123,6 +126,19 @@ def _open(path: Path) -> tuple[C3dContent, list[str]]:
             "has them (forces alone are not enough)",
         )
     return file, left_out
+
+
+@contextlib.contextmanager
+def _plain(path: Path) -> Iterator[Path]:
+    """The file, or a copy where ezc3d would misread its analog samples."""
+    content = with_plain_samples(path)
+    if content is None:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "plain.c3d"
+        copy.write_bytes(content)
+        yield copy
 
 
 def _poses(file: C3dContent) -> Poses | None:
