@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.c3d_plates import lab_plates, to_ground_plates
+from kinertia.io.c3d_plates import lab_plates, person_on_plates, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
-from kinertia.io.subject_prefix import without_prefixes
+from kinertia.io.subject_prefix import people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import FloatArray, Markers, Recording
@@ -225,7 +225,12 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
     outputs = _outputs(file["parameters"], labels)
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
     kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs]
-    names, notes = without_prefixes(path, [labels[k] for k in kept])
+    own = [labels[k] for k in kept]
+    people = list(people_among([label for label, k in zip(own, kept, strict=True) if seen[k]]))
+    on_plates = person_on_plates(file["data"].get("platform", []), people, own, positions[:, kept])
+    names, notes = without_prefixes(path, own, people[0] if len(people) == 1 else on_plates)
+    if on_plates:
+        notes.append(f"{path.name}: of {', '.join(people)} it is {on_plates} who is on the plates")
     chosen: dict[str, int] = {}
     for k, name in zip(kept, names, strict=True):
         if name not in chosen or (not seen[chosen[name]] and seen[k]):

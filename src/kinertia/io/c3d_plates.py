@@ -7,6 +7,7 @@ and the free moment; ezc3d's moment has the opposite sign there, so the moment i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ _EDGE_LIMITS_M = (0.1, 10.0)
 _OUTSIDE_LIMIT_M = 0.05
 _OFFSET_LIMIT_N = 5.0
 _FEWEST_IDLE_SAMPLES = 50
+_MUCH_NEARER = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +150,30 @@ def to_ground_plates(
         time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises), tuple(idle)
     )
     return loads, notes
+
+
+def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:
+    """Of several people the one who is much nearer to the plates while they are loaded; empty where nobody is.
+
+    Args:
+        platforms: as ezc3d has them.
+        people: what their labels begin with.
+        labels: of all m markers.
+        positions: (n, m, 3) in the axes and unit of the file.
+    """
+    if len(people) < 2:
+        return ""
+    away: dict[str, list[FloatArray]] = {person: [] for person in people}
+    for platform in platforms:
+        force = platform["force"].T[:: max(1, platform["force"].shape[1] // len(positions))][: len(positions)]
+        loaded = np.flatnonzero(np.linalg.norm(force, axis=1) > 5 * LOAD_THRESHOLD_N)
+        distance = np.linalg.norm(positions[loaded] - platform["corners"].mean(axis=1), axis=2)
+        for person in people:
+            own = [label.startswith(f"{person}:") for label in labels]
+            away[person].append(np.nan_to_num(distance[:, own], nan=np.inf).min(axis=1))
+    far = {person: float(np.median(np.concatenate(rows))) for person, rows in away.items() if any(map(len, rows))}
+    nearest, *others = sorted(far, key=lambda person: far[person]) or [""]
+    return nearest if others and far[nearest] < _MUCH_NEARER * far[others[0]] else ""
 
 
 def _corner_trouble(corners: FloatArray) -> str:
