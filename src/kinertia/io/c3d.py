@@ -25,7 +25,7 @@ from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
 from kinertia.io.subject_prefix import people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
-from kinertia.io.trc import METRES_PER_UNIT
+from kinertia.io.trc import METRES_PER_UNIT, stand_ins
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
@@ -217,8 +217,9 @@ def _continued(parameters: Any, name: str) -> list[str]:
 def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[str]]:
     """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
-    zero = np.asarray((positions == 0).all(axis=2))
-    positions[zero] = np.nan
+    missing = stand_ins(positions)
+    for where in missing.values():
+        positions[where] = np.nan
     seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
     labels = _continued(file["parameters"], "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
@@ -248,9 +249,9 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
     repeated = [name for name, times in Counter(names).items() if times > 1]
     if repeated:
         notes.append(f"{path.name}: repeated labels, the first with data was kept: {_some(repeated)}")
-    zeros = int(zero[:, list(chosen.values())].sum())
-    if zeros:
-        notes.append(f"{path.name}: {zeros} marker positions 0 0 0 were taken as missing")
+    for what, where in missing.items():
+        if count := where[:, list(chosen.values())].sum():
+            notes.append(f"{path.name}: {count} marker positions {what} were taken as missing")
     return tuple(chosen), positions[:, list(chosen.values())], notes
 
 
