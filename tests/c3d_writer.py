@@ -34,8 +34,10 @@ def write_c3d(
     unit: str = "mm",
     moment_unit: str | None = None,
     first_frame: int = 1,
+    integers: bool = False,
 ) -> Path:
-    """Write points (n, m, 3) with NaN as missing and analogs (n * s, c), both in file units."""
+    """Write points (n, m, 3) with NaN as missing and analogs (n * s, c), both in file units; as 16-bit `integers`
+    points in tenths of it, and analogs as they are."""
     n, m = points.shape[:2]
     analogs = np.zeros((n, 0)) if analogs is None else analogs
     per_frame, channels = len(analogs) // n, analogs.shape[1]
@@ -44,7 +46,7 @@ def write_c3d(
         "POINT": {
             "USED": np.array([m], np.int16),
             "FRAMES": np.array([n], np.int16),
-            "SCALE": np.array([-1.0]),
+            "SCALE": np.array([0.1 if integers else -1.0]),
             "RATE": np.array([rate_hz]),
             "UNITS": [unit],
             "LABELS": labels[:255],
@@ -66,11 +68,13 @@ def write_c3d(
     blocks = len(_section(groups)) // 512
     groups["POINT"]["DATA_START"] = np.array([2 + blocks], np.int16)
     missing = np.isnan(points).any(axis=2, keepdims=True)
-    rows = np.concatenate((np.where(missing, 0.0, points), np.where(missing, -1.0, 0.0)), axis=2)
+    places = 10.0 * points if integers else points
+    rows = np.concatenate((np.where(missing, 0.0, places), np.where(missing, -1.0, 0.0)), axis=2)
     data = np.concatenate((rows.reshape(n, 4 * m), analogs.reshape(n, per_frame * channels)), axis=1)
     header = struct.pack("<BBHHHHHfHHf", 2, 0x50, m, per_frame * channels, first_frame, first_frame + n - 1, 0,
-                         -1.0, 2 + blocks, per_frame, rate_hz)  # fmt: skip
-    path.write_bytes(header.ljust(512, b"\0") + _section(groups) + data.astype("<f4").tobytes())
+                         0.1 if integers else -1.0, 2 + blocks, per_frame, rate_hz)  # fmt: skip
+    content = data.round().astype(np.int64).astype("<u2") if integers else data.astype("<f4")
+    path.write_bytes(header.ljust(512, b"\0") + _section(groups) + content.tobytes())
     return path
 
 

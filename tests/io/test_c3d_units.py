@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from c3d_writer import write_c3d
-from kinertia.errors import FileError
+from c3d_writer import plate_parameters, write_c3d
+from kinertia.checks.recording import check_recording
+from kinertia.errors import FileError, TrialError
 from kinertia.io.c3d import read_c3d
 from kinertia.io.recording import read_recording
+from kinertia.trial.plate_assignment import assign_plates
 
 
 @pytest.mark.parametrize("unit_in_file", ["", "m", "inch"])
@@ -42,3 +44,39 @@ def test_a_length_unit_is_inferred_though_no_frame_shows_every_marker(tmp_path):
     person[:, 8] = np.nan
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", 1000.0 * person, [f"M{k}" for k in range(9)], unit=""))
     assert recording.length_unit == "mm"
+
+
+PLATE_AXES = np.array([[0.8, 0.6, 0.0], [0.6, -0.8, 0.0], [0.0, 0.0, -1.0]])
+"""Columns: a turned plate's axes in the laboratory, z down."""
+
+
+def on_turned_plate(path, moment_unit, per_unit, kind=2):
+    """A C3D file in mm of somebody whose load acts 50 and -40 mm from the middle of a plate, along its axes; moments
+    are in N mm / `per_unit`."""
+    person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (600.0, 500.0, 1800.0), (20, 9, 3))
+    to_surface = np.array([12.0, -9.0, -20.0])
+    force, place = np.array([-30.0, 20.0, -600.0]), np.array([50.0, -40.0, 0.0])
+    load = np.concatenate((force, np.cross(place + to_surface, force) / per_unit))
+    corners = np.array([[300.0, 200, 0], [-300, 200, 0], [-300, -200, 0], [300, -200, 0]]) @ PLATE_AXES.T
+    plate = {**plate_parameters(corners[None], kind), "ORIGIN": to_surface[:, None]}
+    parameters = {"POINT": {"Y_SCREEN": ["+Z"]}, "FORCE_PLATFORM": plate}
+    labels = [f"M{k}" for k in range(9)]
+    return write_c3d(path, person, labels, np.tile(load, (200, 1)), parameters, moment_unit=moment_unit)
+
+
+@pytest.mark.parametrize(("unit", "per_unit"), [("Nm", 1e3), ("N-m", 1e3), ("Ncm", 10.0), ("Nmm", 1.0), ("", 1.0)])
+def test_moments_in_another_unit_than_lengths_are_converted(tmp_path, unit, per_unit):
+    recording = read_c3d(on_turned_plate(tmp_path / "x.c3d", unit, per_unit))
+    x, y, _ = PLATE_AXES @ [0.05, -0.04, 0.0]
+    force = recording.plates.force[:, 0]
+    np.testing.assert_allclose(recording.plates.moment[:, 0], np.cross((x, 0.0, -y), force), atol=1e-3)
+    said = [note for note in recording.notes if f"the moments of plate 1 are in {unit}, points in mm" in note]
+    assert len(said) == (per_unit != 1.0)
+
+
+def test_why_a_plate_was_left_out_is_said_where_forces_are_missed(tmp_path):
+    reason = "plate 1 was left out, its moments are in Nm while points are in mm"
+    recording = read_recording(on_turned_plate(tmp_path / "x.c3d", "Nm", 1e3, kind=4))
+    with pytest.raises(TrialError, match=f"no force plates that can be used: {reason}"):
+        assign_plates(recording, {"r": ("M0",), "l": ("M1",)})
+    assert [verdict.sentence for verdict in check_recording(recording).verdicts if reason in verdict.sentence]

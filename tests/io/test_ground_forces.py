@@ -284,3 +284,45 @@ def test_uneven_time(write, tmp_path):
     path.write_text("\n".join(lines[:50] + lines[60:]))
     with pytest.raises(FileError, match="without gaps"):
         read_forces(path)
+
+
+def forces_at(path, time):
+    """A force file whose vertical force is the number of the sample, with these times."""
+    count = np.arange(len(time), dtype=float)
+    zero = np.zeros(len(time))
+    columns = {f"fA_{stem}{axis}": count if stem + axis == "vy" else zero for stem in "vpm" for axis in "xyz"}
+    write_sto(path, pd.DataFrame(columns, index=pd.Index(time, name="time")), in_degrees=False, name="grf")
+    return path
+
+
+@pytest.mark.parametrize(("rate_hz", "decimals"), [(2000, 3), (1200, 3), (960, 3), (600, 3), (1000, 2)])
+def test_rounded_times_are_put_back_on_their_grid(tmp_path, rate_hz, decimals):
+    true = 1.23 + np.arange(3000) / rate_hz
+    loads, notes = read_forces_with_notes(forces_at(tmp_path / "grf.mot", true.round(decimals)))
+    np.testing.assert_allclose(loads.time, true, atol=0.3 * 10.0**-decimals)
+    np.testing.assert_allclose(np.diff(loads.time), 1 / rate_hz, rtol=1e-4)
+    assert f"grf.mot: times are rounded to {10.0 ** (3 - decimals):g} ms; the even times of {rate_hz}" in notes[0]
+
+
+def test_exact_times_stay(tmp_path):
+    true = np.arange(3000) / 1000
+    loads, notes = read_forces_with_notes(forces_at(tmp_path / "grf.mot", true.round(3)))
+    np.testing.assert_array_equal(loads.time, true.round(3))
+    assert not [note for note in notes if "times" in note]
+
+
+@pytest.mark.parametrize(("rate_hz", "decimals"), [(2000, 3), (1200, 3), (1000, 3), (1000, 2)])
+@pytest.mark.parametrize("place", [100, 1500, 2900])
+def test_samples_lost_and_repeated_though_times_are_rounded(tmp_path, rate_hz, decimals, place):
+    frames = np.arange(3000)
+    few = 1 if (rate_hz, decimals) == (1000, 3) else 40  # what is lost within one step of exact times is seen
+    for kept in (np.delete(frames, slice(place, place + few)), np.insert(frames, place, frames[place : place + few])):
+        with pytest.raises(FileError, match="time goes from"):
+            read_forces(forces_at(tmp_path / "grf.mot", (kept / rate_hz).round(decimals)))
+
+
+def test_times_that_do_not_go_on(tmp_path):
+    with pytest.raises(FileError, match="time goes from 0 s to 0 s"):
+        read_forces(forces_at(tmp_path / "grf.mot", np.zeros(100)))
+    with pytest.raises(FileError, match="time goes from"):  # whole seconds are too coarse to tell the rate
+        read_forces(forces_at(tmp_path / "grf.mot", (np.arange(3000) / 1000).round()))

@@ -247,3 +247,13 @@ def test_labels_that_trc_cannot_hold(tmp_path, label):
     with pytest.raises(ValueError, match="labels"):
         write_trc(tmp_path / "x.trc", Markers(np.zeros(1), (label,), np.zeros((1, 1, 3))))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("number", ["-9999", "-9999.00000", "-9.999"])
+def test_places_that_stand_for_missing_markers(write, number):
+    row = "\t".join([number] * 3)
+    recording = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3", row, 1)))
+    assert np.isnan(recording.markers.positions).all(axis=2).sum() == 1
+    assert "x.trc: 1 marker positions -9999 -9999 -9999 were taken as missing (R.Heel)" in recording.notes
+    alone = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3", f"{number}\t2\t3", 1)))
+    assert np.isfinite(alone.markers.positions).all()

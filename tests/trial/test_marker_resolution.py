@@ -41,6 +41,29 @@ def test_frames_that_are_held(walk, times):
     assert f"at about {walk.rate_hz / times:.0f} Hz" in trouble
 
 
+def test_every_tenth_frame_repeats_the_one_before_it(walk):
+    places = walk.positions.copy()
+    places[10::10] = places[9:-1:10]
+    count = len(places[10::10])
+    trouble = made_up_frames_trouble(replace(walk, positions=places))
+    said = f"{count} of {len(places)} marker frames repeat the one before them, in all markers at once, the first at "
+    assert trouble.startswith(f"{said}{walk.time[10]:.3f} s")
+
+
+def test_frames_that_were_put_in(walk):
+    middle = len(walk.time) // 2
+    rows = np.r_[0 : middle + 1, middle, middle, middle + 1 : len(walk.time) - 2]
+    trouble = made_up_frames_trouble(replace(walk, positions=walk.positions[rows]))
+    assert trouble.startswith(f"2 of {len(rows)} marker frames repeat")
+    assert f"the first at {walk.time[middle + 1]:.3f} s" in trouble
+
+
+def test_frames_held_at_the_ends_are_no_trouble(walk):
+    places = walk.positions.copy()
+    places[:3], places[-3:] = places[3], places[-4]
+    assert made_up_frames_trouble(replace(walk, positions=places)) == ""
+
+
 def test_frames_that_are_drawn_between_others(walk):
     kept = np.arange(0, len(walk.time), 4)
     rows = np.arange(kept[-1] + 1)

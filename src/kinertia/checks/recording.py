@@ -267,7 +267,8 @@ def _trial(
 ) -> tuple[Trial | None, tuple[str, ...], list[Verdict]]:
     """The loads sorted by foot, notes, and whether all ground contact is known somewhere."""
     if recording.plates is None:
-        sentence = "no forces: a fit needs them; name the force file too, or a C3D file with plates"
+        why = f" ({'; '.join(recording.left_out)})" if recording.left_out else ""
+        sentence = f"no forces{why}: a fit needs them; name the force file too, or a C3D file with plates"
         return None, recording.notes, [] if standing else [Verdict("caution", sentence)]
     if feet is None:
         return None, recording.notes, []

@@ -9,21 +9,23 @@ from __future__ import annotations
 
 import contextlib
 import re
+import tempfile
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.c3d_plates import lab_plates, to_ground_plates
-from kinertia.io.c3d_structure import doubts_about
+from kinertia.io.c3d_plates import lab_plates, person_on_plates, to_ground_plates
+from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
-from kinertia.io.subject_prefix import without_prefixes
+from kinertia.io.subject_prefix import people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
-from kinertia.io.trc import METRES_PER_UNIT
+from kinertia.io.trc import METRES_PER_UNIT, stand_ins
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
@@ -58,7 +60,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
             or ezc3d is not installed.
     """
     path = Path(path)
-    file, notes = _open(path)
+    file, left_out = _open(path)
     parameters = file["parameters"]
     poses = _poses(file)
     if poses is None:
@@ -67,7 +69,6 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         labels, positions, label_notes = (), np.stack(list(poses.translation.values()), axis=1), []
     unit_name, unit_notes = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
-    notes += unit_notes
     if poses is not None:
         poses = poses.scaled(unit)
         places = virtual_places(poses)
@@ -77,41 +78,67 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
             f"deviation of {POSE_SD_M * 1e3:.0f} mm each" + (", of the person standing upright" if standing else "")
         ]
     time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
-    plates, plate_notes = lab_plates(path, file, unit_name)
+    plates, more_left_out, plate_notes = lab_plates(path, file, unit_name)
+    left_out += more_left_out
     stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
     rotation, up, axis_notes = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
     mass, height, measurements, subject_notes = _subject(path, parameters)
-    notes += [*label_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
+    left_out_notes = [f"{path.name}: {reason}" for reason in left_out]
+    notes = [*unit_notes, *label_notes, *left_out_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
     virtual = {} if poses is None else dict.fromkeys(labels, POSE_SD_M)
     return Recording(
-        path.stem, markers, ground_plates, mass, height, measurements, tuple(notes), unit_name, up, virtual
+        path.stem,
+        markers,
+        ground_plates,
+        mass,
+        height,
+        measurements,
+        tuple(notes),
+        unit_name,
+        up,
+        virtual,
+        left_out=tuple(left_out),
     )
 
 
 def _open(path: Path) -> tuple[C3dContent, list[str]]:
-    """What is in the file, with forces where ezc3d can work them out."""
+    """What is in the file, with forces where ezc3d can work them out, and why plates were left out."""
     expect_file(path)
     expect_ezc3d(path)
     doubt = doubts_about(path)
-    notes = []
+    left_out = []
     try:
-        file = read_apart(path) if doubt else read_content(path)
+        with _plain(path) as readable:
+            file = read_apart(readable) if doubt else read_content(readable)
     except C3dTrouble as error:
         problem = f"{doubt}; {error}" if doubt else str(error)
         raise FileError(path, f"broken C3D file ({problem}); export it again") from None
     parameters = file["parameters"]
     if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
         types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))
-        notes.append(f"{path.name}: force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
+        left_out.append(f"force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
     if not file["data"]["points"].shape[1] and _poses(file) is None:
         raise FileError(
             path,
             "has no points; expected marker trajectories, or poses of pelvis, thighs, shanks, feet and toes as Theia "
             "has them (forces alone are not enough)",
         )
-    return file, notes
+    return file, left_out
+
+
+@contextlib.contextmanager
+def _plain(path: Path) -> Iterator[Path]:
+    """The file, or a copy where ezc3d would misread its analog samples."""
+    content = with_plain_samples(path)
+    if content is None:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "plain.c3d"
+        copy.write_bytes(content)
+        yield copy
 
 
 def _poses(file: C3dContent) -> Poses | None:
@@ -190,15 +217,21 @@ def _continued(parameters: Any, name: str) -> list[str]:
 def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[str]]:
     """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
-    zero = np.asarray((positions == 0).all(axis=2))
-    positions[zero] = np.nan
+    missing = stand_ins(positions)
+    for where in missing.values():
+        positions[where] = np.nan
     seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
     labels = _continued(file["parameters"], "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
     outputs = _outputs(file["parameters"], labels)
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
     kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs]
-    names, notes = without_prefixes(path, [labels[k] for k in kept])
+    own = [labels[k] for k in kept]
+    people = list(people_among([label for label, k in zip(own, kept, strict=True) if seen[k]]))
+    on_plates = person_on_plates(file["data"].get("platform", []), people, own, positions[:, kept])
+    names, notes = without_prefixes(path, own, people[0] if len(people) == 1 else on_plates)
+    if on_plates:
+        notes.append(f"{path.name}: of {', '.join(people)} it is {on_plates} who is on the plates")
     chosen: dict[str, int] = {}
     for k, name in zip(kept, names, strict=True):
         if name not in chosen or (not seen[chosen[name]] and seen[k]):
@@ -216,9 +249,9 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
     repeated = [name for name, times in Counter(names).items() if times > 1]
     if repeated:
         notes.append(f"{path.name}: repeated labels, the first with data was kept: {_some(repeated)}")
-    zeros = int(zero[:, list(chosen.values())].sum())
-    if zeros:
-        notes.append(f"{path.name}: {zeros} marker positions 0 0 0 were taken as missing")
+    for what, where in missing.items():
+        if count := where[:, list(chosen.values())].sum():
+            notes.append(f"{path.name}: {count} marker positions {what} were taken as missing")
     return tuple(chosen), positions[:, list(chosen.values())], notes
 
 

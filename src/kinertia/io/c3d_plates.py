@@ -7,6 +7,7 @@ and the free moment; ezc3d's moment has the opposite sign there, so the moment i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ _EDGE_LIMITS_M = (0.1, 10.0)
 _OUTSIDE_LIMIT_M = 0.05
 _OFFSET_LIMIT_N = 5.0
 _FEWEST_IDLE_SAMPLES = 50
+_MUCH_NEARER = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,32 +55,56 @@ class LabPlates:
         return result
 
 
-def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | None, list[str]]:
-    """The plates that can be used, in lab axes; None where there is none. `length_unit` is the file's: mm, cm or m."""
+def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | None, list[str], list[str]]:
+    """The plates that can be used, in lab axes; None where there is none. `length_unit` is the file's: mm, cm or m.
+
+    Also why others were left out, and notes.
+    """
     unit = METRES_PER_UNIT[length_unit]
     platforms = file["data"].get("platform", [])
     group = file["parameters"].get("FORCE_PLATFORM", {})
-    names, forces, moments, corners, notes = [], [], [], [], []
+    names, forces, moments, corners, left_out, notes = [], [], [], [], [], []
     for number, platform in enumerate(platforms, start=1):
         name = f"plate {number}"
         places = unit * platform["corners"].T
-        trouble = _corner_trouble(places) or _unit_trouble(file, group, number - 1, length_unit)
-        trouble = trouble or ("" if platform["force"].size else "it has no samples")
+        kind = int(group["TYPE"]["value"][number - 1])
+        stated, moment_unit = _moment_unit(file, group, number - 1, length_unit)
+        trouble = _corner_trouble(places) or ("" if platform["force"].size else "it has no samples")
+        if moment_unit != unit and kind == 4:  # nobody knows what its matrix makes of them
+            trouble = trouble or f"its moments are in {stated} while points are in {length_unit}"
         if trouble:
-            notes.append(f"{path.name}: {name} was left out, {trouble}")
+            left_out.append(f"{name} was left out, {trouble}")
             continue
-        force = platform["force"].T
-        if int(group["TYPE"]["value"][number - 1]) == 1:
-            moment = np.cross(unit * platform["center_of_pressure"].T, force) + unit * platform["Tz"].T
-        else:
-            moment = unit * platform["moment"].T + np.cross(places.mean(axis=0), force)
+        if moment_unit != unit:
+            notes.append(f"{path.name}: the moments of {name} are in {stated}, points in {length_unit}: converted")
         names.append(name)
-        forces.append(force)
-        moments.append(moment)
+        forces.append(platform["force"].T)
+        moments.append(_moment(platform, kind, unit, moment_unit))
         corners.append(places)
     if not names:
-        return None, notes
-    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners)), notes
+        return None, left_out, notes
+    plates = LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners))
+    return plates, left_out, notes
+
+
+def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatArray:
+    """(k, 3) N m about the lab origin, of a file whose lengths are in `unit` (m), and moments in N `moment_unit`."""
+    force, corners = platform["force"].T, platform["corners"].T
+    if kind == 1:
+        result: FloatArray = np.cross(unit * platform["center_of_pressure"].T, force) + unit * platform["Tz"].T
+        return result
+    # to what the channels say ezc3d adds that of the way from the transducer to the surface, in the unit of lengths
+    measured = platform["moment"].T - np.cross(force, _axes(corners) @ platform["origin"])
+    about_middle = unit * platform["moment"].T + (moment_unit - unit) * measured
+    result = about_middle + np.cross(unit * corners.mean(axis=0), force)
+    return result
+
+
+def _axes(corners: FloatArray) -> FloatArray:
+    """Columns (3, 3): a plate's axes in the laboratory, by its corners (4, 3), as ezc3d has them."""
+    x, along = corners[0] - corners[1], corners[0] - corners[3]
+    z = np.cross(x, along)
+    return np.column_stack([axis / np.linalg.norm(axis) for axis in (x, np.cross(z, x), z)])
 
 
 def to_ground_plates(
@@ -126,6 +152,30 @@ def to_ground_plates(
     return loads, notes
 
 
+def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:
+    """Of several people the one who is much nearer to the plates while they are loaded; empty where nobody is.
+
+    Args:
+        platforms: as ezc3d has them.
+        people: what their labels begin with.
+        labels: of all m markers.
+        positions: (n, m, 3) in the axes and unit of the file.
+    """
+    if len(people) < 2:
+        return ""
+    away: dict[str, list[FloatArray]] = {person: [] for person in people}
+    for platform in platforms:
+        force = platform["force"].T[:: max(1, platform["force"].shape[1] // len(positions))][: len(positions)]
+        loaded = np.flatnonzero(np.linalg.norm(force, axis=1) > 5 * LOAD_THRESHOLD_N)
+        distance = np.linalg.norm(positions[loaded] - platform["corners"].mean(axis=1), axis=2)
+        for person in people:
+            own = [label.startswith(f"{person}:") for label in labels]
+            away[person].append(np.nan_to_num(distance[:, own], nan=np.inf).min(axis=1))
+    far = {person: float(np.median(np.concatenate(rows))) for person, rows in away.items() if any(map(len, rows))}
+    nearest, *others = sorted(far, key=lambda person: far[person]) or [""]
+    return nearest if others and far[nearest] < _MUCH_NEARER * far[others[0]] else ""
+
+
 def _corner_trouble(corners: FloatArray) -> str:
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     low, high = _EDGE_LIMITS_M
@@ -139,18 +189,16 @@ def _corner_trouble(corners: FloatArray) -> str:
     return f"its corners do not form a plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
 
 
-def _unit_trouble(file: Any, group: Any, plate: int, length: str) -> str:
-    """Moments are taken to be in N times the file's unit of `length`; say where the analog channels say otherwise."""
+def _moment_unit(file: Any, group: Any, plate: int, length: str) -> tuple[str, float]:
+    """What the analog channels of a plate say its moments are in, and how many N m that is; N `length` by default."""
     if int(group["TYPE"]["value"][plate]) not in (2, 4):
-        return ""
+        return "", METRES_PER_UNIT[length]
     channels = np.atleast_2d(group["CHANNEL"]["value"])[:, plate]
     units = file["parameters"]["ANALOG"]["UNITS"]["value"]
     channel = int(channels[3]) - 1
-    unit = units[channel] if channel < len(units) else ""
-    said = "".join(letter for letter in str(unit).lower() if letter.isalpha())
-    if said in ("nm", "nmm", "ncm") and said != "n" + length:
-        return f"its moments are in {unit} while points are in {length}"
-    return ""
+    unit = str(units[channel]) if channel < len(units) else ""
+    said = "".join(letter for letter in unit.lower() if letter.isalpha())
+    return unit, METRES_PER_UNIT[said[1:] if said in ("nm", "nmm", "ncm") else length]
 
 
 def _outside(force: FloatArray, moment: FloatArray, corners: FloatArray) -> float:

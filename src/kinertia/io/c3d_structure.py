@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from kinertia.errors import FileError
 
 _BLOCK = 512
@@ -46,12 +48,13 @@ class _Header:
 
 @dataclass(frozen=True)
 class _Parameter:
-    """One entry of the parameter section: its shape, and its bytes."""
+    """One entry of the parameter section: its shape, its bytes, and at which byte of the section they begin."""
 
     kind: str
     shape: tuple[int, ...]
     content: bytes
     order: str
+    at: int = 0
 
     @cached_property
     def numbers(self) -> tuple[float, ...]:
@@ -107,6 +110,53 @@ def trial_date(path: Path) -> tuple[int, ...]:
     parameters, _ = _parameters(path, section, _BYTE_ORDERS[section[3]][0])
     entry = parameters.get(("TRIAL", "DATE"))
     return () if entry is None else tuple(int(number) for number in entry.numbers)
+
+
+def with_plain_samples(path: Path) -> bytes | None:
+    """A C3D file of integers whose ANALOG:OFFSET is taken off its samples, where ezc3d would not; None of all others.
+
+    ezc3d takes samples to be signed, and offsets to be positive. Some files say that their samples are unsigned, and
+    they are not: in signed samples around zero those below would be the largest.
+
+    Raises:
+        FileError: a sample is farther from its offset than 16 bits hold; or as `doubts_about`.
+    """
+    block, start, section = _sections(path)
+    if len(block) < _BLOCK or len(section) < 4 or section[3] not in _BYTE_ORDERS:
+        return None
+    order, sign_byte = _BYTE_ORDERS[section[3]]
+    parameters, _ = _parameters(path, section, order)
+    said, offset = parameters.get(("ANALOG", "FORMAT")), parameters.get(("ANALOG", "OFFSET"))
+    header = _header(block, order)
+    channels = header.analogs // max(header.samples, 1)
+    if block[sign_byte] & 0x80 or not channels or offset is None or offset.kind != "h" or offset.size < channels:
+        return None
+    unsigned = said is not None and said.content.strip(b" \0").upper() == b"UNSIGNED"
+    if not unsigned and min(offset.numbers) >= 0:
+        return None
+    content = bytearray(path.read_bytes())
+    first, per_frame = _BLOCK * (header.data_block - 1), 4 * header.points + header.analogs
+    frames = header.frames or (len(content) - first) // (2 * per_frame)
+    if first < 0 or not frames:
+        return None
+    words = np.frombuffer(content, f"{order}i2", per_frame * frames, first).reshape(frames, per_frame)
+    samples = words[:, 4 * header.points :].reshape(-1, channels).astype(int)
+    offsets = np.frombuffer(content, f"{order}i2", offset.size, start + offset.at)
+    taken_off = offsets[:channels].astype(int)
+    if unsigned and np.ptp(samples % 65536, axis=0).sum() <= np.ptp(samples, axis=0).sum():
+        samples, taken_off = samples % 65536, taken_off % 65536
+    if samples.max() < 32768 and taken_off.max() < 32768 and taken_off.min() >= 0:
+        return None
+    plain = samples - taken_off
+    if np.abs(plain).max() > 32767:
+        raise FileError(
+            path,
+            f"analog samples are up to {np.abs(plain).max()} steps from ANALOG:OFFSET, more than can be read of 16-bit "
+            "integers; correct ANALOG:FORMAT or OFFSET, or export it with floating-point numbers",
+        )
+    words[:, 4 * header.points :] = plain.reshape(frames, -1)
+    offsets[:] = 0
+    return bytes(content)
 
 
 def _sections(path: Path) -> tuple[bytes, int, bytes]:
@@ -174,7 +224,7 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
             bytes_needed = abs(kind) * math.prod(shape)
             if kind not in _KINDS or len(shape) < dimensions or body + bytes_needed >= len(section):
                 raise broken(f"{called} is longer than the parameters are, or of an unknown type")
-            entries[group, name] = _Parameter(_KINDS[kind], shape, section[body : body + bytes_needed], order)
+            entries[group, name] = _Parameter(_KINDS[kind], shape, section[body : body + bytes_needed], order, body)
             body += bytes_needed
         elif -group in groups or name in groups.values():
             odd = odd or f"it has the group {called} twice"

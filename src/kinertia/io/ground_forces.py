@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.io.even_times import even_times
 from kinertia.io.file_names import path_from
 from kinertia.io.number_table import expect_file
 from kinertia.io.sto import TimeTable, read_table
@@ -42,7 +43,8 @@ def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = Non
 
     Below `LOAD_THRESHOLD_N` of vertical force the point of application is garbage: such samples are set to zero, unless
     they are how a load begins or ends (`idle_plate`). Where no torque is given, the free moment is zero.
-    `read_forces_with_notes` tells what was assumed.
+    Times that were rounded when written are put back on the even grid they came from. `read_forces_with_notes` tells
+    what was assumed.
 
     Raises:
         FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
@@ -75,7 +77,8 @@ def read_forces_with_notes(
         notes += more
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
-    _expect_steady_time(path, table.time)
+    time, time_notes = even_times(path, table.time)
+    table = replace(table, time=time)
     turn = np.eye(3) if turn is None else turn
     wrenches = [_wrench(path, table, group, turn) for group in groups]
     loads = PlateLoads(
@@ -88,22 +91,7 @@ def read_forces_with_notes(
         idle=tuple(plate.idle for plate in wrenches),
         torques=torque_columns(*_stated(table, groups, turn)),
     )
-    return loads, (*notes, *table.notes, *_remarks(path, loads, groups))
-
-
-def _expect_steady_time(path: Path, time: FloatArray) -> None:
-    steps = np.diff(time)
-    if not steps.size:
-        return
-    usual = float(np.median(steps))
-    odd = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * abs(usual)))
-    if odd.size:
-        before, after = time[odd[0]], time[odd[0] + 1]
-        raise FileError(
-            path,
-            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal "
-            "steps, export the forces without gaps",
-        )
+    return loads, (*notes, *table.notes, *time_notes, *_remarks(path, loads, groups))
 
 
 def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> PlateLoad:

@@ -64,7 +64,7 @@ def read_recording(
         plates, notes = read_forces_with_notes(forces_path, loads_path, turn)
         if recording.plates is not None:
             notes = (f"{markers_path.name}: its own force plates were not used, the force file was", *notes)
-        recording = replace(recording, plates=plates, notes=(*recording.notes, *notes))
+        recording = replace(recording, plates=plates, notes=(*recording.notes, *notes), left_out=())
     _expect_overlap(recording)
     _expect_laboratory(markers_path, recording)
     return recording

@@ -10,25 +10,26 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.io.even_times import rounding_s
 from kinertia.io.number_table import read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject_prefix import without_prefixes
-from kinertia.trial.data import FloatArray, Markers, Recording
+from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
 _TIME_TOLERANCE_FRAMES = 0.25
-_MOST_DECIMALS = 7
+_STAND_INS = {"0 0 0": (0.0,), "-9999 -9999 -9999": (-9999.0, -9.999)}
 
 
 def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
-    Empty cells, NaN and the triple 0 0 0 are missing markers; `subject:` before the labels is taken off. Frame times
-    that were rounded when written are put back on the uniform grid they came from. `read_trc_recording` tells what was
-    needed.
+    Empty cells, NaN and the triples 0 0 0 and -9999 -9999 -9999 are missing markers; `subject:` before the labels is
+    taken off. Frame times that were rounded when written are put back on the uniform grid they came from.
+    `read_trc_recording` tells what was needed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
@@ -190,7 +191,7 @@ def _uniform_time(
     step = (time[-1] - time[0]) / (len(time) - 1)
     at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
     # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
-    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > _rounding_s(time):
+    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > rounding_s(time):
         problem = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
         raise FileError(path, f"{problem}; correct the wrong one", 3)
     frames = np.arange(len(time))
@@ -211,14 +212,6 @@ def _uniform_time(
     return uniform, ((note,) if error.max() > 1e-6 else ())
 
 
-def _rounding_s(time: FloatArray) -> float:
-    """The unit of the last decimal that the times are told to."""
-    for decimals in range(_MOST_DECIMALS):
-        if np.abs(time - time.round(decimals)).max() < 1e-9:
-            return float(10.0**-decimals)
-    return 0.0
-
-
 def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) -> None:
     if np.isnan(time).any():
         row = int(np.argmax(np.isnan(time)))
@@ -236,7 +229,7 @@ def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) ->
 def seen_positions(
     path: Path, values: FloatArray, labels: tuple[str, ...], line_numbers: list[int]
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where all are missing or zero, and notes on zeros."""
+    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where these are missing or stand for it, notes."""
     positions = values.reshape(len(values), len(labels), 3)
     absent = np.isnan(positions)
     partly = np.argwhere(absent.any(axis=2) & ~absent.all(axis=2))
@@ -247,9 +240,22 @@ def seen_positions(
             f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair the row",
             line_numbers[row],
         )
-    zero = (positions == 0).all(axis=2)
-    if not zero.any():
-        return positions, ()
-    positions[zero] = np.nan
-    named = ", ".join(label for label, hit in zip(labels, zero.any(axis=0), strict=True) if hit)
-    return positions, (f"{path.name}: {int(zero.sum())} marker positions 0 0 0 were taken as missing ({named})",)
+    notes = []
+    for what, where in stand_ins(positions).items():
+        positions[where] = np.nan
+        if where.any():
+            named = ", ".join(label for k, label in enumerate(labels) if where[:, k].any())
+            notes.append(f"{path.name}: {where.sum()} marker positions {what} were taken as missing ({named})")
+    return positions, tuple(notes)
+
+
+def stand_ins(positions: FloatArray) -> dict[str, BoolArray]:
+    """Where (n, m) positions (n, m, 3) in a file's unit only stand for a missing marker, by what they are there.
+
+    -9999 became -9.999 where millimetres were written as metres.
+    """
+    found = {}
+    for name, numbers in _STAND_INS.items():
+        hits = [np.isclose(positions, number, rtol=1e-6, atol=0.0).all(axis=2) for number in numbers]
+        found[name] = np.asarray(np.any(hits, axis=0))
+    return found

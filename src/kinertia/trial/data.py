@@ -215,6 +215,7 @@ class Recording:
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
         virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
         belt: of the treadmill, where its speed is stated.
+        left_out: of plates that the file has and that cannot be used, why; among the notes, too.
 
     Raises:
         TrialError: times that are no clock's, infinite places of markers, forces that are not numbers, two plates of
@@ -237,6 +238,7 @@ class Recording:
     vertical: str = "+Y"
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
+    left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         markers, plates = self.markers, self.plates

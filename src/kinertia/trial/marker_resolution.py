@@ -36,6 +36,12 @@ def made_up_frames_trouble(markers: Markers) -> str:
     if len(place) < _FEWEST_FRAMES:
         return ""
     repeated = _for_moments(_repeated(place), markers.rate_hz)
+    if 0.0 < repeated.mean() <= _REPEATED_SHARE and _amid_motion(place, repeated):
+        return (
+            f"{repeated.sum()} of {len(place)} marker frames repeat the one before them, in all markers at once, the "
+            f"first at {markers.time[1 + int(np.argmax(repeated))]:.3f} s: lost frames were filled so, or frames were "
+            "put in, and the markers stop there and jump on; export the frames that were measured, lost ones as gaps"
+        )
     between = _for_moments(_between(place), markers.rate_hz)
     if repeated.mean() > _REPEATED_SHARE:
         true_hz, what = markers.rate_hz * (1.0 - repeated.mean()), "repeats the one before it, in all markers at once"
@@ -109,6 +115,19 @@ def _repeated(place: FloatArray) -> BoolArray:
     if not goes_on.size or np.median(goes_on) < _LEAST_MOTION_M:
         return np.zeros(len(way), dtype=bool)
     return np.asarray(same & (count > 0))
+
+
+def _amid_motion(place: FloatArray, repeated: BoolArray) -> bool:
+    """Whether markers stop in repeated frames (n - 1,) and go on just before and after, those at the ends apart.
+
+    Coordinates that are rounded repeat as well, where a person hardly moves.
+    """
+    way = np.linalg.norm(np.diff(place, axis=0), axis=2)
+    way[~np.isfinite(way).any(axis=1)] = 0.0
+    moving = float(np.nanmedian(way[~repeated])) if (~repeated).any() else np.inf
+    inner = [run for run in runs(repeated) if run[0] > 0 and run[1] < len(repeated) - 1]
+    beside = [np.nanmedian(way[[first - 1, last + 1]], axis=1).min() for first, last in inner]
+    return max(beside, default=0.0) > max(_LEAST_MOTION_M, 0.5 * moving)
 
 
 def _between(place: FloatArray) -> BoolArray:

@@ -86,7 +86,8 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
             f"by the data, all ground contact is measured in {spans}",
         )
     if not measured.any():
-        raise TrialError(recording.name, _nothing_measured(recording.markers.time, loads, contact, window_s))
+        problem = "; ".join([_nothing_measured(recording.markers.time, loads, contact, window_s), *recording.left_out])
+        raise TrialError(recording.name, problem)
     told = (*recording.notes, *notes)
     return Trial(recording.name, recording.markers, loads, measured, told, recording.virtual_sd_m, recording.belt)
 
@@ -109,7 +110,10 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     """
     plates = recording.plates
     if plates is None:
-        raise TrialError(recording.name, "no force plates; give a force file (.mot, .sto) or a C3D file with plates")
+        why = f" that can be used: {'; '.join(recording.left_out)}" if recording.left_out else ""
+        raise TrialError(
+            recording.name, f"no force plates{why}; give a force file (.mot, .sto) or a C3D file with plates"
+        )
     centres = [_centre(recording.markers.select(feet[foot]), plates.time) for foot in FEET]
     covered = (plates.time >= recording.markers.time[0]) & (plates.time <= recording.markers.time[-1])
     force = np.zeros((len(plates.time), 2, 3))

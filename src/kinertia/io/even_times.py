@@ -1,0 +1,63 @@
+"""Times of samples that were taken at a constant rate, and rounded when they were written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.trial.data import FloatArray
+
+_MOST_DECIMALS = 7
+_COARSEST_S = 0.01
+"""Times in coarser units hardly tell where samples are lost."""
+_OFF = 0.75
+"""Of the unit: so far rounded times are from the even ones, half a unit and what the straight line errs by."""
+_FEWEST_ODD, _ODD_SHARE = 5, 0.02
+"""Rounding makes odd steps all the time; a lost or repeated sample makes one."""
+_NOTICED = 0.05
+"""Of a step; times that are off by less stay as they are."""
+
+
+def rounding_s(time: FloatArray) -> float:
+    """The unit of the last decimal that the times are told to; 0 where there are too many."""
+    for decimals in range(_MOST_DECIMALS):
+        if np.abs(time - time.round(decimals)).max() < 1e-9:
+            return float(10.0**-decimals)
+    return 0.0
+
+
+def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with a note.
+
+    Nothing tells the rate but the times: the grid is the straight line through them. At 2000 Hz and in whole
+    milliseconds every other step is zero.
+
+    Raises:
+        FileError: samples are lost or repeated, or time goes back.
+    """
+    steps = np.diff(time)
+    if not steps.size:
+        return time, ()
+    usual = float(np.median(steps))
+    odd = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * abs(usual)))
+    unit = rounding_s(time)
+    step, start = np.polyfit(np.arange(len(time)), time, 1)
+    even = start + step * np.arange(len(time))
+    error = float(np.abs(time - even).max())
+    rounded = 0 < unit <= _COARSEST_S and step > 0 and error <= _OFF * unit
+    often = odd.size >= _FEWEST_ODD and odd.size > _ODD_SHARE * steps.size
+    if odd.size and not (rounded and often):
+        before, after = time[odd[0]], time[odd[0] + 1]
+        raise FileError(
+            path,
+            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal "
+            "steps, export the forces without gaps",
+        )
+    if not rounded or error <= _NOTICED * step:
+        return time, ()
+    note = (
+        f"{path.name}: times are rounded to {1e3 * unit:g} ms; the even times of {1 / step:.4g} Hz were taken instead"
+    )
+    return even, (note,)
