@@ -52,6 +52,15 @@ def test_a_doubted_segment_is_a_caution_for_its_own_output(fit):
     assert outputs["segment masses"].level == "pass"
 
 
+def test_of_a_person_unlike_the_prior_nothing_is_used_without_care(fit):
+    """Though no single parameter is far: an ankle weight's masses were to be used, 8 error bars from the truth."""
+    clear = informed(fit, 1.0, slice(0, 7))
+    whole = replace(clear.posterior.unlikeness, chance=1e-12)
+    for use in uses(replace(clear, posterior=replace(clear.posterior, unlikeness=whole)))[1:4]:
+        assert use.level == "caution"
+        assert "1 of 1,000,000,000 people" in use.reason
+
+
 def test_what_contradicts_the_model_is_not_used(fit):
     clear = informed(fit, 1.0, slice(0, 10))
     table = clear.literature.table().copy()

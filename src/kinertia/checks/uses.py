@@ -101,7 +101,7 @@ def _with_convergence(fit: Fit, verdicts: Sequence[Verdict]) -> Level:
 
 
 def _segments(fit: Fit, name: str, columns: slice) -> Use:
-    """By what the data say about these parameters, and by how far they went from the prior's mean."""
+    """By what the data say about these parameters, and by how far they are from the prior, each or together."""
     impossible, _ = impossible_estimates(fit)
     if not fit.converged or impossible:
         why = _NOT_CONVERGED if not fit.converged else f"{len(impossible)} segments are physically impossible"
@@ -123,6 +123,11 @@ def _segments(fit: Fit, name: str, columns: slice) -> Use:
         reason += f"; beyond {CONTRADICTION_SD:g} prior SDs from {start}: {', '.join(doubted)}"
         if contradicts(away):
             return Use(name, "fail", reason)
+    whole = fit.posterior.unlikeness
+    unlike = whole is not None and whole.unlike
+    if whole is not None and unlike:
+        reason += f"; as far from {start} as {whole.people}, so that error bars are too small: see the warning below"
     if not shown:
         return Use(name, "fail", f"the data show none of {information.size}: they are about as uncertain as {start}'s")
-    return Use(name, "pass" if shown >= SHOWN_SHARE * information.size and not doubted else "caution", reason)
+    sound = shown >= SHOWN_SHARE * information.size and not doubted and not unlike
+    return Use(name, "pass" if sound else "caution", reason)

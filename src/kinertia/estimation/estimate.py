@@ -122,7 +122,13 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         *([] if outcome.posterior is None else not_found_warnings(ready.attached, outcome.bsp, outcome.posterior.sd)),
         # free moments of the wrong sign are off like mirror images, too
         *([] if signs else _mirrored_free_moments(outcome)),
-        *force_warnings(ready.carried, ready.literature, outcome.trials, ready.skeleton),
+        *force_warnings(
+            ready.carried,
+            ready.literature,
+            outcome.trials,
+            ready.skeleton,
+            None if outcome.posterior is None else outcome.posterior.calibration,
+        ),
         *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
     )
     return Fit(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.common_gain import common_gain_warning
 from kinertia.estimation.force_mass import CARRIED_HINT, UNMEASURED_HINT, force_mass
 from kinertia.estimation.input_checks import mass_by_force_kg
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
+from kinertia.estimation.simultaneous.instrument_warnings import common_gain
 from kinertia.estimation.two_level import TwoLevelResult
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -36,15 +38,26 @@ def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> fl
 
 
 def force_warnings(
-    carried: CarriedMass, literature: BodySegmentParameters, trials: Sequence[TrialFit], skeleton: Skeleton
+    carried: CarriedMass,
+    literature: BodySegmentParameters,
+    trials: Sequence[TrialFit],
+    skeleton: Skeleton,
+    calibration: Mapping[str, Mapping[str, float | str]] | None = None,
 ) -> list[str]:
     """Trials whose vertical force is not that of the person on the scale, or not that of the motion found.
 
     The first is said of the forces and the markers' centre alone (`force_mass`), so that no motion that we found
-    wrongly can accuse the scale or the plates.
+    wrongly can accuse the scale or the plates; of all trials at once where the estimate gives all plates the same gain.
+
+    Args:
+        carried: what was stated.
+        literature, skeleton: as before the estimate.
+        trials: as estimated.
+        calibration: what the estimate found of the plates, if it looked.
     """
-    warnings = []
+    warnings, measured = [], []
     mass_kg = carried.total_kg
+    alike = bool(common_gain(calibration or {}))
     for trial in trials:
         by_markers = force_mass(skeleton, trial.kinematics.trial)
         if by_markers is None:
@@ -52,12 +65,15 @@ def force_warnings(
         by_force, by_motion = by_markers.mass_kg, mass_from_force_kg(literature, trial)
         if lost := by_markers.lost_for_a_while(carried):
             warnings.append(f"{trial.name}: the plates do not carry the stated {carried} all the time: {lost}")
+        elif alike:
+            measured.append(by_markers)
         elif abs(by_force - mass_kg) > FORCE_MASS_TOLERANCE * mass_kg + 2 * carried.sd_kg:
-            hint = f"; {CARRIED_HINT}" if by_force - mass_kg > LIGHTEST_LOAD_KG else ""
-            hint = f", {UNMEASURED_HINT}" if by_force < mass_kg else hint
+            check = "check the mass, and the gain and zero of the plates"
+            check = f"{CARRIED_HINT}; else {check}" if by_force - mass_kg > LIGHTEST_LOAD_KG else check
+            hint = f", {UNMEASURED_HINT}" if by_force < mass_kg else ""
             warnings.append(
                 f"{trial.name}: the mean vertical force corresponds to {by_force:.1f} kg; stated mass {carried} "
-                f"({100 * (by_force / mass_kg - 1):+.1f} %); check the mass, and the gain and zero of the plates{hint}"
+                f"({100 * (by_force / mass_kg - 1):+.1f} %); {check}{hint}"
             )
         if abs(by_motion - by_force) > MOTION_TOLERANCE * by_force + 2 * by_markers.sd_kg:
             warnings.append(
@@ -65,7 +81,7 @@ def force_warnings(
                 f"{by_motion:.1f} kg like this, and one of {by_force:.1f} kg like the markers): inverse kinematics "
                 f"went wrong, not the plates; look at the marker errors over time for the frames where it did"
             )
-    return warnings
+    return [common_gain_warning(calibration or {}, measured, carried), *warnings] if alike else warnings
 
 
 def fit_warnings(

@@ -13,6 +13,8 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from kinertia.estimation.simultaneous.one_sided import OneSided
+from kinertia.estimation.simultaneous.unlike import Unlikeness
 from kinertia.io.object_archive import read_archive, write_archive
 from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.axis_functions import Composed, PiecewisePolynomial
@@ -52,7 +54,7 @@ class SavedFit:
 
 _KINDS = (
     SavedFit, Provenance, Truth, Fit, TrialFit, CurveDeviations, Subject, Settings,
-    Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination,
+    Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,

@@ -19,7 +19,7 @@ from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
-from kinertia.estimation.simultaneous.unlike import unlikeness
+from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
@@ -52,6 +52,7 @@ class Posterior:
         base: which combinations of parameters these motions show, and which none ever shows.
         instruments: what these trials say of plates and clock.
         prior_mean: of the body segment parameters; None in files of before, where it was not written.
+        unlikeness: how far the estimate is from the prior; None in files of before.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -67,6 +68,7 @@ class Posterior:
     base: BaseParameters
     instruments: InstrumentInformation
     prior_mean: BodySegmentParameters | None = None
+    unlikeness: Unlikeness | None = None
 
     @property
     def information(self) -> np.ndarray:
@@ -148,6 +150,7 @@ def fit_simultaneous(
         ),
         result.instruments,
         uncertainty.whole(prior.mean),
+        unlikeness(prior, result.bsp, result.bsp_covariance),
     )
     return SimultaneousFit(
         result,
@@ -255,18 +258,30 @@ def _warnings(
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
             warnings.append(f"{kinematics.trial.name}: drifting markers, down-weighted: {listed}")
     warnings += _attached_anew(result, trials)
-    away = (result.bsp.table() - prior.mean.table()) / prior.sd
+    return warnings + _body_warnings(prior, uncertainty, result.bsp, posterior.unlikeness)
+
+
+def _body_warnings(
+    prior: BspPrior, uncertainty: ModelUncertainty, bsp: BodySegmentParameters, whole: Unlikeness | None
+) -> list[str]:
+    """One sentence where the estimate contradicts the prior.
+
+    A side that is heavier is the body's, or something on it, even where that drives single parameters far; where single
+    parameters are far for no such reason, it is the instruments'.
+    """
+    away = (bsp.table() - prior.mean.table()) / prior.sd
     far = [
-        f"{PARAMETERS[k]} of {result.bsp.segments[i]} {away[i, k]:+.1f}"
+        f"{PARAMETERS[k]} of {bsp.segments[i]} {away[i, k]:+.1f}"
         for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD)
     ]
-    if far:
-        warnings.append(
-            f"the data contradict the model: {', '.join(far)} prior SDs from {uncertainty.source}; a wrong joint, "
-            f"plate or marker is more likely than an unusual body"
-        )
-    whole = unlikeness(prior, result.bsp, result.bsp_covariance)
-    return [*warnings, whole.sentence()] if whole.unlike and not far else warnings
+    if whole is not None and whole.unlike and (whole.one_sided or not far):
+        return [whole.sentence()]
+    if not far:
+        return []
+    return [
+        f"the data contradict the model: {', '.join(far)} prior SDs from {uncertainty.source}; a wrong joint, "
+        f"plate or marker is more likely than an unusual body"
+    ]
 
 
 def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:

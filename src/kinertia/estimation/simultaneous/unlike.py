@@ -16,6 +16,7 @@ from scipy.linalg import eigh
 from scipy.special import chdtrc
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.one_sided import OneSided, one_sided
 from kinertia.model.bsp import BodySegmentParameters
 
 UNLIKE_CHANCE = 1e-3
@@ -43,6 +44,8 @@ class Unlikeness:
         segments: those that have moved most, the furthest first.
         both_sides: whether the first of them and its other side have moved alike: joints that are found wrongly do so,
             a prosthesis does not.
+        one_sided: the side that is heavier, where that is what departs most; the prior pulls the other side along, so
+            that both may seem to have moved alike.
     """
 
     distance2: float
@@ -50,29 +53,35 @@ class Unlikeness:
     chance: float
     segments: tuple[str, ...]
     both_sides: bool
+    one_sided: OneSided | None = None
 
     @property
     def unlike(self) -> bool:
         """Whether this is hardly a person of the prior."""
         return self.chance < UNLIKE_CHANCE
 
+    @property
+    def people(self) -> str:
+        """Of how many people of the prior one is as far away, in a word."""
+        rounded = 10.0 ** round(np.log10(max(self.chance, 1e-9)))
+        return f"1 of {1.0 / rounded:,.0f} people"
+
     def sentence(self) -> str:
         """What that means, the likeliest causes first."""
+        if self.one_sided is not None:
+            return self.one_sided.sentence()
+        worn = "something that was worn or carried ([[attached]])"
+        other = "a body that the tables do not describe (age_years, population under [subject])"
         wrong = "a wrong joint, plate or marker"
-        causes = [
-            "a prosthesis ([segment.shank_l] prosthesis = true)",
-            "something that was worn or carried ([[attached]])",
-            "a body that the tables do not describe (age_years, population under [subject])",
-        ]
+        causes = [worn, other, wrong]
         if self.both_sides:
-            wrong = (
-                f"{wrong}, since left and right are off alike (joint widths, places of the knees' and ankles' markers)"
-            )
-        causes = [wrong, *causes[1:], causes[0]] if self.both_sides else [*causes, wrong]
-        rounded = 10.0 ** round(np.log10(max(self.chance, 1e-9)))
+            alike = "left and right are off alike (joint widths, places of the knees' and ankles' markers)"
+            causes = [f"{wrong}, since {alike}", worn, other]
+        if limb := next((name for name in self.segments if name.endswith(("_r", "_l"))), None):
+            causes.append(f"a prosthesis (prosthesis = true under [segment.{limb}])")
         return (
             f"the person is unlike the prior: {self.combinations} combinations of parameters that the data show are "
-            f"together as far from it as in 1 of {1.0 / rounded:,.0f} people, most of all "
+            f"together as far from it as in {self.people}, most of all "
             f"{', '.join(self.segments)}; likely causes: {'; '.join(causes)}"
         )
 
@@ -90,7 +99,9 @@ def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.
     by_segment = moved.reshape(-1, 10)
     order = np.argsort(-np.abs(by_segment).max(axis=1))[:3]
     segments = tuple(estimate.segments[k] for k in order)
-    return Unlikeness(distance2, count, chance, segments, _alike(estimate.segments, by_segment, int(order[0])))
+    side = one_sided(prior, estimate, covariance)
+    alike = side is None and _alike(estimate.segments, by_segment, int(order[0]))
+    return Unlikeness(distance2, count, chance, segments, alike, side)
 
 
 def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
