@@ -4,7 +4,8 @@ When a foot lands, soft parts of the body swing after its bones, and the sum of 
 the motion's bandwidth cannot make. Which of it they can make depends on where the landing lies between two knots. Taken
 as sure as in other frames, these frames would pull the motion about, and the clock to where the landing suits the
 knots: of a walk whose forces were moved in steps, the clock followed in jumps of a knot interval, tens of deviations
-wide, and with the wrong sign as often as not.
+wide, and with the wrong sign as often as not. With these frames counting less, three of the nine parameters that
+contradicted the literature in thirteen measured trials do so no more.
 """
 
 from __future__ import annotations

@@ -9,12 +9,15 @@ and departures from the priors. Those of the instruments are Gaussians that chan
 (`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives analytic. The normal matrix is block
 tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur complement is the information on
 them, and its inverse their covariance.
+
+Frames in which forces change faster than the motion can follow say less of all that does not move (`impacts`). When
+that is settled, the motion alone is made to follow the forces there, too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -91,6 +94,10 @@ _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
 _MAX_ITERATIONS = 100
 """Most trials take 5 to 20; impacts, and arms that reach the ends of their ranges, some 50."""
+_NO_IMPACT = 1.05
+"""Of `Observation.impact`: below it the motion follows the forces as it is."""
+_MOST_THROUGH_IMPACTS = 5
+"""Steps of the motion alone; two or three are usual."""
 _USUAL_ITERATIONS = 10
 _LEFT_ITERATIONS = 2
 """What progress counts with: the usual number, and when these are done always so many more."""
@@ -110,7 +117,8 @@ def estimate_simultaneous(
     problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem, progress)
     covariance, of_curves = _deviations(problem, ended.under)
-    return _result(problem, ended, covariance, of_curves)
+    motions = _through_impacts(problem, ended.under.point)
+    return _result(problem, ended, motions, covariance, of_curves)
 
 
 class _Ended(NamedTuple):
@@ -175,6 +183,29 @@ def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instr
     covariance = np.linalg.inv(static_information.first)
     mean = here.point.static[places] + (covariance @ static_information.first_of(right))[places]
     return instruments.updated(problem.instruments, mean, covariance[places, places])
+
+
+def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...]:
+    """Coefficients of motions that follow the forces through impacts as elsewhere, with all that does not move held.
+
+    What impacts say of body and instruments counts less (`impacts`); but a motion that did not follow the forces there
+    would leave residuals that OpenSim's next tools have to take.
+    """
+    if all(np.max(trial.impact) < _NO_IMPACT for trial in problem.trials):
+        return point.coefficients
+    sure = [replace(trial, impact=1.0) for trial in problem.trials]
+    following = MapProblem(problem.skeleton, problem.prior, problem.calibration, sure)
+    still, result = np.zeros(problem.layout.size), []
+    for k, coefficients in enumerate(point.coefficients):
+        static = problem.in_trial(k, point)
+        for _ in range(_MOST_THROUGH_IMPACTS):
+            normal = following.trial_normal(k, coefficients, static, _LEAST_DAMPING)
+            move = reduced(normal, _LEAST_DAMPING).motion_step(still)
+            coefficients = coefficients + move
+            if (normal.right * move).sum() < 2.0 * CONVERGED:
+                break
+        result.append(coefficients)
+    return tuple(result)
 
 
 def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
@@ -244,7 +275,11 @@ def _step(
 
 
 def _result(
-    problem: MapProblem, ended: _Ended, covariance: np.ndarray, of_curves: tuple[CurveDeviations, ...]
+    problem: MapProblem,
+    ended: _Ended,
+    motions: Sequence[np.ndarray],
+    covariance: np.ndarray,
+    of_curves: tuple[CurveDeviations, ...],
 ) -> SimultaneousResult:
     point, layout = ended.under.point, problem.layout
     values = point.static
@@ -271,7 +306,7 @@ def _result(
         tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
-        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, point.coefficients, strict=True)),
+        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, motions, strict=True)),
         tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
         of_curves,
         _shown(
