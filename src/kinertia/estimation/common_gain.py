@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.force_mass import CARRIED_HINT, UNMEASURED_HINT, ForceMass
-from kinertia.estimation.simultaneous.instrument_warnings import common_gain
+from kinertia.estimation.simultaneous.instrument_warnings import GAIN, common
 
 
 def common_gain_warning(
@@ -24,7 +24,7 @@ def common_gain_warning(
         by_force: body mass by the forces, of each trial that tells it.
         carried: what was stated.
     """
-    gains = common_gain(calibration)
+    gains = common(calibration, GAIN)
     if not gains:
         return ""
     listed = ", ".join(f"{100 * gain:+.1f} % ({plate})" for plate, gain in gains.items())

@@ -12,7 +12,7 @@ from kinertia.estimation.force_mass import CARRIED_HINT, UNMEASURED_HINT, force_
 from kinertia.estimation.input_checks import mass_by_force_kg
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
-from kinertia.estimation.simultaneous.instrument_warnings import common_gain
+from kinertia.estimation.simultaneous.instrument_warnings import GAIN, common
 from kinertia.estimation.two_level import TwoLevelResult
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -57,7 +57,7 @@ def force_warnings(
     """
     warnings, measured = [], []
     mass_kg = carried.total_kg
-    alike = bool(common_gain(calibration or {}))
+    alike = bool(common(calibration or {}, GAIN))
     for trial in trials:
         by_markers = force_mass(skeleton, trial.kinematics.trial)
         if by_markers is None:

@@ -35,3 +35,26 @@ def test_all_else_that_is_off_is_still_said():
 def test_nothing_is_said_of_sound_plates():
     assert instrument_warnings(calibration(1.0, -1.0)) == []
     assert not mirrored_free_moments_warning(calibration(1.0, -1.0))
+
+
+def zeros(**values_n):
+    return {
+        f"plate {plate}: zero x": {"value": value, "prior_sd": 2.4, "sd": 1.5, "unit": "N"}
+        for plate, value in values_n.items()
+    }
+
+
+def test_zeros_that_all_plates_have_alike_are_rather_a_force_that_none_measures():
+    (said,) = instrument_warnings(zeros(left=-22.0, right=-23.0))
+    assert "all plates read too much along x, and alike (-22.0, -23.0 N): rather a force that no plate measures" in said
+
+
+@pytest.mark.parametrize("other", [23.0, -9.0, -3.0])
+def test_zeros_of_plates_that_differ_are_theirs(other):
+    said = instrument_warnings(zeros(left=-22.0, right=other))
+    assert said[0] == "plate left: zero x: -22.0 N (expected within 2.4 N); check the instruments"
+    assert not any("all plates" in one for one in said)
+
+
+def test_the_zero_of_a_single_plate_is_its_own():
+    assert "plate left: zero x: -22.0 N" in instrument_warnings(zeros(left=-22.0))[0]
