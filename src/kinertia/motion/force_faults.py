@@ -133,7 +133,7 @@ def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     tilt_deg = float(np.degrees(np.arctan(np.linalg.norm(list(off.values())) / weight_n)))
     return (
         f"the plates show {shown} on average that do not accelerate the body; if they read it while nobody stands "
-        "on them, the zero of that axis is wrong: zero the plates, or subtract it before export; if not, a force acts that "
+        "on them, the zero of that axis is wrong: zero them, or subtract it before export; if not, a force acts that "
         "no plate measures (a hand on a rail, a stick, somebody who pulls or pushes): record again without it; or the "
         f"verticals of plates and cameras differ by {tilt_deg:.1f} degrees (weight along that axis): level the plates, "
         "or calibrate the cameras on a level floor"

@@ -60,7 +60,7 @@ def _common_zero(what: str, values_n: list[float]) -> str:
     shown = ", ".join(f"{value:+.1f}" for value in values_n)
     return (
         f"all plates read too much along {axis}, and alike ({shown} N): rather a force that no plate measures (a hand "
-        "on a rail, a stick or bars, somebody who pulls or pushes, a harness), or plates and cameras that are not level, "
+        "on a rail, a stick, somebody who pulls or pushes, a harness), or plates and cameras that are not level, "
         "than the zero of every plate; joint moments are wrong by what such a force does, and plates may be told to be "
         "elsewhere because of it: find the cause, and record again without it"
     )
