@@ -50,7 +50,7 @@ def quick(fit):
         estimate = type(fit.estimate).from_table(fit.estimate.segments, table)
         return replace(fit, estimate=estimate, subject=fit.subject.model_copy(update={"name": wanted.subject.name}))
 
-    def saved(fit, folder, provenance):
+    def saved(fit, folder, provenance, force):
         write_fit(fit, provenance, folder / FIT_FILE)
 
     with (
