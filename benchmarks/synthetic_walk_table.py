@@ -28,8 +28,9 @@ from kinertia.motion.dynamics import Motion, residual, root_derivatives
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.settings import Subject
 from kinertia.synthetic.walk import walking_subject
-from kinertia.trial.data import Recording, Trial, runs
+from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.trial.sampled_time import runs
 
 HARMONICS = 8
 STANDING = {"elbow_flex_r": 1.2, "elbow_flex_l": 1.2, "arm_add_r": -0.25, "arm_add_l": -0.25}

@@ -13,9 +13,9 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.settings import Subject
-from kinertia.trial.data import nearest_samples, span_s
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.trial.sampled_time import nearest_samples, span_s
 from recorded_walks import WALKS
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")

@@ -10,8 +10,9 @@ from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.motion.spatiotemporal import spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial, runs
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
 from kinertia.trial.rms import rms
+from kinertia.trial.sampled_time import runs
 
 RATE = 100.0
 FRAME = 1.0 / RATE

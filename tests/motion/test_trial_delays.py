@@ -12,7 +12,7 @@ from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
 from kinertia.motion.trial_delays import TrialDelay, trial_delay, trial_delays_doubts, uneven_delays
 from kinertia.settings import Settings, Subject
-from kinertia.trial.data import within
+from kinertia.trial.sampled_time import within
 from subject4_trials import trial_of_subject4
 
 TRIALS = ("walking1", "walking2", "squats1")

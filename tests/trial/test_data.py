@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError
-from kinertia.trial.data import FootLoads, Markers, PlateLoads, Trial, runs, windows
+from kinertia.trial.data import FootLoads, Markers, PlateLoads, Trial
+from kinertia.trial.sampled_time import runs, windows
 
 
 def markers(n=11, labels=("a", "b")):

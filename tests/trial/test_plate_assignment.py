@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording, runs
+from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
+from kinertia.trial.sampled_time import runs
 from walk_on_plates import ALL_STEPS, FEET, walk
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
-from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Recording, Trial, runs
+from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates
+from kinertia.trial.sampled_time import runs
 from kinertia.trial.strides import periods
 
 _FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}

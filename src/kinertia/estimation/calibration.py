@@ -17,7 +17,8 @@ import numpy as np
 from kinertia.errors import TrialError
 from kinertia.model.skeleton import Marker, Pose, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
-from kinertia.trial.data import Markers, Trial, span_s
+from kinertia.trial.data import Markers, Trial
+from kinertia.trial.sampled_time import span_s
 
 MARKER_NOISE_M = 0.01
 """Deviation of one marker coordinate in one frame; the frames used stand 0.1 s apart and count as independent."""

@@ -22,7 +22,8 @@ from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics, inside
 from kinertia.motion.smoothing import interpolate
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
-from kinertia.trial.data import FEET, nearest_samples
+from kinertia.trial.data import FEET
+from kinertia.trial.sampled_time import nearest_samples
 
 Stage = Literal["estimate", "literature"]
 """As estimated; or as usual: inverse kinematics, smoothed, and inverse dynamics with the parameters before."""

@@ -20,7 +20,8 @@ from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.markers_centre import markers_centre, owners_of
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
-from kinertia.trial.data import FloatArray, Trial, runs, span_s, within
+from kinertia.trial.data import FloatArray, Trial
+from kinertia.trial.sampled_time import runs, span_s, within
 
 CONTRADICTING_MASS = 0.10
 """Scale and vertical force, or two trials, may differ by this share, and by twice the deviation of the mass by force,

@@ -32,7 +32,7 @@ from kinertia.motion.dynamics import (
     root_regressor,
 )
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.trial.data import span_s
+from kinertia.trial.sampled_time import span_s
 
 MAX_STRETCH_S = 1.1
 """Longest stretch over which the pelvis is corrected by one double integration."""

@@ -10,7 +10,8 @@ import numpy as np
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
-from kinertia.trial.data import FloatArray, Trial, span_s, within
+from kinertia.trial.data import FloatArray, Trial
+from kinertia.trial.sampled_time import span_s, within
 
 _PELVIS_HZ = 6.0
 _LEAST_WINDOW_S = 0.4

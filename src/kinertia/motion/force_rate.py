@@ -13,7 +13,8 @@ import numpy as np
 
 from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import Trial, span_s
+from kinertia.trial.data import Trial
+from kinertia.trial.sampled_time import span_s
 
 _LEAST_WINDOW_S, _LEAST_GROWTH, _MOST_LEFT = 1.0, 0.0105, 0.22
 """By pelvis or by markers' centre the delay of 21 sound trials grows by -0.017 to 0.013 in windows of 1.03 to 1.3 s

@@ -24,7 +24,8 @@ from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.range_ends import range_notes
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
-from kinertia.trial.data import TIME_TOLERANCE_S, Markers, Trial, runs, span_s, within
+from kinertia.trial.data import Markers, Trial
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s, within
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""

@@ -13,7 +13,8 @@ import numpy as np
 from kinertia.motion.caused_velocity import CausedVelocity, caused_velocities
 from kinertia.motion.force_faults import HORIZONTAL, OFFSET_WINDOW_S, offset_trouble
 from kinertia.motion.unexplained_velocity import TOLD_APART, Scaled, Unexplained
-from kinertia.trial.data import PlateLoads, Trial, span_s
+from kinertia.trial.data import PlateLoads, Trial
+from kinertia.trial.sampled_time import span_s
 
 _ONE_TURNED, _CLEARLY_BEST, _LEAST_TURNED_M_S = 0.65, 0.85, 0.08
 """Where one plate's sign is wrong, turning it leaves 0.04 to 0.57 of the difference of velocities on five trials; on

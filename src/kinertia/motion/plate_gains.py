@@ -16,7 +16,8 @@ from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import FloatArray, Recording, Trial, nearest_samples, runs, span_s, within
+from kinertia.trial.data import FloatArray, Recording, Trial
+from kinertia.trial.sampled_time import nearest_samples, runs, span_s, within
 
 _CENTRE_HZ = 8.0
 _ALONE_N, _IDLE_N, _SHORTEST_S = 50.0, 10.0, 0.2

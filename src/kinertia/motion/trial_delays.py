@@ -16,7 +16,8 @@ import numpy as np
 
 from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import Trial, span_s
+from kinertia.trial.data import Trial
+from kinertia.trial.sampled_time import span_s
 
 _LEAST_WINDOW_S, _MOST_LEFT = 0.8, 0.22
 """Parts of half a second of one trial differ by up to 40 ms."""

@@ -24,7 +24,8 @@ from kinertia.report.coordinate_titles import load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
-from kinertia.trial.data import FEET, runs
+from kinertia.trial.data import FEET
+from kinertia.trial.sampled_time import runs
 
 MOST_STRIDES = 100
 """Of a trial and side; of more, so many are taken, evenly spread."""

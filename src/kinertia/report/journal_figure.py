@@ -19,7 +19,7 @@ from kinertia.estimation.result import Fit
 from kinertia.report.extras import expect_matplotlib
 from kinertia.report.figure import Figure
 from kinertia.report.plots import FitFigures
-from kinertia.trial.data import runs
+from kinertia.trial.sampled_time import runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,8 @@ from kinertia.estimation.result import TrialFit
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import base_layout, plain
-from kinertia.trial.data import Markers, runs
+from kinertia.trial.data import Markers
+from kinertia.trial.sampled_time import runs
 
 _ROW_PX = 17
 _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}

@@ -47,9 +47,9 @@ from kinertia.report.time_figures import (
 )
 from kinertia.report.truth import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
-from kinertia.trial.data import runs
 from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms_length
+from kinertia.trial.sampled_time import runs
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""

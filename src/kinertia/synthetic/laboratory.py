@@ -21,7 +21,8 @@ from kinertia.io.trc import write_trc
 from kinertia.synthetic.noise import SkinMotion, camera_noise, plate_noise, study_noise
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Markers, PlateLoads, Recording, runs
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Markers, PlateLoads, Recording
+from kinertia.trial.sampled_time import runs
 
 PLATE_SIZE_M = (0.6, 0.4)
 """Length along the walk and width of a force plate."""

@@ -22,6 +22,7 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
 from kinertia.trial.impossible_data import marker_trouble, plate_trouble
+from kinertia.trial.sampled_time import nearest_samples, windows, within
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -36,9 +37,6 @@ Below it the centre of pressure is a quotient of two noises (346 m off the origi
 the readers set force and moment of such samples to zero, but for those with which a load begins or ends
 (`kinertia.trial.idle_plate`).
 """
-
-TIME_TOLERANCE_S = 1e-6
-"""Times that differ by less are the same: what a clock adds by its rounding must decide nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,38 +373,6 @@ class Trial:
         if not (proper and np.allclose(rotation[1], [0, 1, 0], atol=1e-9)):
             raise ValueError(f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}")
         return replace(self, markers=self.markers.rotated(rotation), loads=self.loads.rotated(rotation))
-
-
-def nearest_samples(time: FloatArray, at: FloatArray) -> npt.NDArray[np.int_]:
-    """Indices into `time` (ascending) of the samples nearest to the times `at`; of two as near, the later one."""
-    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
-    return after - (at - time[after - 1] < time[after] - at - TIME_TOLERANCE_S)
-
-
-def within(time: FloatArray, start_s: float, end_s: float) -> BoolArray:
-    """Which of these times are at least the one and at most the other; a clock's rounding decides nothing."""
-    result: BoolArray = (time >= start_s - TIME_TOLERANCE_S) & (time <= end_s + TIME_TOLERANCE_S)
-    return result
-
-
-def span_s(time: FloatArray, first: int = 0, last: int = -1) -> float:
-    """Seconds from one sample to another, to a microsecond: 0.04, and neither more nor less, for 10.17 to 10.21 s."""
-    return round(float(time[last] - time[first]), 6)
-
-
-def runs(mask: BoolArray) -> list[tuple[int, int]]:
-    """First and last index of every contiguous run of True, in order."""
-    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
-    return [
-        (int(start), int(end) - 1)
-        for start, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
-    ]
-
-
-def windows(time: FloatArray, mask: BoolArray) -> list[tuple[float, float]]:
-    """First and last time (s) of every contiguous run of True in `mask` (n,), longest run first."""
-    spans = [(float(time[first]), float(time[last])) for first, last in runs(mask)]
-    return sorted(spans, key=lambda span: span[0] - span[1])
 
 
 def _expect_shape(name: str, array: npt.NDArray[np.generic], shape: tuple[int, ...]) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 
 from kinertia.errors import MarkerSetError
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import BoolArray, FloatArray, Markers, runs, span_s
+from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.sampled_time import runs, span_s
 
 _SPEED_SPAN_S = 0.01
 _FILLED_GAP_S = 0.2

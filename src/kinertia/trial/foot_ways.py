@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import FEET, TIME_TOLERANCE_S, BoolArray, FloatArray, Markers, runs, span_s
+from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
 from kinertia.trial.ground_contact import bridged
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
 _LOW = 0.15
 """Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""

@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads, runs
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
+from kinertia.trial.sampled_time import runs
 
 _COARSE_N, _COARSE_M = 7.5, 0.0075
 """Steps of 5 N, or of 5 mm, change joint moments by less than their deviations; of 10 N, or 10 mm, by up to twice

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import free_moment
-from kinertia.trial.data import TIME_TOLERANCE_S, FloatArray, FootLoads, span_s, within
+from kinertia.trial.data import FloatArray, FootLoads
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, span_s, within
 from kinertia.trial.strides import periods
 
 TURNING_LEVER_M = 0.002

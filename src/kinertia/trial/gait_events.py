@@ -6,9 +6,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, TIME_TOLERANCE_S, FootLoads, Trial, runs, span_s
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import BRIDGED_GAP_S, SHORTEST_CONTACT_S
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
 
 class GaitEvent(NamedTuple):

@@ -13,20 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.trial.belt import Belt
-from kinertia.trial.data import (
-    FEET,
-    LOAD_THRESHOLD_N,
-    TIME_TOLERANCE_S,
-    BoolArray,
-    FloatArray,
-    FootLoads,
-    Markers,
-    nearest_samples,
-    runs,
-    span_s,
-    within,
-)
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Markers
 from kinertia.trial.foot_motion import FootMotion, foot_motions
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 BRIDGED_GAP_S = 0.02
 """A load that vanishes for less than this is one contact."""

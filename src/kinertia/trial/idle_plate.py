@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, TIME_TOLERANCE_S, BoolArray, FloatArray, IdleReading, nearest_samples
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading
 from kinertia.trial.force_resolution import ringing_s
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, TIME_TOLERANCE_S, FloatArray, PlateLoads, runs, span_s
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.foot_ways import FootWay
 from kinertia.trial.ground_contact import bridged
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
 FIRM_N = 5 * LOAD_THRESHOLD_N
 EDGE_N, SHORTEST_S = 50.0, 0.15

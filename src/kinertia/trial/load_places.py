@@ -11,13 +11,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinertia.trial.data import PlateLoads, Recording, span_s
+from kinertia.trial.data import PlateLoads, Recording
 from kinertia.trial.exchanged_plates import exchanged_plates_trouble
 from kinertia.trial.foot_ways import FootWay, foot_ways
 from kinertia.trial.load_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, Contact, contacts_of, half_within
 from kinertia.trial.load_times import delay_trouble, rate_trouble
 from kinertia.trial.load_travel import load_travel_doubts
 from kinertia.trial.other_clock import other_delay_trouble, other_rate_trouble
+from kinertia.trial.sampled_time import span_s
 from kinertia.trial.turned_plates import turned_plates_trouble
 
 _FAR_TOO_FAR_M = 5.0

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.trial.data import FloatArray, PlateLoads, runs, span_s
+from kinertia.trial.data import FloatArray, PlateLoads
 from kinertia.trial.foot_ways import FootWay
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.load_contacts import EDGE_N, FAR_M, SHORTEST_S, Contact, contacts_of, half_within
+from kinertia.trial.sampled_time import runs, span_s
 
 _DELAY_S, _LONGEST_DELAY_S = 0.045, 0.25
 """Clocks and filters delay by less than the latter; what is later began at another time."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
-from kinertia.trial.data import FloatArray, PlateLoads, runs
+from kinertia.trial.data import FloatArray, PlateLoads
+from kinertia.trial.sampled_time import runs
 
 _MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (-16.0, -13.0, -10.0, 10.0, 13.0, 16.0)

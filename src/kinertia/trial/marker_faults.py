@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
+from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.sampled_time import runs
 
 _SPIKE_M, _FEW_SPIKES = 0.08, 2
 _STEP_M = 0.04

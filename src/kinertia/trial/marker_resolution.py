@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.trial.data import BoolArray, FloatArray, Markers, runs
+from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.sampled_time import runs
 
 _FEWEST_FRAMES = 11
 _REPEATED_SHARE, _BETWEEN_SHARE = 0.25, 0.4

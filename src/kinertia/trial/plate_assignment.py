@@ -15,21 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.errors import TrialError
-from kinertia.trial.data import (
-    FEET,
-    TIME_TOLERANCE_S,
-    BoolArray,
-    FloatArray,
-    FootLoads,
-    Markers,
-    Recording,
-    Trial,
-    nearest_samples,
-    runs,
-    span_s,
-    windows,
-    within,
-)
+from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial
 from kinertia.trial.ground_contact import (
     BRIDGED_GAP_S,
     FootMarkers,
@@ -38,6 +24,7 @@ from kinertia.trial.ground_contact import (
     ground_contact,
     measured_frames,
 )
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within
 
 __all__ = ["BRIDGED_GAP_S", "FootMarkers", "assign_plates", "build_trial", "measured_frames"]
 

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads, runs, span_s
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
 from kinertia.trial.force_resolution import force_step_n, rounded_force_doubts
+from kinertia.trial.sampled_time import runs, span_s
 
 _LONGEST_ARM_M = 0.15
 """Free moment over vertical force; that of feet on the ground stays below 0.04 m."""

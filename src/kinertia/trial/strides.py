@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 
-from kinertia.trial.data import FEET, FootLoads, runs
+from kinertia.trial.data import FEET, FootLoads
 from kinertia.trial.ground_contact import bridged
+from kinertia.trial.sampled_time import runs
 
 _TOGETHER = 0.2
 """Share of the time between two landings of a foot within which the other foot lands with it."""

@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinertia.trial.data import FloatArray, Markers, runs, span_s
+from kinertia.trial.data import FloatArray, Markers
+from kinertia.trial.sampled_time import runs, span_s
 
 _STILL_M_S, _SHORTEST_S = 0.15, 0.08
 _LONGEST_M, _FEWEST_PLACES = 1.0, 3

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.ndimage import maximum_filter1d
 
-from kinertia.trial.data import runs
+from kinertia.trial.sampled_time import runs
 
 _BESIDE = 2.0
 """What a body with soft parts does otherwise than rigid segments, over what is beyond the bandwidth: it does not end

@@ -33,7 +33,7 @@ from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
-from kinertia.trial.data import nearest_samples, within
+from kinertia.trial.sampled_time import nearest_samples, within
 
 FORCE_SD_OF_WEIGHT = 0.005
 """Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
