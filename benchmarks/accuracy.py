@@ -16,11 +16,12 @@ from threadpoolctl import threadpool_limits
 from calibration_errors import DISTURBANCES, Calibrated, calibrated, calibration_section
 from kinertia.report.accuracy import JOINT_CAPTION, accuracy_markdown, moments_markdown
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
+from measured_data import data_folder
 from measured_walks import measured_section, measured_walk
 from pooling import pooled, pooling_section
 from study_bound import bound_rows
 from study_noise import UNIFORM_SD, study_draw, study_section
-from walks import WALKS, data_folder
+from walks import WALKS
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "accuracy.md"
 PEOPLE = 40

@@ -19,8 +19,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from measured_data import data_folder
 from measured_trials import table
-from walks import WALKS, data_folder, fit_arguments
+from walks import WALKS, fit_arguments
 
 YARDSTICK = "import numpy, scipy.optimize, pandas"
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.cli.app import main as kinertia
+from measured_data import data_folder
 from measured_trials import table
-from walks import data_folder
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "held-out.md"
 

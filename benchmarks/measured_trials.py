@@ -17,7 +17,8 @@ import numpy as np
 import pandas as pd
 
 from kinertia.cli.app import main as kinertia
-from walks import WALKS, data_folder, fit_arguments
+from measured_data import data_folder
+from walks import WALKS, fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "measured-trials.md"
 STAGES = ("literature", "corrected", "estimate")

@@ -16,8 +16,8 @@ from typing import Any
 import pandas as pd
 
 from kinertia.cli.app import main as kinertia
+from measured_data import data_folder
 from measured_trials import STAGES, farthest, table
-from walks import data_folder
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "osim-models.md"
 

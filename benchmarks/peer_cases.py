@@ -18,6 +18,7 @@ import pandas as pd
 from kinertia.cli.app import main as kinertia
 from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
+from measured_data import data_folder
 from opensim_rra import Reduced, RRAFailed, reduce_residuals
 from opensim_runs import (
     inverse_dynamics,
@@ -29,7 +30,6 @@ from opensim_runs import (
     without_forces,
 )
 from truth_trials import Faults, gait2354, make_trial
-from walks import data_folder
 
 CUTOFFS_HZ = (6, 10, 12)
 FAULTS = Faults(plate_m=0.020, lag_s=0.010, hip_m=0.010)

@@ -10,8 +10,8 @@ from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
+from measured_data import data_folder
 from measured_trials import table
-from walks import data_folder
 
 
 def pooled() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

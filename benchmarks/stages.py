@@ -44,8 +44,9 @@ from kinertia.motion.smoothing import smooth
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.plate_assignment import build_trial
+from measured_data import data_folder
 from measured_trials import table
-from walks import WALKS, data_folder, fit_arguments
+from walks import WALKS, fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "speed.md"
 SETUPS = {

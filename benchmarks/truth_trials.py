@@ -27,9 +27,9 @@ from scipy.interpolate import BSpline
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from kinertia.trial.data import Markers
+from measured_data import data_folder
 from opensim_runs import inverse_dynamics, inverse_kinematics, quietly, radians, vector
 from truth_person import SIDES, Person, array
-from walks import data_folder
 
 KNOTS_HZ = 8.0
 EDGE_S = 0.15

@@ -12,18 +12,6 @@ WALKS = {
 }
 
 
-def data_folder() -> Path:
-    """Where the measured data are: beside the repository, not part of it.
-
-    Raises:
-        FileNotFoundError: they are not there.
-    """
-    folder = Path(__file__).resolve().parents[2] / "shared" / "data"
-    if not folder.is_dir():
-        raise FileNotFoundError(f"needs the measured trials in {folder}, which are not part of the package")
-    return folder
-
-
 def fit_arguments(data: Path, name: str) -> list[str]:
     """Arguments of `kinertia fit` for one of WALKS. Mass and height of subject B come from the C3D file."""
     if name == "gait2354":

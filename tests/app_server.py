@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import http.client
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from urllib.parse import urlsplit
 
 from kinertia.cli.web.library import Library
+from kinertia.cli.web.routes import Example
 from kinertia.cli.web.server import Server
 
 
@@ -65,9 +67,9 @@ class Running:
 
 
 @contextmanager
-def running(folder: Path, example: Path | None = None) -> Iterator[Running]:
+def running(folder: Path, examples: Mapping[str, Example] = MappingProxyType({})) -> Iterator[Running]:
     library = Library(folder)
     with library.opened():
-        server = Server(library, example=example)
+        server = Server(library, examples=examples)
         with server.in_background() as address:
             yield Running(address, library, server)

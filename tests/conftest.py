@@ -4,6 +4,8 @@ import builtins
 import functools
 import importlib.util
 import os
+import shutil
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest import mock
@@ -15,17 +17,22 @@ from threadpoolctl import threadpool_limits
 import osim_models
 from command_line import Outcome, fitted, run
 from kinertia.cli.compiling import compile_once
-from kinertia.cli.measured_demo import FILES, run_measured_demo
+from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.estimation.estimate import estimate_bsp
 from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.result import Fit
+from kinertia.io import samples
+from kinertia.io.provenance import sha256
 from kinertia.io.recording import read_recording
 from kinertia.report import extras
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
+from measured_data import data_folder, find
 from once import once
 from quick_two_level import given_back
+from recordings import SYNTHETIC, is_here
+from synthetic_lab import write_synthetic_lab
 from walks import fit_arguments
 
 # no test judges time: machines are busy
@@ -36,6 +43,22 @@ settings.load_profile("kinertia")
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 threadpool_limits(1, user_api="blas")
 
+MEASURED = "gait2354/subject01_walk1.trc"
+NEEDS_MEASURED = "need measured recordings"
+NOT_HERE = (
+    f"measured recordings: none in the folder that {samples.VARIABLE} names, in shared/data beside the repository "
+    "or in the cache of kinertia demo --measured; tests ran on synthetic ones"
+)
+SUBJECT = """[subject]
+name = "synthetic walker"
+sex = "male"
+
+[model]
+static = "static.c3d"
+
+[[trial]]
+markers = "walk.c3d"
+"""
 FEW_EVALUATIONS = 30
 LIMITS = ("kinertia.estimation.two_level._MAX_EVALUATIONS", "kinertia.estimation.two_level._FREE_EVALUATIONS")
 
@@ -50,13 +73,37 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: item.get_closest_marker("first") is None)
 
 
+def pytest_terminal_summary(terminalreporter):
+    """One line on what was skipped, in place of one for each."""
+    reasons = Counter(
+        report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])
+    )
+    told = [f"{count} {reason}" for reason, count in reasons.most_common()]
+    if told:
+        terminalreporter.write_line(f"{reasons.total()} skipped: {'; '.join(told)}")
+    if not is_here(MEASURED):
+        terminalreporter.write_line(NOT_HERE)
+
+
 @pytest.fixture(scope="session")
-def shared_data() -> Path:
-    """Folder of measured trials that are not part of the package."""
-    folder = Path(__file__).resolve().parents[2] / "shared" / "data"
-    if not folder.is_dir():
-        pytest.skip(f"needs the measured trials in {folder}, which are not part of the package")
-    return folder
+def measured_folder() -> Path:
+    """Folder of measured recordings, which are not part of the repository."""
+    try:
+        return data_folder()
+    except FileNotFoundError:
+        pytest.skip(NEEDS_MEASURED)
+
+
+@pytest.fixture(scope="session")
+def synthetic_lab(tmp_path_factory) -> Path:
+    """Folder of the files of `synthetic_lab.write_synthetic_lab`, with `subject.toml` for those in C3D."""
+
+    def make(folder: Path) -> Path:
+        write_synthetic_lab(folder)
+        (folder / "subject.toml").write_text(SUBJECT, encoding="utf-8")
+        return folder
+
+    return once(tmp_path_factory, "synthetic-lab", make)
 
 
 @pytest.fixture(scope="session")
@@ -81,13 +128,13 @@ def browser():
 
 
 @pytest.fixture(scope="session")
-def fit_of(shared_data, tmp_path_factory):
+def fit_of(measured_folder, tmp_path_factory):
     """Results of `kinertia fit` for a measured walk, by its name in `walks.WALKS`; run once."""
     done = {}
 
     def get(name):
         if name not in done:
-            arguments = fit_arguments(shared_data, name)
+            arguments = fit_arguments(measured_folder, name)
             done[name] = once(
                 tmp_path_factory, f"fit-{name}", lambda made: fitted(made / "results" / "out", *arguments)
             )
@@ -97,14 +144,14 @@ def fit_of(shared_data, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def fit_with_model(shared_data, tmp_path_factory):
+def fit_with_model(measured_folder, tmp_path_factory):
     """Folder of results of `kinertia fit` with a user's model, by person and calibration; run once."""
     done: dict[tuple[str, bool], Path] = {}
 
     def get(name: str, calibrate: bool) -> Path:
         def make(folder: Path) -> Path:
             subject = folder / f"{name}.toml"
-            subject.write_text(osim_models.subject_file(shared_data, osim_models.PEOPLE[name], calibrate))
+            subject.write_text(osim_models.subject_file(measured_folder, osim_models.PEOPLE[name], calibrate))
             return fitted(folder / "out", subject).folder
 
         if (name, calibrate) not in done:
@@ -141,29 +188,27 @@ def demo_run(demo_command) -> tuple[Demo, Path]:
 
 
 @pytest.fixture(scope="session")
-def measured_walk() -> Path:
-    """Folder of the measured walk that is part of the package: `static.c3d`, `walk.c3d`, `subject.toml`."""
-    return FILES
+def file_of(synthetic_lab):
+    """Path of a file by its name as in `recordings`: synthetic, or measured and then perhaps not on this machine."""
+
+    def path(name: str) -> Path:
+        if name.startswith(SYNTHETIC):
+            return synthetic_lab / name.removeprefix(SYNTHETIC)
+        measured = find(name)
+        if measured is None:
+            pytest.skip(NEEDS_MEASURED)
+        return measured
+
+    return path
 
 
 @pytest.fixture(scope="session")
-def measured_file(request, measured_walk):
-    """Path of a measured file by its name in `shared_data`, which only those need that are not in the package."""
-
-    def find(name: str) -> Path:
-        of_package = name.removeprefix("pig_c3d/subject_a_")
-        return measured_walk / of_package if of_package != name else request.getfixturevalue("shared_data") / name
-
-    return find
-
-
-@pytest.fixture(scope="session")
-def measured_recording(measured_file):
-    """Recordings by the names of the files that `read_recording` takes; each is read once."""
+def recording_of(file_of):
+    """Recordings by the names (`file_of`) of the files that `read_recording` takes; each is read once."""
 
     @functools.cache
     def read(*names: str | None) -> Recording:
-        return read_recording(*(None if name is None else measured_file(name) for name in names))
+        return read_recording(*(None if name is None else file_of(name) for name in names))
 
     return read
 
@@ -178,7 +223,34 @@ class MeasuredDemo:
 
 
 @pytest.fixture(scope="session")
-def measured_demo(tmp_path_factory) -> MeasuredDemo:
+def sample_walk(tmp_path_factory, synthetic_lab):
+    """The sample walk as if it had been downloaded: the measured one, or a synthetic walk in its place.
+
+    Yields the folder that the environment variable names, of which it is a folder.
+    """
+    measured = find(f"{samples.NAME}/subject01_walk1.trc")
+    with pytest.MonkeyPatch.context() as patched:
+        if measured is None:
+            place = once(tmp_path_factory, "sample", lambda folder: written_sample(synthetic_lab, folder))
+            digests = {name: sha256(place / samples.NAME / name) for name in samples.SHA256}
+            patched.setattr(samples, "SHA256", digests)
+        else:
+            place = measured.parents[1]
+        patched.setenv(samples.VARIABLE, str(place))
+        yield place
+
+
+def written_sample(lab: Path, folder: Path) -> Path:
+    """Files of a synthetic laboratory under the names of the sample walk's."""
+    place = folder / samples.NAME
+    place.mkdir()
+    for name in samples.SHA256:
+        shutil.copyfile(lab / name.replace("subject01_", "").replace("walk1", "walk"), place / name)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def measured_demo(tmp_path_factory, sample_walk) -> MeasuredDemo:
     """Outcome of `kinertia demo --measured`; run once."""
 
     def make(made: Path) -> MeasuredDemo:
@@ -204,12 +276,12 @@ def few_evaluations(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def short_fit(measured_walk):
+def short_fit(recording_of):
     """A two-level `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
-    walk, static = (read_recording(measured_walk / f"{kind}.c3d") for kind in ("walk", "static"))
+    walk, static = (recording_of(f"synthetic/{kind}.c3d") for kind in ("walk", "static"))
     inputs = [
         TrialInput(replace(walk, name=name), window, 0.25)
-        for name, window in (("early", (2.8, 3.1)), ("late", (3.2, 3.5)))
+        for name, window in (("early", (1.2, 1.5)), ("late", (1.7, 2.0)))
     ]
     with mock.patch(LIMITS[0], FEW_EVALUATIONS), mock.patch(LIMITS[1], FEW_EVALUATIONS):
         return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))

@@ -1,4 +1,4 @@
-"""Files of OpenSim models of six laboratories in `shared_data`, none of which has a known mistake."""
+"""Files of OpenSim models of six laboratories in `measured_folder`, none of which has a known mistake."""
 
 MODELS = (
     "gait2354/subject01_scaled.osim",

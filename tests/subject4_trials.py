@@ -16,7 +16,7 @@ def trial_of_subject4(
     """The trial of this name.
 
     Args:
-        read: the fixture `measured_recording`.
+        read: the fixture `recording_of`.
         marker_set: of the person's model.
         name: of the trial.
         forces: the trial whose forces it has; its own if None.

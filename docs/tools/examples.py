@@ -1,6 +1,6 @@
 """Examples in the pages: take them apart, compare what they show with what happens, renew their numbers.
 
-    python docs/tools/examples.py
+    PYTHONPATH=benchmarks python docs/tools/examples.py
 
 runs every command shown behind `$` (with measured files, where the page names them) and puts the
 numbers of now into the pages. Words that have changed are told, and to be mended by hand. The tests of the pages use
@@ -17,11 +17,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from measured_data import data_folder
+
 ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT.parent / "shared" / "data"
 PAGES = (*sorted((ROOT / "docs").glob("*.md")), ROOT / "README.md")
 MEASURED = ("gait2354", "pig_c3d", "rajagopal_walk")
-"""Marks of examples that run beside the files of this folder of `DATA`; others run in an empty folder."""
+"""Marks of examples that run beside the files of this folder among the measured data; others run in an empty folder."""
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!-- example: (\w+)(, slow)? -->")
@@ -59,7 +60,7 @@ def blocks(text: str) -> list[Block]:
 
 def link_measured(name: str, folder: Path) -> None:
     """Put links to measured files into a folder, one person's, as a user would have them."""
-    for file in (DATA / name).iterdir():
+    for file in (data_folder() / name).iterdir():
         if file.is_file() and not file.name.startswith("subject_a"):
             (folder / file.name).symlink_to(file)
 

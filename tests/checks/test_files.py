@@ -14,8 +14,8 @@ def cautions(check):
     return [verdict.sentence for verdict in check.verdicts if verdict.level == "caution"]
 
 
-def test_a_walk_given_as_the_static_trial(shared_data):
-    folder = shared_data / "pig_c3d"
+def test_a_walk_given_as_the_static_trial(measured_folder):
+    folder = measured_folder / "pig_c3d"
     static, walk = (RecordingFiles(folder / f"subject_b_{name}.c3d") for name in ("static", "walk"))
     (_, right), _ = check_files(PersonFiles((static, walk), None, static=static))[0]
     assert not any("walks in the static trial" in one for one in cautions(right))
@@ -25,9 +25,9 @@ def test_a_walk_given_as_the_static_trial(shared_data):
 
 
 @pytest.mark.parametrize("name", ["a", "b"])
-def test_the_fit_says_so_too(measured_recording, name):
+def test_the_fit_says_so_too(recording_of, name):
     marker_set = read_marker_set("plug-in-gait")
-    walk, static = (measured_recording(f"pig_c3d/subject_{name}_{kind}.c3d", None) for kind in ("walk", "static"))
+    walk, static = (recording_of(f"pig_c3d/subject_{name}_{kind}.c3d", None) for kind in ("walk", "static"))
     assert any("walks in the static trial" in one.sentence for one in static_doubts(walk, marker_set))
     assert not any("walks in" in one.sentence for one in static_doubts(static, marker_set))
     # the same distances in both: nothing to be divided by

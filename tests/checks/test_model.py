@@ -196,10 +196,10 @@ KNOWN = {
 
 
 @pytest.mark.parametrize("name", KNOWN)
-def test_models_in_use(shared_data, name):
+def test_models_in_use(measured_folder, name):
     """None is impossible; those with arms carry them twice, which is known of them."""
     person, arms_twice, words = KNOWN[name]
-    model = read_osim(shared_data / name)
+    model = read_osim(measured_folder / name)
     model_check = check_model(model.skeleton, model.bsp, *person)
     assert not stands_against(model_check.verdicts)
     assert words in sentences(model_check, "caution")
@@ -214,12 +214,12 @@ MEASURED = {  # the static trial; how far the pelvis may be off, whose hips the 
 
 @pytest.mark.parametrize("source", ["deleva", "dumas"])
 @pytest.mark.parametrize("name", MEASURED)
-def test_literature_for_the_trunk_is_the_one_of_a_fit(shared_data, name, source):
+def test_literature_for_the_trunk_is_the_one_of_a_fit(measured_folder, name, source):
     """As `kinertia fit` has it by the markers of the static trial, whatever the model's lumbar joint."""
     trial, person, off = MEASURED[name]
-    static = read_recording(shared_data / trial)
+    static = read_recording(measured_folder / trial)
     own = build_gait27(static, choose_marker_set(static.markers.labels), *person[1:]).geometry
-    model = read_osim(shared_data / name)
+    model = read_osim(measured_folder / name)
     segments = model_segments(model.skeleton, model.bsp, *person[1:])
     bodies = [literature_bsp(*person, geometry, source).table() for geometry in (segments.geometry, own)]
     pelvis, torso = SEGMENTS.index("pelvis"), SEGMENTS.index("torso")

@@ -209,9 +209,9 @@ def test_static_trial_without_a_landmark(lab, marker_set):
         ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
     ],
 )
-def test_mass_on_one_belt_is_that_of_two_plates(measured_recording, markers, forces):
+def test_mass_on_one_belt_is_that_of_two_plates(recording_of, markers, forces):
     """While both feet stand on it, the sum of their loads is known, which is all that weighs."""
-    two = measured_recording(markers, forces)
+    two = recording_of(markers, forces)
     plates = two.plates
     force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
     one = replace(two, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
@@ -230,9 +230,9 @@ WALKS = {
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_measured_walks(measured_recording, name):
+def test_measured_walks(recording_of, name):
     forces, mass_kg, level, window = WALKS[name]
-    recording = measured_recording(name, forces)
+    recording = recording_of(name, forces)
     own = Path(__file__).parents[1] / "subject4.toml"
     marker_set = read_marker_set(own) if "subject4" in name else common_marker_set([recording])
     check = check_recording(recording, marker_set, mass_kg)
@@ -251,8 +251,8 @@ def test_measured_walks(measured_recording, name):
         ("plates_type1", "m", "+Y"),
     ],
 )
-def test_files_of_other_laboratories(shared_data, name, unit, vertical):
-    recording = read_recording(shared_data / "c3d_variety" / f"{name}.c3d")
+def test_files_of_other_laboratories(measured_folder, name, unit, vertical):
+    recording = read_recording(measured_folder / "c3d_variety" / f"{name}.c3d")
     check = check_recording(recording)
     assert (recording.length_unit, recording.vertical) == (unit, vertical)
     assert "no marker set fits" in sentences(check, "fail")

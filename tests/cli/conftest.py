@@ -6,11 +6,11 @@ import pytest
 
 
 @pytest.fixture
-def lab(tmp_path, shared_data):
+def lab(tmp_path, measured_folder):
     """The gait2354 walk under short names, and a C3D walk with its static trial; free to be spoiled."""
     folder = tmp_path / "lab"
     folder.mkdir()
-    gait, pig = shared_data / "gait2354", shared_data / "pig_c3d"
+    gait, pig = measured_folder / "gait2354", measured_folder / "pig_c3d"
     for source, name in (
         (gait / "subject01_walk1.trc", "walk.trc"),
         (gait / "subject01_walk1_grf.mot", "walk.mot"),

@@ -259,8 +259,8 @@ def test_init_without_recordings(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_evaluations")
-def test_one_walk_as_two_trials(tmp_path, shared_data):
-    walk, _, forces, _, loads, _, static, *_ = fit_arguments(shared_data, "gait2354")
+def test_one_walk_as_two_trials(tmp_path, measured_folder):
+    walk, _, forces, _, loads, _, static, *_ = fit_arguments(measured_folder, "gait2354")
     trial = f'[[trial]]\nmarkers = "{walk}"\nforces = "{forces}"\nloads = "{loads}"\n'
     (tmp_path / "subject.toml").write_text(
         f'[subject]\nsex = "male"\nmass_kg = 72.6\nheight_m = 1.803\n[model]\nstatic = "{static}"\n'

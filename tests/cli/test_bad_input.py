@@ -64,8 +64,8 @@ def test_wrong_type(lab, source, name, changes):
     expect(refused(lab, **changes), re.escape(str(lab / name)), "expected|not a")
 
 
-def test_xml_that_explains_no_loads(lab, shared_data):
-    shutil.copyfile(shared_data / "gait2354" / "subject01_Setup_IK.xml", lab / "walk.xml")
+def test_xml_that_explains_no_loads(lab, measured_folder):
+    shutil.copyfile(measured_folder / "gait2354" / "subject01_Setup_IK.xml", lab / "walk.xml")
     expect(refused(lab), r"walk\.xml", "ExternalLoads|ExternalForce")
 
 
@@ -172,9 +172,9 @@ def test_static_trial_of_another_marker_set(lab):
     expect(message, "plug-in-gait|Plug-in Gait", "RASI", r"R\.ASIS")
 
 
-def test_no_fully_measured_frame(lab, shared_data):
+def test_no_fully_measured_frame(lab, measured_folder):
     """After 2.2 s of the Rajagopal walk the left foot stands on no plate."""
-    walk = shared_data / "rajagopal_walk"
+    walk = measured_folder / "rajagopal_walk"
     write_trc(lab / "late.trc", read_trc(walk / "motion_capture_walk.trc").cut(2.2, 2.5))
     shutil.copyfile(walk / "static_walk_1.trc", lab / "static.trc")
     shutil.copyfile(walk / "grf_walk.mot", lab / "walk.mot")
@@ -237,8 +237,8 @@ def test_trial_without_forces(lab):
         ("duplicate_labels.c3d", ("marker",)),
     ],
 )
-def test_c3d_that_cannot_be_used(lab, shared_data, name, parts):
-    shutil.copyfile(shared_data / "c3d_variety" / name, lab / name)
+def test_c3d_that_cannot_be_used(lab, measured_folder, name, parts):
+    shutil.copyfile(measured_folder / "c3d_variety" / name, lab / name)
     expect(refused(lab, name, mass="60", height="1.7"), re.escape(name.removesuffix(".c3d")), *parts)
 
 

@@ -46,16 +46,16 @@ def test_subject_file(lab):
     assert outcome.err.splitlines() == ["reading"]
 
 
-def test_widths_of_joints_may_come_from_elsewhere(tmp_path, measured_recording, shared_data):
+def test_widths_of_joints_may_come_from_elsewhere(tmp_path, recording_of, measured_folder):
     """Plug-in Gait has no medial markers; TRC files have no widths, the walk's C3D and the subject file may."""
-    static = measured_recording("pig_c3d/subject_b_static.c3d").markers
+    static = recording_of("pig_c3d/subject_b_static.c3d").markers
     write_trc(tmp_path / "static.trc", static)
     subject = "[subject]\nsex = 'female'\nmass_kg = 45.0\nheight_m = 1.505\nWIDTHS\n[model]\nstatic = 'static.trc'\n"
     subject += "[[trial]]\nmarkers = 'walk.c3d'\n"
-    shutil.copy(shared_data / "pig_c3d" / "subject_b_walk.c3d", tmp_path / "walk.c3d")
+    shutil.copy(measured_folder / "pig_c3d" / "subject_b_walk.c3d", tmp_path / "walk.c3d")
     (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", ""))
     assert "all landmarks that the model needs" in text(run("check", tmp_path))
-    walk = measured_recording("pig_c3d/subject_b_walk.c3d").markers
+    walk = recording_of("pig_c3d/subject_b_walk.c3d").markers
     write_trc(tmp_path / "walk.trc", walk)
     (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", "").replace("c3d", "trc"))
     outcome = run("check", tmp_path)
@@ -214,17 +214,17 @@ def test_page_goes_only_where_it_may(lab):
 
 
 @pytest.mark.slow
-def test_files_of_two_people_keep_their_masses(shared_data):
+def test_files_of_two_people_keep_their_masses(measured_folder):
     """The walk of A carries no mass, the others do: with A's static alone it is A's, with B's files it is nobody's."""
-    a, b = ([shared_data / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
+    a, b = ([measured_folder / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
     alone, both = text(run("check", *a)), text(run("check", *a, *b))
     assert alone.count("stated mass 41.5 kg") == 2
     assert (both.count("stated mass 41.5 kg"), both.count("stated mass 47.5 kg")) == (1, 2)
 
 
-def test_model(shared_data, tmp_path, monkeypatch):
+def test_model(measured_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    model = shared_data / "rajagopal_walk" / "scaled.osim"
+    model = measured_folder / "rajagopal_walk" / "scaled.osim"
     person = ["--mass", "85", "--height", "1.83", "--sex", "male"]
     outcome = run("check", model, *person, "-o", "out")
     assert outcome.status == 0
@@ -239,8 +239,8 @@ def test_model(shared_data, tmp_path, monkeypatch):
     assert "needs --height and --sex" in text(run("check", model))
 
 
-def test_impossible_model_is_status_1(shared_data, tmp_path):
-    content = (shared_data / "rajagopal_walk" / "scaled.osim").read_text()
+def test_impossible_model_is_status_1(measured_folder, tmp_path):
+    content = (measured_folder / "rajagopal_walk" / "scaled.osim").read_text()
     broken, count = re.subn(
         r'(<Body name="tibia_l">.*?<inertia>)[^<]*', r"\g<1>0.9 0.0076 0.076 0 0 0", content, count=1, flags=re.DOTALL
     )
@@ -252,9 +252,9 @@ def test_impossible_model_is_status_1(shared_data, tmp_path):
 
 
 @pytest.mark.slow
-def test_every_measured_file_gets_an_answer(shared_data):
+def test_every_measured_file_gets_an_answer(measured_folder):
     """No traceback on anything: each file is shown (0), warned of (1) or refused in one line (2)."""
-    files = sorted(path for kind in ("trc", "c3d", "osim") for path in shared_data.rglob(f"*.{kind}"))
+    files = sorted(path for kind in ("trc", "c3d", "osim") for path in measured_folder.rglob(f"*.{kind}"))
     assert len(files) > 20
     seen = set()
     for path in files:
@@ -268,9 +268,9 @@ def test_every_measured_file_gets_an_answer(shared_data):
     assert seen == {0, 1, 2}
 
 
-def test_subject_file_with_a_model(shared_data, tmp_path):
+def test_subject_file_with_a_model(measured_folder, tmp_path):
     """The markers are the model's: as for `kinertia fit`, no preset is asked for."""
-    data = shared_data / "subject4"
+    data = measured_folder / "subject4"
     (tmp_path / "subject.toml").write_text(
         f'[subject]\nname = "four"\nmass_kg = 60.0\n[model]\nosim = "{data / "addbiomechanics_scaled.osim"}"\n'
         f'[[trial]]\nmarkers = "{data / "walking1.trc"}"\nforces = "{data / "walking1_grf.mot"}"\n'
@@ -283,9 +283,9 @@ def test_subject_file_with_a_model(shared_data, tmp_path):
     assert "pass: every foot on the ground stands on a plate from" in printed
 
 
-def test_model_that_is_doubted_in_a_subject_file(shared_data, tmp_path):
+def test_model_that_is_doubted_in_a_subject_file(measured_folder, tmp_path):
     """What the fit will warn of; a sound model is not mentioned."""
-    data = shared_data / "subject4"
+    data = measured_folder / "subject4"
     sound = (data / "addbiomechanics_scaled.osim").read_text()
     (joint,) = re.findall(r'<CustomJoint name="walker_knee_l">.*?</CustomJoint>', sound, flags=re.DOTALL)
     moved, count = re.subn(r"(<translation>)(\S+)", lambda found: f"{found[1]}{float(found[2]) + 0.03}", joint, count=1)
@@ -304,9 +304,9 @@ def test_model_that_is_doubted_in_a_subject_file(shared_data, tmp_path):
     assert "tibia_r and tibia_l (30 mm)" in (tmp_path / "out" / "check.html").read_text()
 
 
-def test_model_of_other_markers_in_a_subject_file(lab, shared_data):
+def test_model_of_other_markers_in_a_subject_file(lab, measured_folder):
     """None shared fails; none in the model is an error, as it is to a fit."""
-    model = shared_data / "subject4" / "addbiomechanics_scaled.osim"
+    model = measured_folder / "subject4" / "addbiomechanics_scaled.osim"
     body = f'[[trial]]\nmarkers = "{lab / "other.trc"}"\nforces = "{lab / "walk_grf.mot"}"\n'
     (lab / "s.toml").write_text(f'[subject]\nname = "s"\nmass_kg = 72.6\n[model]\nosim = "{model}"\n{body}')
     labels = (lab / "walk.trc").read_text().splitlines(keepends=True)

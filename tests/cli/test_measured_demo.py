@@ -7,11 +7,11 @@ import hashlib
 import json
 import re
 
+import cut_walk
 import numpy as np
 import pandas as pd
 import pytest
 
-import cut_walk
 from command_line import fitted, run
 from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.estimation.from_files import prepare_subject
@@ -76,8 +76,8 @@ def test_nothing_clinical_is_left(measured_walk, kind):
 
 
 @pytest.mark.parametrize("one", cut_walk.CUTS, ids=lambda one: one.target)
-def test_what_is_left_is_as_it_was(measured_walk, shared_data, tmp_path, one):
-    whole = read_recording(shared_data / "pig_c3d" / one.source)
+def test_what_is_left_is_as_it_was(measured_walk, measured_folder, tmp_path, one):
+    whole = read_recording(measured_folder / "pig_c3d" / one.source)
     part = read_recording(measured_walk / one.target)
     first = np.searchsorted(whole.markers.time, part.markers.time[0] - 1e-6)
     frames = slice(first, first + len(part.markers.time))
@@ -91,7 +91,7 @@ def test_what_is_left_is_as_it_was(measured_walk, shared_data, tmp_path, one):
         np.testing.assert_array_equal(getattr(part.plates, name), getattr(whole.plates, name)[samples])
     np.testing.assert_array_equal(part.plates.corners, whole.plates.corners)
     assert (part.mass_kg, part.height_m, part.measurements) == (whole.mass_kg, whole.height_m, whole.measurements)
-    cut_walk.write_cut(one, shared_data / "pig_c3d" / one.source, tmp_path / "again.c3d")
+    cut_walk.write_cut(one, measured_folder / "pig_c3d" / one.source, tmp_path / "again.c3d")
     assert (tmp_path / "again.c3d").read_bytes() == (measured_walk / one.target).read_bytes()
 
 

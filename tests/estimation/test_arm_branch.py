@@ -25,9 +25,9 @@ def heading_deg(rightwards):
 
 
 @pytest.mark.slow
-def test_elbows_bend_forwards_and_the_trunk_faces_where_its_markers_do(shared_data, tmp_path):
+def test_elbows_bend_forwards_and_the_trunk_faces_where_its_markers_do(measured_folder, tmp_path):
     path = tmp_path / "subject.toml"
-    path.write_text(SUBJECT.format(folder=(shared_data / "field" / "hamner_run").as_posix()), encoding="utf-8")
+    path.write_text(SUBJECT.format(folder=(measured_folder / "field" / "hamner_run").as_posix()), encoding="utf-8")
     ready = kinertia.prepare_subject(path)
     (kinematics,) = ready.kinematics
     names, q = ready.skeleton.coordinates, kinematics.motion.q

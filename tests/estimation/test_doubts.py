@@ -7,12 +7,12 @@ import pytest
 
 from kinertia.estimation.doubts import trial_doubts
 from kinertia.io.marker_set_file import choose_marker_set
-from recorded_walks import WALKS
+from recordings import WALKS
 
 
-def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(measured_recording):
+def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(recording_of):
     """Played backwards, a walk obeys the same laws."""
-    walk = measured_recording(*WALKS["plug-in gait b"])
+    walk = recording_of(*WALKS["plug-in gait b"])
     plates, markers = walk.plates, walk.markers
     then = markers.time[0] + markers.time[-1] - plates.time
     turned = {
@@ -31,9 +31,9 @@ def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(measure
 
 
 @pytest.mark.parametrize("lost", ["Toe", "Heel"])
-def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(measured_recording, lost):
+def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(recording_of, lost):
     """Seen from the rest of the markers, loads begin or end off the foot; the plates are where they were."""
-    walk = measured_recording(*WALKS["gait2354"])
+    walk = recording_of(*WALKS["gait2354"])
     marker_set = choose_marker_set(walk.markers.labels)
     kept = [label for label in walk.markers.labels if lost not in label]
     assert len(kept) < len(walk.markers.labels)
@@ -41,8 +41,8 @@ def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(measure
     assert trial_doubts(replace(walk, markers=walk.markers.select(kept)), marker_set, None, feet) == []
 
 
-def test_a_single_frame_is_no_motion(measured_recording):
-    walk = measured_recording("gait2354/subject01_walk1.trc")
+def test_a_single_frame_is_no_motion(recording_of):
+    walk = recording_of("gait2354/subject01_walk1.trc")
     (doubt,) = trial_doubts(replace(walk, markers=walk.markers.cut(0.0, 0.0)), None, None, None)
     assert doubt.refused
     assert "a single frame shows no motion" in doubt.sentence

@@ -8,9 +8,9 @@ from osim_models import PEOPLE, subject_file
 
 
 @pytest.fixture
-def subject(shared_data, tmp_path):
+def subject(measured_folder, tmp_path):
     path = tmp_path / "subject.toml"
-    path.write_text(subject_file(shared_data, PEOPLE["subject4"], False))
+    path.write_text(subject_file(measured_folder, PEOPLE["subject4"], False))
     return read_subject(path)
 
 

@@ -43,12 +43,12 @@ def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndar
 
 
 @pytest.mark.parametrize(("name", "calibrate"), CASES)
-def test_opensim_sees_the_markers_where_the_fit_says(opensim, shared_data, fit_with_model, name, calibrate):
+def test_opensim_sees_the_markers_where_the_fit_says(opensim, measured_folder, fit_with_model, name, calibrate):
     """Model and motion as written: all coordinates, locked and coupled ones too, and calibrated markers and joints."""
     folder = fit_with_model(name, calibrate)
     trial = json.loads((folder / "fit.json").read_text())["trials"][0]
     (markers_file,) = osim_models.PEOPLE[name].trials
-    measured = read_trc(shared_data / f"{markers_file}.trc")
+    measured = read_trc(measured_folder / f"{markers_file}.trc")
     labels = list(used_labels(folder))
     time, modelled = opensim_markers(opensim, folder / "model.osim", folder / "kinematics.mot", labels)
     frames = np.searchsorted(measured.time, time - 1e-6)
@@ -104,10 +104,10 @@ def test_residuals_markers_and_parameters(fit_with_model, name):
 
 
 @pytest.mark.slow
-def test_walks_and_squats_pooled(shared_data, tmp_path):
+def test_walks_and_squats_pooled(measured_folder, tmp_path):
     """Of the squats, the first two."""
     subject = tmp_path / "subject4.toml"
-    text = osim_models.subject_file(shared_data, osim_models.PEOPLE["subject4"], True)
+    text = osim_models.subject_file(measured_folder, osim_models.PEOPLE["subject4"], True)
     subject.write_text(f"{text}window_s = [0.0, 5.0]\n")
     folder = fitted(tmp_path / "out", subject).folder
     assert_targets(folder)
@@ -164,18 +164,18 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line(shared_data, tmp_path, case):
+def test_bad_input_is_one_line(measured_folder, tmp_path, case):
     given, message = BAD[case]
-    files = {key: shared_data / value if "." in value else value for key, value in given.items()}
-    outcome = run("fit", *options(shared_data, **files), "-o", tmp_path / "out")
+    files = {key: measured_folder / value if "." in value else value for key, value in given.items()}
+    outcome = run("fit", *options(measured_folder, **files), "-o", tmp_path / "out")
     assert outcome.status == 2
     assert message in " ".join(outcome.err.split())
     assert not (tmp_path / "out").exists()
 
 
-def test_calibrate_goes_with_a_model(shared_data, tmp_path):
-    static = shared_data / "gait2354" / "subject01_static.trc"
-    words = [*options(shared_data)[:1], "--static", static, "--sex", "male", "--height", 1.8, "--mass", 72.6]
+def test_calibrate_goes_with_a_model(measured_folder, tmp_path):
+    static = measured_folder / "gait2354" / "subject01_static.trc"
+    words = [*options(measured_folder)[:1], "--static", static, "--sex", "male", "--height", 1.8, "--mass", 72.6]
     outcome = run("fit", *words, "--calibrate", "-o", tmp_path / "out")
     assert outcome.status == 2
     assert "calibrate goes with osim" in " ".join(outcome.err.split())

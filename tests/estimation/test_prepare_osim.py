@@ -19,18 +19,18 @@ SUBJECT = Subject(name="A", mass_kg=72.6)
 
 
 @pytest.fixture(scope="module")
-def gait2354(shared_data) -> OsimModel:
-    return read_osim(shared_data / "gait2354" / "subject01_scaled.osim")
+def gait2354(measured_folder) -> OsimModel:
+    return read_osim(measured_folder / "gait2354" / "subject01_scaled.osim")
 
 
 @pytest.fixture(scope="module")
-def rajagopal(shared_data) -> OsimModel:
-    return read_osim(shared_data / "rajagopal_walk" / "scaled.osim")
+def rajagopal(measured_folder) -> OsimModel:
+    return read_osim(measured_folder / "rajagopal_walk" / "scaled.osim")
 
 
 @pytest.fixture(scope="module")
-def walk(shared_data):
-    folder = shared_data / "gait2354"
+def walk(measured_folder):
+    folder = measured_folder / "gait2354"
     return read_recording(*(folder / f"subject01_walk1{end}" for end in (".trc", "_grf.mot", "_grf.xml")))
 
 
@@ -152,9 +152,9 @@ def test_offsets_move_a_joint_along_its_parents_axes(rajagopal):
     np.testing.assert_array_equal(centre_offsets(moved)["hip_l"], 0.0)
 
 
-def test_arms_do_not_turn_over(shared_data):
+def test_arms_do_not_turn_over(measured_folder):
     """With the arm turned by half a turn and the elbow bent backwards, its markers fit nearly as well."""
-    folder = shared_data / "subject4"
+    folder = measured_folder / "subject4"
     skeleton = read_osim(folder / "addbiomechanics_scaled.osim").skeleton
     ik = solve_ik(skeleton.lock({"mtp_angle_r": 0.0, "mtp_angle_l": 0.0}), read_trc(folder / "squats1.trc"))
     elbows = ik.q[:, [ik.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
@@ -164,8 +164,8 @@ def test_arms_do_not_turn_over(shared_data):
     assert ik.marker_rms_m < 0.011
 
 
-def test_a_model_without_markers(shared_data, walk):
-    bare = read_osim(shared_data / "gait2354" / "gait2354_simbody.osim")
+def test_a_model_without_markers(measured_folder, walk):
+    bare = read_osim(measured_folder / "gait2354" / "gait2354_simbody.osim")
     with pytest.raises(OsimError, match="no markers in it; scale the model") as error:
         prepare_osim(SUBJECT, bare, [TrialInput(walk)], Settings(), False)
     assert "gait2354_simbody.osim" in str(error.value)

@@ -8,12 +8,12 @@ import pytest
 from kinertia.estimation.prepare import TrialInput, prepare
 from kinertia.estimation.repeated_trials import repeated_trials
 from kinertia.settings import Subject
-from recorded_walks import WALKS
+from recordings import WALKS
 
 
 @pytest.fixture(scope="module")
-def walk(measured_recording):
-    return measured_recording(*WALKS["plug-in gait a"])
+def walk(recording_of):
+    return recording_of(*WALKS["plug-in gait a"])
 
 
 def test_a_recording_that_is_listed_twice(walk):
@@ -56,8 +56,8 @@ def test_pieces_of_a_recording_may_have_the_forces_of_the_whole(walk):
     assert repeated_trials(pieces, [None, None]) == []
 
 
-def test_the_fit_says_so(walk, measured_recording):
-    static = measured_recording("pig_c3d/subject_a_static.c3d")
+def test_the_fit_says_so(walk, recording_of):
+    static = recording_of("pig_c3d/subject_a_static.c3d")
     subject = Subject(name="A", sex="male", mass_kg=41.5, height_m=1.61)
     ready = prepare(subject, static, [TrialInput(walk), TrialInput(replace(walk, name="walk 2"))])
     assert any("have the same markers to the last digit" in warning for warning in ready.warnings)

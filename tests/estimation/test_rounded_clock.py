@@ -16,7 +16,7 @@ from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_time import nearest_samples, span_s
-from recorded_walks import WALKS
+from recordings import WALKS
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")
 LATER_S = (5.0, 10.0, 20.0, 1234.567)
@@ -57,8 +57,8 @@ def test_as_many_knots(spacing_s):
 
 
 @pytest.mark.parametrize("name", [*WALKS, "subject4"])
-def test_the_same_frames_and_doubts(measured_recording, name):
-    recording = measured_recording(*(SUBJECT4 if name == "subject4" else WALKS[name]))
+def test_the_same_frames_and_doubts(recording_of, name):
+    recording = recording_of(*(SUBJECT4 if name == "subject4" else WALKS[name]))
     if name == "subject4":
         marker_set = read_marker_set(Path(__file__).parents[1] / "subject4.toml")
     else:
@@ -79,10 +79,10 @@ def test_the_same_frames_and_doubts(measured_recording, name):
         assert found(later(recording, by_s)) == as_read
 
 
-def test_the_same_estimate(shared_data, measured_recording):
+def test_the_same_estimate(measured_folder, recording_of):
     """In this walk one knot more than 39 made the forces 4.8 ms late and lumbar moments 4.5 N m larger."""
-    model = read_osim(shared_data / "subject4" / "addbiomechanics_scaled.osim")
-    walk = measured_recording(*SUBJECT4)
+    model = read_osim(measured_folder / "subject4" / "addbiomechanics_scaled.osim")
+    walk = recording_of(*SUBJECT4)
     first, *others = (
         estimate_bsp_of_model(Subject(mass_kg=60.0), model, [TrialInput(one)])
         for one in (walk, later(walk, 5.0), later(walk, 10.0))

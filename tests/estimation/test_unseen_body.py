@@ -32,8 +32,8 @@ def lacking(recording, gone):
 
 
 @pytest.fixture(scope="module")
-def walk(shared_data):
-    folder = shared_data / "rajagopal_walk"
+def walk(measured_folder):
+    folder = measured_folder / "rajagopal_walk"
     walk = read_recording(folder / "motion_capture_walk.trc", folder / "grf_walk.mot", folder / "grf_walk.xml")
     return read_recording(folder / "static_walk_1.trc"), walk
 

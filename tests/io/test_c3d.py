@@ -49,9 +49,9 @@ LARGE = ("bts.c3d", "plates_kistler_type3.c3d")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE)) for name in VARIETY])
-def test_every_maker(shared_data, name):
+def test_every_maker(measured_folder, name):
     expected = VARIETY[name]
-    path = shared_data / "c3d_variety" / name
+    path = measured_folder / "c3d_variety" / name
     if isinstance(expected, str):
         with pytest.raises(FileError, match=expected):
             read_c3d(path)
@@ -81,8 +81,8 @@ WALKS = ["pig_c3d/subject_a_walk", "pig_c3d/subject_b_walk", "c3d_variety/ist", 
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_centre_of_pressure_lies_within_the_corners(measured_file, name):
-    plates = read_c3d(measured_file(f"{name}.c3d")).plates
+def test_centre_of_pressure_lies_within_the_corners(file_of, name):
+    plates = read_c3d(file_of(f"{name}.c3d")).plates
     for p in range(len(plates.names)):
         _, point, free_moment = centres_of_pressure(plates, p)
         low, high = plates.corners[p].min(axis=0), plates.corners[p].max(axis=0)
@@ -96,8 +96,8 @@ FEET = {"plate 1": "L", "plate 2": "R"}
 
 
 @pytest.mark.parametrize("subject", "ab")
-def test_centre_of_pressure_runs_under_the_stance_foot(measured_file, subject):
-    recording = read_c3d(measured_file(f"pig_c3d/subject_{subject}_walk.c3d"))
+def test_centre_of_pressure_runs_under_the_stance_foot(file_of, subject):
+    recording = read_c3d(file_of(f"pig_c3d/subject_{subject}_walk.c3d"))
     for p, name in enumerate(recording.plates.names):
         side = FEET[name] if subject == "a" else {"L": "R", "R": "L"}[FEET[name]]
         time, point, _ = centres_of_pressure(recording.plates, p, 200.0)
@@ -109,8 +109,8 @@ def test_centre_of_pressure_runs_under_the_stance_foot(measured_file, subject):
 
 
 @pytest.mark.parametrize("subject", "ab")
-def test_force_on_the_person_brakes_then_drives(measured_file, subject):
-    recording = read_c3d(measured_file(f"pig_c3d/subject_{subject}_walk.c3d"))
+def test_force_on_the_person_brakes_then_drives(file_of, subject):
+    recording = read_c3d(file_of(f"pig_c3d/subject_{subject}_walk.c3d"))
     pelvis = recording.markers.select(["LASI"]).positions[:, 0]
     forward = pelvis[-1] - pelvis[0]
     for p in range(2):
@@ -122,8 +122,8 @@ def test_force_on_the_person_brakes_then_drives(measured_file, subject):
 
 
 @pytest.mark.parametrize(("subject", "mass_kg", "height_m"), [("a", 41.5, 1.61), ("b", 47.5, 1.505)])
-def test_static_trials_weigh_the_subject(measured_file, subject, mass_kg, height_m):
-    recording = read_c3d(measured_file(f"pig_c3d/subject_{subject}_static.c3d"))
+def test_static_trials_weigh_the_subject(file_of, subject, mass_kg, height_m):
+    recording = read_c3d(file_of(f"pig_c3d/subject_{subject}_static.c3d"))
     mean = recording.plates.force[:, :, 1].sum(axis=1).mean() / GRAVITY
     assert mean == pytest.approx(mass_kg, rel=0.05)
     assert recording.mass_kg == mass_kg
@@ -132,8 +132,8 @@ def test_static_trials_weigh_the_subject(measured_file, subject, mass_kg, height
     assert all(0.01 < value < 1.2 for value in recording.measurements.values())
 
 
-def test_plug_in_gait_outputs_go_and_virtual_markers_stay(shared_data):
-    recording = read_c3d(shared_data / "pig_c3d" / "subject_a_walk.c3d")
+def test_plug_in_gait_outputs_go_and_virtual_markers_stay(measured_folder):
+    recording = read_c3d(measured_folder / "pig_c3d" / "subject_a_walk.c3d")
     labels = recording.markers.labels
     assert {"RHEE", "LFEO", "CentreOfMass"} <= set(labels)
     assert not [label for label in labels if label.endswith(("Angles", "Force", "Moment", "Power"))]
@@ -384,8 +384,8 @@ def test_files_that_are_no_trial(tmp_path):
         read_c3d(write_c3d(tmp_path / "x.c3d", points * np.nan, labels))
 
 
-def test_real_file_cut_anywhere(shared_data, tmp_path):
-    whole = (shared_data / "pig_c3d" / "subject_b_walk.c3d").read_bytes()
+def test_real_file_cut_anywhere(measured_folder, tmp_path):
+    whole = (measured_folder / "pig_c3d" / "subject_b_walk.c3d").read_bytes()
     for size in (10, 600, 20_000, 200_000, len(whole) - 20_000):
         (tmp_path / "x.c3d").write_bytes(whole[:size])
         with pytest.raises(FileError, match="truncated"):

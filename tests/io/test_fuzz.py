@@ -34,8 +34,8 @@ REPRODUCERS = ["c3d_142", "c3d_176", "c3d_189", "c3d_246", "c3d_259", "c3d_306"]
 
 
 @pytest.mark.parametrize("name", REPRODUCERS)
-def test_c3d_files_on_which_ezc3d_crashes_or_hangs(shared_data, name):
-    path = shared_data.parent / "reproducers" / f"{name}.c3d"
+def test_c3d_files_on_which_ezc3d_crashes_or_hangs(measured_folder, name):
+    path = measured_folder.parent / "reproducers" / f"{name}.c3d"
     if not path.is_file():
         pytest.skip(f"needs {path}, which is not part of the package")
     outcome = run("check", path)
@@ -85,8 +85,8 @@ def test_osim_of_a_version_that_is_no_number(small, version):
 
 
 @pytest.mark.parametrize("frame", range(8))
-def test_osim_with_a_renamed_offset_frame(shared_data, tmp_path, frame):
-    text = (shared_data / "rajagopal_walk" / "scaled.osim").read_text(encoding="utf-8")
+def test_osim_with_a_renamed_offset_frame(measured_folder, tmp_path, frame):
+    text = (measured_folder / "rajagopal_walk" / "scaled.osim").read_text(encoding="utf-8")
     parts = text.split('name="tibia_r_offset"')
     at = 1 + frame % (len(parts) - 1)
     (tmp_path / "model.osim").write_text(

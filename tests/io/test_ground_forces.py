@@ -73,10 +73,10 @@ REAL = {
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files_with_and_without_loads_file(shared_data, name):
+def test_real_files_with_and_without_loads_file(measured_folder, name):
     xml, feet = REAL[name]
-    by_name = read_forces(shared_data / f"{name}.mot")
-    by_identifier = read_forces(shared_data / f"{name}.mot", shared_data / xml)
+    by_name = read_forces(measured_folder / f"{name}.mot")
+    by_identifier = read_forces(measured_folder / f"{name}.mot", measured_folder / xml)
     np.testing.assert_array_equal(by_name.force, by_identifier.force)
     np.testing.assert_array_equal(by_name.moment, by_identifier.moment)
     assert by_identifier.declared_feet == feet
@@ -92,16 +92,16 @@ WEIGHTS = {
 
 
 @pytest.mark.parametrize("name", WEIGHTS)
-def test_mean_vertical_force_is_body_weight(shared_data, name):
+def test_mean_vertical_force_is_body_weight(measured_folder, name):
     start, end, mass_kg = WEIGHTS[name]
-    plates = read_forces(shared_data / f"{name}.mot")
+    plates = read_forces(measured_folder / f"{name}.mot")
     during = (plates.time >= start) & (plates.time <= end)
     mean = plates.force[during, :, 1].sum(axis=1).mean() / GRAVITY
     assert mean == pytest.approx(mass_kg, rel=0.02)
 
 
-def test_point_of_application_is_kept_where_loaded(shared_data):
-    plates = read_forces(shared_data / "rajagopal_walk" / "grf_walk.mot")
+def test_point_of_application_is_kept_where_loaded(measured_folder):
+    plates = read_forces(measured_folder / "rajagopal_walk" / "grf_walk.mot")
     loaded = plates.force[:, 0, 1] > 100
     x = plates.moment[loaded, 0, 2] / plates.force[loaded, 0, 1]
     assert x.min() > -1.0

@@ -22,12 +22,12 @@ pelvis = ["RA", "LA", "LB"]
 
 
 @pytest.mark.parametrize(("path", "name"), STATICS.items())
-def test_each_preset_finds_its_own_files(shared_data, path, name):
-    assert choose_marker_set(read_recording(shared_data / path).markers.labels).name == name
+def test_each_preset_finds_its_own_files(measured_folder, path, name):
+    assert choose_marker_set(read_recording(measured_folder / path).markers.labels).name == name
 
 
-def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(shared_data):
-    known = read_recording(shared_data / "subject4/static1.trc").markers.labels
+def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(measured_folder):
+    known = read_recording(measured_folder / "subject4/static1.trc").markers.labels
     labels = [f"{label}_1" for label in known]
     with pytest.raises(MarkerSetError, match=r"no marker-set preset fits.*nearest: ") as caught:
         choose_marker_set(labels)

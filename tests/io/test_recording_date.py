@@ -9,8 +9,8 @@ from kinertia.io.recording_date import recording_date, session_date
 from kinertia.io.subject_file import read_subject
 
 
-def test_files_that_say_it_and_files_that_do_not(shared_data, measured_walk, tmp_path):
-    assert recording_date(shared_data / "c3d_variety" / "bts.c3d") == date(2019, 5, 24)
+def test_files_that_say_it_and_files_that_do_not(measured_folder, measured_walk, tmp_path):
+    assert recording_date(measured_folder / "c3d_variety" / "bts.c3d") == date(2019, 5, 24)
     # Nexus wrote days of processing only
     assert recording_date(measured_walk / "walk.c3d") is None
     (tmp_path / "walk.tsv").write_text("NO_OF_FRAMES\t2\nTIME_STAMP\t2024-02-29, 15:21:26.000\t1.5\n", encoding="utf-8")

@@ -33,12 +33,12 @@ REAL = {
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files_as_opensim_reads_them(shared_data, opensim, name):
+def test_real_files_as_opensim_reads_them(measured_folder, opensim, name):
     rows, columns, in_degrees = REAL[name]
-    table = read_sto(shared_data / name)
+    table = read_sto(measured_folder / name)
     assert table.shape == (rows, columns)
     assert table.attrs["in_degrees"] is in_degrees
-    theirs = opensim.TimeSeriesTable(str(shared_data / name))
+    theirs = opensim.TimeSeriesTable(str(measured_folder / name))
     assert tuple(table.columns) == theirs.getColumnLabels()
     np.testing.assert_array_equal(table.to_numpy(), theirs.getMatrix().to_numpy())
     np.testing.assert_array_equal(table.index, theirs.getIndependentColumn())

@@ -60,8 +60,8 @@ def test_a_pose_that_is_lost_is_a_marker_that_is_missing(file, tmp_path):
         read_c3d(path)
 
 
-def test_a_file_of_the_maker(shared_data):
-    path = shared_data / "c3d_variety" / "rotations_only.c3d"
+def test_a_file_of_the_maker(measured_folder):
+    path = measured_folder / "c3d_variety" / "rotations_only.c3d"
     walking, standing = read_c3d(path), read_c3d(path, standing=True)
     assert walking.markers.positions.shape == (340, 36, 3)
     at = dict(zip(standing.markers.labels, standing.markers.positions[0], strict=True))

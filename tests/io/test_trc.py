@@ -42,9 +42,9 @@ REAL = {
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files(shared_data, name):
+def test_real_files(measured_folder, name):
     frames, count, rate = REAL[name]
-    markers = read_trc(shared_data / name)
+    markers = read_trc(measured_folder / name)
     assert markers.positions.shape == (frames, count, 3)
     assert markers.rate_hz == pytest.approx(rate, rel=1e-9)
     height = np.nanmax(markers.positions[..., 1]) - np.nanmin(markers.positions[..., 1])
@@ -52,9 +52,9 @@ def test_real_files(shared_data, name):
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files_as_opensim_reads_them(shared_data, opensim, name):
-    table = opensim.TimeSeriesTableVec3(str(shared_data / name))
-    markers = read_trc(shared_data / name)
+def test_real_files_as_opensim_reads_them(measured_folder, opensim, name):
+    table = opensim.TimeSeriesTableVec3(str(measured_folder / name))
+    markers = read_trc(measured_folder / name)
     assert markers.labels == table.getColumnLabels()
     scale = 1000.0 if "subject4" not in name else 1.0
     for frame in (0, len(markers.time) // 2, len(markers.time) - 1):
@@ -63,8 +63,8 @@ def test_real_files_as_opensim_reads_them(shared_data, opensim, name):
         np.testing.assert_allclose(scale * markers.positions[frame], theirs, atol=1e-6, equal_nan=True)
 
 
-def test_rounded_times_are_put_back_on_their_grid(shared_data):
-    recording = read_trc_recording(shared_data / "gait2354" / "subject01_walk1.trc")
+def test_rounded_times_are_put_back_on_their_grid(measured_folder):
+    recording = read_trc_recording(measured_folder / "gait2354" / "subject01_walk1.trc")
     markers, notes = recording.markers, recording.notes
     assert recording.length_unit == "mm"
     np.testing.assert_allclose(markers.time, np.arange(151) / 60, atol=1e-12)

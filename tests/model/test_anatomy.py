@@ -87,9 +87,9 @@ def test_models_without_arms_or_without_known_names():
     "name",
     ["gait2354/subject01_scaled.osim", "rajagopal_walk/scaled.osim", "subject4/addbiomechanics_scaled.osim"],
 )
-def test_measured_models_keep_their_mass_and_whole_body_centre(shared_data, name):
+def test_measured_models_keep_their_mass_and_whole_body_centre(measured_folder, name):
     """All bodies have a segment, and femurs, whose frames nearly are the segment's, stay as they are."""
-    model = read_osim(shared_data / name)
+    model = read_osim(measured_folder / name)
     segments = model_segments(model.skeleton, model.bsp)
     assert segments.unknown == ()
     assert segments.bsp.total_mass_kg == pytest.approx(model.bsp.total_mass_kg)

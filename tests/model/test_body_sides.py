@@ -23,9 +23,9 @@ SOUND = [
 
 
 @pytest.fixture(params=SOUND)
-def recorded(request, measured_recording):
+def recorded(request, recording_of):
     """Markers of a sound recording, and their set."""
-    markers = measured_recording(request.param).markers
+    markers = recording_of(request.param).markers
     return markers, choose_marker_set(markers.labels)
 
 

@@ -38,9 +38,9 @@ def scaled(markers, factor):
 
 
 @pytest.fixture(params=STATIC, ids=[trial for _, trial in STATIC])
-def told(request, measured_recording):
+def told(request, recording_of):
     """What is said of somebody's trial against the static one, scaled by a factor."""
-    static, trial = (measured_recording(name).markers for name in request.param)
+    static, trial = (recording_of(name).markers for name in request.param)
     marker_set = choose_marker_set(static.labels)
 
     def said(factor):
@@ -64,8 +64,8 @@ def test_another_scale_than_in_the_static_trial(told, factor, word):
 
 
 @pytest.mark.parametrize("pair", list(permutations(TRIALS, 2)), ids="-".join)
-def test_trials_of_one_person(measured_recording, pair):
-    markers = {name: measured_recording(f"subject4/{name}.trc").markers for name in pair}
+def test_trials_of_one_person(recording_of, pair):
+    markers = {name: recording_of(f"subject4/{name}.trc").markers for name in pair}
     marker_set = read_marker_set("opencap-mocap")
     assert trial_scales(list(markers.items()), marker_set) == []
     for factor, word in ((0.985, "shorter"), (1.015, "longer")):
@@ -75,9 +75,9 @@ def test_trials_of_one_person(measured_recording, pair):
         assert f"% {word} than in '{pair[0]}'" in sentence
 
 
-def test_check_names_the_file(measured_file, measured_recording, tmp_path):
-    folder = measured_file("subject4/static1.trc").parent
-    write_trc(tmp_path / "walking2.trc", scaled(measured_recording("subject4/walking2.trc").markers, 1.015))
+def test_check_names_the_file(file_of, recording_of, tmp_path):
+    folder = file_of("subject4/static1.trc").parent
+    write_trc(tmp_path / "walking2.trc", scaled(recording_of("subject4/walking2.trc").markers, 1.015))
     for one, count in ((folder, 0), (tmp_path, 2)):
         files = (folder / "static1.trc", folder / "walking1.trc", one / "walking2.trc")
         checks, mistakes = check_files(PersonFiles(tuple(RecordingFiles(path) for path in files)))
@@ -86,9 +86,9 @@ def test_check_names_the_file(measured_file, measured_recording, tmp_path):
         assert [len(sentences) for sentences in said] == [0, 0, count]
 
 
-def test_a_fit_with_an_opensim_model_warns(measured_recording, measured_file):
-    model = read_osim(measured_file("gait2354/subject01_scaled.osim"))
-    walk = measured_recording("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot")
+def test_a_fit_with_an_opensim_model_warns(recording_of, file_of):
+    model = read_osim(file_of("gait2354/subject01_scaled.osim"))
+    walk = recording_of("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot")
     other = replace(walk, name="other", markers=scaled(walk.markers, 1.015))
     ready = prepare_osim(Subject(name="A", mass_kg=72.6), model, [TrialInput(walk), TrialInput(other)], Settings())
     (warning,) = [one for one in ready.warnings if "calibrated anew" in one]

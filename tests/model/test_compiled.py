@@ -58,7 +58,7 @@ def test_an_installation_that_may_only_be_read_keeps_them_in_the_users_cache(ins
 @pytest.mark.parametrize("place", ["cache", "temporary"])
 def test_where_the_package_cannot_be_written_to(monkeypatch, place):
     """The user's cache, or where there is none either, the folder for temporary files."""
-    expected = {"cache": compiled._user_cache() / "kinertia", "temporary": Path(compiled.tempfile.gettempdir())}[place]
+    expected = {"cache": compiled._user_cache(), "temporary": Path(compiled.tempfile.gettempdir())}[place]
     compiled.cache_folder.cache_clear()
     monkeypatch.setattr(compiled, "_writable", lambda folder: folder.parent == expected)
     try:

@@ -9,7 +9,7 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.model.computed_markers import computed_doubts
 from kinertia.trial.data import Markers
-from recorded_walks import WALKS
+from recordings import WALKS
 
 SUBJECT4 = Path(__file__).parents[1] / "subject4.toml"
 
@@ -24,8 +24,8 @@ def with_point(markers, marker_set, segment, place):
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_recording):
-    markers = measured_recording(*WALKS[request.param]).markers
+def walk(request, recording_of):
+    markers = recording_of(*WALKS[request.param]).markers
     return markers, choose_marker_set(markers.labels)
 
 
@@ -33,8 +33,8 @@ def test_measured_markers_are_not_doubted(walk):
     assert computed_doubts(*walk) == []
 
 
-def test_a_point_between_two_markers_of_a_joint(measured_recording):
-    markers, marker_set = measured_recording("subject4/walking1.trc").markers, read_marker_set(SUBJECT4)
+def test_a_point_between_two_markers_of_a_joint(recording_of):
+    markers, marker_set = recording_of("subject4/walking1.trc").markers, read_marker_set(SUBJECT4)
     middle = markers.select(["R_elbow_lat", "R_elbow_med"]).positions.mean(axis=1)
     (doubt,) = computed_doubts(*with_point(markers, marker_set, "upper_arm_r", middle))
     assert doubt.startswith("computed, not measured: centre (from R_elbow_lat and R_elbow_med)")
@@ -42,8 +42,8 @@ def test_a_point_between_two_markers_of_a_joint(measured_recording):
     assert computed_doubts(*with_point(markers, marker_set, "upper_arm_r", noisy)) == []
 
 
-def test_a_point_in_axes_through_three_pelvis_markers(measured_recording):
-    markers = measured_recording(*WALKS["plug-in gait a"]).markers
+def test_a_point_in_axes_through_three_pelvis_markers(recording_of):
+    markers = recording_of(*WALKS["plug-in gait a"]).markers
     marker_set = choose_marker_set(markers.labels)
     right, left, back_r, back_l = np.moveaxis(markers.select(["RASI", "LASI", "RPSI", "LPSI"]).positions, 1, 0)
     origin, z = (right + left) / 2, right - left
@@ -58,9 +58,9 @@ def test_a_point_in_axes_through_three_pelvis_markers(measured_recording):
 
 
 @pytest.mark.parametrize("trial", ["walking1", "squats1"])
-def test_hip_centres_that_another_laboratory_computed(trial, measured_recording):
+def test_hip_centres_that_another_laboratory_computed(trial, recording_of):
     """By a rigid fit of all pelvis markers; regressions of the same study go with knees and hips, and are not seen."""
-    markers = measured_recording(f"subject4/{trial}.trc").markers
+    markers = recording_of(f"subject4/{trial}.trc").markers
     marker_set = read_marker_set(SUBJECT4)
     assert computed_doubts(markers, marker_set) == []
     thigh = (*marker_set.segments["thigh_r"], "R_HJC", "L_HJC")

@@ -14,10 +14,10 @@ PLUG_IN = read_marker_set("plug-in-gait")
 
 
 @pytest.fixture(scope="module", params=[("a", 1.61), ("b", 1.505)], ids=["A", "B"])
-def vicon(request, shared_data):
+def vicon(request, measured_folder):
     """Our static model and its angles (deg), and Plug-in Gait's own outputs in ground axes (m, deg)."""
     subject, height = request.param
-    path = shared_data / f"pig_c3d/subject_{subject}_static.c3d"
+    path = measured_folder / f"pig_c3d/subject_{subject}_static.c3d"
     static = read_recording(path)
     skeleton = build_gait27(static, PLUG_IN, height, "male").skeleton
     ik = solve_ik(skeleton, static.markers)

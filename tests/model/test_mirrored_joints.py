@@ -88,13 +88,13 @@ def test_bodies_with_axes_of_their_own():
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_models_in_use(shared_data, name):
-    assert mirrored_joints_doubts(read_osim(shared_data / name).skeleton) == []
+def test_models_in_use(measured_folder, name):
+    assert mirrored_joints_doubts(read_osim(measured_folder / name).skeleton) == []
 
 
-def test_a_subtalar_joint_with_the_frames_of_the_right(shared_data):
+def test_a_subtalar_joint_with_the_frames_of_the_right(measured_folder):
     """Nothing else said so; the moments were up to 33 N m off."""
-    skeleton = read_osim(shared_data / MODELS[0]).skeleton
+    skeleton = read_osim(measured_folder / MODELS[0]).skeleton
     (right,) = [joint for joint in skeleton.joints if joint.child == "calcn_r"]
     (left,) = [joint for joint in skeleton.joints if joint.child == "calcn_l"]
     axes = tuple(replace(own, direction=other.direction) for own, other in zip(left.axes, right.axes, strict=True))

@@ -24,11 +24,11 @@ SOUND = [
 
 
 @pytest.fixture(params=SOUND, ids=[walk for _, walk in SOUND])
-def person(request, shared_data, measured_recording):
+def person(request, measured_folder, recording_of):
     """Places of a model's markers, a trial's, and which are on which segment."""
     model, trial = request.param
-    marker_set = markers_of_model(read_osim(shared_data / model))
-    markers = measured_recording(trial).without_empty_markers().markers
+    marker_set = markers_of_model(read_osim(measured_folder / model))
+    markers = recording_of(trial).without_empty_markers().markers
     return marker_set.in_model, markers.select([x for x in marker_set.labels if x in markers.labels]), marker_set
 
 
@@ -109,8 +109,8 @@ def test_markers_that_were_never_placed(person):
     assert any("not moved to where" in one or "not placed" in one for one in told)
 
 
-def test_markers_that_calibration_moved_far(shared_data):
-    before = read_osim(shared_data / "gait2354/subject01_scaled.osim").skeleton
+def test_markers_that_calibration_moved_far(measured_folder):
+    before = read_osim(measured_folder / "gait2354/subject01_scaled.osim").skeleton
     trial = Markers(np.zeros(1), before.labels, np.zeros((1, len(before.labels), 3)))
     moved = {"R.Heel": 0.08, "R.Toe.Tip": 0.03, "Top.Head": 0.2}
     after = before.with_markers(

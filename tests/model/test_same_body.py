@@ -18,9 +18,9 @@ PEOPLE = [
 
 
 @pytest.fixture(params=PEOPLE, ids=[static for static, _ in PEOPLE])
-def person(request, measured_recording):
+def person(request, recording_of):
     """Markers of somebody's static trial and walk, and their set."""
-    static, walk = (measured_recording(name).markers for name in request.param)
+    static, walk = (recording_of(name).markers for name in request.param)
     return static, walk, choose_marker_set(static.labels)
 
 

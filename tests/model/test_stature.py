@@ -18,9 +18,9 @@ PEOPLE = {
 
 
 @pytest.fixture(params=PEOPLE.items(), ids=list(PEOPLE))
-def person(request, measured_recording):
+def person(request, recording_of):
     name, height_m = request.param
-    static = measured_recording(name)
+    static = recording_of(name)
     return static, choose_marker_set(static.markers.labels), height_m
 
 

@@ -42,20 +42,20 @@ CROSSED = [
 """Walks whose sets have no markers at the joints."""
 
 
-def read(measured_recording, name):
-    markers = measured_recording(name).markers
+def read(recording_of, name):
+    markers = recording_of(name).markers
     marker_set = read_marker_set(OPENCAP) if "subject4" in name else choose_marker_set(markers.labels)
     return markers.select([label for label in marker_set.labels if label in markers.labels]), marker_set
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_sound_trials(name, measured_recording):
-    assert torn_segments_trouble(*read(measured_recording, name)) == ""
+def test_sound_trials(name, recording_of):
+    assert torn_segments_trouble(*read(recording_of, name)) == ""
 
 
 @pytest.mark.parametrize(("name", "pairs", "where"), EXCHANGED)
-def test_exchanged_labels(name, pairs, where, measured_recording):
-    markers, marker_set = read(measured_recording, name)
+def test_exchanged_labels(name, pairs, where, recording_of):
+    markers, marker_set = read(recording_of, name)
     other = {a: b for one in pairs for a, b in (one, one[::-1])}
     swapped = replace(markers, labels=tuple(other.get(label, label) for label in markers.labels))
     trouble = torn_segments_trouble(swapped, marker_set)
@@ -67,11 +67,11 @@ def test_exchanged_labels(name, pairs, where, measured_recording):
     assert "correct the labels" in trouble
 
 
-def with_soft_thigh(measured_recording):
+def with_soft_thigh(recording_of):
     """A walk with a thigh marker that skin takes along with the hip's angle, so that the distance to the knee's changes
     by more than 60 mm.
     """
-    markers, marker_set = read(measured_recording, "rajagopal_walk/motion_capture_walk.trc")
+    markers, marker_set = read(recording_of, "rajagopal_walk/motion_capture_walk.trc")
     places = markers.positions.copy()
     thigh, knee, ankle = (markers.labels.index(name) for name in ("R.TH1", "R.Knee", "R.Ankle"))
     along = places[:, knee] - places[:, ankle]
@@ -80,8 +80,8 @@ def with_soft_thigh(measured_recording):
     return replace(markers, positions=places), marker_set
 
 
-def test_soft_thighs_are_no_exchanged_labels(measured_recording):
-    markers, marker_set = with_soft_thigh(measured_recording)
+def test_soft_thighs_are_no_exchanged_labels(recording_of):
+    markers, marker_set = with_soft_thigh(recording_of)
     place = markers.positions
     apart = [
         np.linalg.norm(place[:, markers.labels.index("R.TH1")] - place[:, markers.labels.index(k)], axis=1)
@@ -91,8 +91,8 @@ def test_soft_thighs_are_no_exchanged_labels(measured_recording):
     assert torn_segments_trouble(markers, marker_set) == ""
 
 
-def test_what_a_marker_goes_with_instead(measured_recording):
-    markers, marker_set = read(measured_recording, "pig_c3d/subject_a_walk.c3d")
+def test_what_a_marker_goes_with_instead(recording_of):
+    markers, marker_set = read(recording_of, "pig_c3d/subject_a_walk.c3d")
     other = {"RTIB": "LTIB", "LTIB": "RTIB"}
     swapped = replace(markers, labels=tuple(other.get(label, label) for label in markers.labels))
     trouble = torn_segments_trouble(swapped, marker_set)
@@ -100,8 +100,8 @@ def test_what_a_marker_goes_with_instead(measured_recording):
 
 
 @pytest.mark.parametrize(("name", "segment"), CROSSED)
-def test_whole_segments_of_the_other_leg(name, segment, measured_recording):
-    markers, marker_set = read(measured_recording, name)
+def test_whole_segments_of_the_other_leg(name, segment, recording_of):
+    markers, marker_set = read(recording_of, name)
     right, left = (sorted(marker_set.segments[f"{segment}_{side}"]) for side in "rl")
     other = {a: b for one in zip(right, left, strict=True) for a, b in (one, one[::-1])}
     swapped = replace(markers, labels=tuple(other.get(label, label) for label in markers.labels))

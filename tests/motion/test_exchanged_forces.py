@@ -13,15 +13,14 @@ TRIALS = ("walking1", "walking2", "squats1")
 
 
 @pytest.fixture
-def of_subject4(measured_file, measured_recording):
+def of_subject4(file_of, recording_of):
     """Trials of one person with the forces of others, late by so much (s), and the labels on each segment."""
-    marker_set = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
+    marker_set = markers_of_model(read_osim(file_of("subject4/addbiomechanics_scaled.osim")))
 
     def made(late_s=0.0, early_s=0.0, **forces):
         late = {"walking1": -early_s, "walking2": late_s}
         return [
-            trial_of_subject4(measured_recording, marker_set, name, of, late.get(name, 0.0))
-            for name, of in forces.items()
+            trial_of_subject4(recording_of, marker_set, name, of, late.get(name, 0.0)) for name, of in forces.items()
         ], marker_set.segments
 
     return made

@@ -14,14 +14,14 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.plate_faults import loads_trouble
-from recorded_walks import WALKS
+from recordings import WALKS
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_recording):
+def walk(request, recording_of):
     """A measured walk."""
     markers, forces = WALKS[request.param]
-    return measured_recording(markers, forces)
+    return recording_of(markers, forces)
 
 
 def with_force(walk, change, torque=1.0):
@@ -68,10 +68,10 @@ def test_the_sign_of_one_plate(walk, axis, plate):
 
 @pytest.mark.parametrize("axis", ["X", "Z"])
 @pytest.mark.parametrize("plate", [0, 1])
-def test_the_sign_of_one_plate_in_a_run(measured_recording, plate, axis):
+def test_the_sign_of_one_plate_in_a_run(recording_of, plate, axis):
     """Limbs swing so that the pelvis does not move as the centre of mass."""
     folder = "field/rajagopal_run"
-    run = measured_recording(f"{folder}/motion_capture_run.trc", f"{folder}/grf_run.mot")
+    run = recording_of(f"{folder}/motion_capture_run.trc", f"{folder}/grf_run.mot")
     assert one_plate_trouble(run) == ""
     signs = np.ones((2, 3))
     signs[plate, "XYZ".index(axis)] = -1.0
@@ -216,18 +216,18 @@ def test_a_file_at_another_rate(walk, factor, words):
         ([-1, 1, -1], "the forces are turned by 180 degrees about the vertical"),
     ],
 )
-def test_signs_in_a_run(measured_recording, signs, words):
+def test_signs_in_a_run(recording_of, signs, words):
     """Limbs swing so much that the pelvis does not go as the centre of mass."""
-    run = measured_recording("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
+    run = recording_of("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
     assert one_plate_trouble(run) == ""
     trouble = trouble_of(with_force(run, lambda force: force * signs))
     assert trouble.startswith(words)
     assert bool(trouble) == bool(words)
 
 
-def test_squats_are_not_doubted(measured_recording):
+def test_squats_are_not_doubted(recording_of):
     """The markers' centre goes back where the centre of mass does not: the trunk bends."""
-    squats = measured_recording("subject4/squats1.trc", "subject4/squats1_grf.mot")
+    squats = recording_of("subject4/squats1.trc", "subject4/squats1_grf.mot")
     assert trouble_of(squats, read_marker_set(Path(__file__).parents[1] / "subject4.toml")) == ""
 
 

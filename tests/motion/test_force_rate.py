@@ -8,12 +8,12 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.motion.force_rate import rate_doubts
 from kinertia.trial.plate_assignment import build_trial
-from recorded_walks import WALKS
+from recordings import WALKS
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_recording):
-    return measured_recording(*WALKS[request.param])
+def walk(request, recording_of):
+    return recording_of(*WALKS[request.param])
 
 
 def doubts(recording, rate=1.0, late_s=0.0, gain=(1.0, 1.0)):
@@ -37,13 +37,13 @@ def test_forces_at_their_rate(walk, late_s, gain):
 
 
 @pytest.mark.parametrize(("name", "rates"), [("gait2354", [0.98, 1.02]), ("rajagopal", [0.97, 1.02])])
-def test_forces_at_another_rate(measured_recording, name, rates):
+def test_forces_at_another_rate(recording_of, name, rates):
     for rate in rates:
-        (doubt,) = doubts(measured_recording(*WALKS[name]), rate)
+        (doubt,) = doubts(recording_of(*WALKS[name]), rate)
         assert doubt.startswith("markers and forces do not run at the same speed")
         assert float(doubt.partition("of about ")[2].partition(":")[0]) == pytest.approx(rate, abs=0.011)
 
 
-def test_windows_that_are_too_short_say_nothing(measured_recording):
+def test_windows_that_are_too_short_say_nothing(recording_of):
     """A single support and what is around it."""
-    assert doubts(measured_recording(*WALKS["plug-in gait a"]), 1.02) == []
+    assert doubts(recording_of(*WALKS["plug-in gait a"]), 1.02) == []

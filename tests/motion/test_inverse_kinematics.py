@@ -110,9 +110,9 @@ def test_an_arm_that_swings_through_more_than_half_a_turn_stays_on_its_branch(sk
     "name",
     ["hamner_run/subject02_running.trc hamner_run/subject02_registered.osim", "laiarnold5_jump/DJ1.trc " + JUMPER],
 )
-def test_no_coordinate_of_a_run_or_a_jump_jumps(measured_file, name):
+def test_no_coordinate_of_a_run_or_a_jump_jumps(file_of, name):
     """Not by more than half a turn in 0.1 s, as a leg does in a sprint at most; an arm may turn round overhead."""
-    markers, model = (measured_file(f"field/{file}") for file in name.split())
+    markers, model = (file_of(f"field/{file}") for file in name.split())
     skeleton, walk = read_osim(model).skeleton, read_recording(markers).markers
     ik = solve_ik(skeleton, walk.cut(*walk.time[[0, min(300, len(walk.time) - 1)]]))
     fastest = np.nanmax(np.abs(np.diff(ik.q[:, skeleton.rotational], axis=0))) * walk.rate_hz
@@ -255,9 +255,9 @@ def test_opensim_finds_the_same_coordinates(model):
 
 
 @pytest.mark.parametrize("person", ["a", "b"])
-def test_a_few_frames_are_solved_as_in_the_whole_trial(measured_recording, person):
+def test_a_few_frames_are_solved_as_in_the_whole_trial(recording_of, person):
     """Frames a second apart are no start for one another: a foot would end upside down."""
-    static, walk = (measured_recording(f"pig_c3d/subject_{person}_{kind}.c3d") for kind in ("static", "walk"))
+    static, walk = (recording_of(f"pig_c3d/subject_{person}_{kind}.c3d") for kind in ("static", "walk"))
     skeleton = build_gait27(static, choose_marker_set(static.markers.labels), 1.6, "female").skeleton
     every = round(walk.markers.rate_hz / 10)
     few = solve_ik(skeleton, sampled(walk.markers)).q

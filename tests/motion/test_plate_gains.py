@@ -8,15 +8,15 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.plate_assignment import build_trial
-from recorded_walks import WALKS
+from recordings import WALKS
 
 SOUND = ("gait2354", "rajagopal", "plug-in gait b")
 
 
 @pytest.fixture(params=SOUND)
-def walk(request, measured_recording):
+def walk(request, recording_of):
     """A measured walk."""
-    return measured_recording(*WALKS[request.param])
+    return recording_of(*WALKS[request.param])
 
 
 def told(walk):

@@ -45,17 +45,17 @@ SWAPS = {
 
 
 @pytest.fixture(scope="module")
-def walk(measured_recording):
+def walk(recording_of):
     known = {}
 
     def read(name):
         if name not in known:
             static_path, walk_path, height = WALKS[name]
-            static = measured_recording(static_path)
+            static = recording_of(static_path)
             labels = static.markers.labels
             marker_set = read_marker_set(SUBJECT4) if name.startswith("subject4") else choose_marker_set(labels)
             skeleton = build_gait27(static, marker_set, height, "male").skeleton.free(ARM_ROTATIONS)
-            known[name] = skeleton, sampled(measured_recording(walk_path).markers)
+            known[name] = skeleton, sampled(recording_of(walk_path).markers)
         return known[name]
 
     return read

@@ -19,13 +19,13 @@ TRIALS = ("walking1", "walking2", "squats1")
 
 
 @pytest.fixture
-def of_subject4(measured_file, measured_recording):
+def of_subject4(file_of, recording_of):
     """Trials of one person whose forces are late by so much (s), and the labels on each segment."""
-    marker_set = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
+    marker_set = markers_of_model(read_osim(file_of("subject4/addbiomechanics_scaled.osim")))
 
     def made(**late_s):
         return [
-            trial_of_subject4(measured_recording, marker_set, name, late_s=late) for name, late in late_s.items()
+            trial_of_subject4(recording_of, marker_set, name, late_s=late) for name, late in late_s.items()
         ], marker_set.segments
 
     return made
@@ -90,9 +90,9 @@ def test_walks_of_less_than_a_second(of_subject4, late_s):
     assert len(uneven_delays(short, segments)) == (late_s != 0.0)
 
 
-def test_said_by_a_fit(measured_file, measured_recording):
-    model = read_osim(measured_file("subject4/addbiomechanics_scaled.osim"))
-    walks = [measured_recording(f"subject4/{name}.trc", f"subject4/{name}_grf.mot") for name in TRIALS[:2]]
+def test_said_by_a_fit(file_of, recording_of):
+    model = read_osim(file_of("subject4/addbiomechanics_scaled.osim"))
+    walks = [recording_of(f"subject4/{name}.trc", f"subject4/{name}_grf.mot") for name in TRIALS[:2]]
     late = replace(walks[1], plates=replace(walks[1].plates, time=walks[1].plates.time + 0.02))
 
     def said(*recordings):
@@ -104,18 +104,18 @@ def test_said_by_a_fit(measured_file, measured_recording):
     assert len(said(walks[0], late)) == 1
 
 
-def test_said_by_check(measured_file, tmp_path):
+def test_said_by_check(file_of, tmp_path):
     """Of the trial that is late, by its name."""
     for name in ("walking1", "walking2"):
         for end in (".trc", "_grf.mot"):
-            text = measured_file(f"subject4/{name}{end}").read_text()
+            text = file_of(f"subject4/{name}{end}").read_text()
             if name == "walking2" and end == "_grf.mot":
                 head, rows = text.split("endheader\n", 1)
                 labels, *lines = rows.splitlines()
                 late = [f"{float(line.split()[0]) + 0.02:.6f}\t" + "\t".join(line.split()[1:]) for line in lines]
                 text = f"{head}endheader\n{labels}\n" + "\n".join(late) + "\n"
             (tmp_path / f"{name}{end}").write_text(text)
-    model = measured_file("subject4/addbiomechanics_scaled.osim")
+    model = file_of("subject4/addbiomechanics_scaled.osim")
     trials = "".join(
         f'[[trial]]\nname = "{n[-1]}. walk"\nmarkers = "{n}.trc"\nforces = "{n}_grf.mot"\n'
         for n in ("walking1", "walking2")

@@ -256,13 +256,13 @@ class NextToOpenSim:
 
 
 @pytest.fixture(scope="module")
-def next_to_opensim(fit_with_model, shared_data):
+def next_to_opensim(fit_with_model, measured_folder):
     """The same model, markers and forces; OpenSim's files end at 79 % of the only stride."""
     fit = load_fit(fit_with_model("gait2354", False))
     (trial,) = fit.trials
     (stride,) = trial.strides
     assert stride.side == "r"
-    folder = shared_data / "gait2354" / "opensim_results"
+    folder = measured_folder / "gait2354" / "opensim_results"
     coordinates, moments = read_sto(folder / "ik.mot"), read_sto(folder / "inverse_dynamics.sto")
     values = coordinates[list(trial.skeleton.coordinates)].to_numpy()
     spline = smooth(

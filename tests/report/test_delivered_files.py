@@ -173,7 +173,7 @@ def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_pa
         arguments = [wanted.trials[0].markers, "--static", wanted.model.static]
         arguments += ["--mass", person.mass_kg, "--height", person.height_m, "--sex", person.sex]
     else:
-        arguments = fit_arguments(request.getfixturevalue("shared_data"), walk)
+        arguments = fit_arguments(request.getfixturevalue("measured_folder"), walk)
         for option in ("--forces", "--loads"):
             at = arguments.index(option)
             del arguments[at : at + 2]

@@ -51,7 +51,7 @@ def test_page_of_measured_trials(fit_of):
 
 
 @pytest.mark.slow
-def test_page_of_speed(shared_data, tmp_path, monkeypatch):
+def test_page_of_speed(measured_folder, tmp_path, monkeypatch):
     stages = pytest.importorskip("stages")
     monkeypatch.setattr(stages, "WINDOW_S", {"gait2354": (0.0, 0.6)})
     monkeypatch.setattr(stages, "ESTIMATED_S", (0.8,))

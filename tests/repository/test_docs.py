@@ -35,7 +35,7 @@ def workshop(tmp_path, monkeypatch, request):
 
     def make(name):
         if name in MEASURED:
-            request.getfixturevalue("shared_data")
+            request.getfixturevalue("measured_folder")
             link_measured(name, tmp_path)
         monkeypatch.chdir(tmp_path)
         return tmp_path

@@ -8,8 +8,8 @@ import kinertia
 
 
 @pytest.mark.slow
-def test_step_by_step_example_runs(shared_data, capsys):
-    fit = fit_gait2354.main(shared_data / "gait2354", (0.7, 1.1))
+def test_step_by_step_example_runs(measured_folder, capsys):
+    fit = fit_gait2354.main(measured_folder / "gait2354", (0.7, 1.1))
     shown = capsys.readouterr().out
     forces = [float(force) for force in re.findall(r"([\d.]+) N +[\d.]+ N m", shown)]
     before, after = forces[:2]

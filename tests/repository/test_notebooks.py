@@ -42,7 +42,7 @@ def test_pages_show_what_the_notebooks_show(name):
 @pytest.mark.parametrize("name", MEASURED)
 def test_notebooks_run(name, tmp_path, monkeypatch, capsys, request):
     if MEASURED[name] is not None:
-        request.getfixturevalue("shared_data")
+        request.getfixturevalue("measured_folder")
         link_measured(MEASURED[name], tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(SVG=lambda path: (tmp_path / path).read_text()))

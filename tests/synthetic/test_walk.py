@@ -173,8 +173,8 @@ def test_loads_that_cannot_be_balanced_are_refused(trial):
         consistent_trial(trial.skeleton, trial.bsp, trial.time, trial.motion, upside_down)
 
 
-def test_a_measured_walk_becomes_consistent(shared_data, tmp_path):
-    folder = shared_data / "rajagopal_walk"
+def test_a_measured_walk_becomes_consistent(measured_folder, tmp_path):
+    folder = measured_folder / "rajagopal_walk"
     file = tmp_path / "subject.toml"
     file.write_text(
         f'[subject]\nsex = "male"\nmass_kg = 85.0\nheight_m = 1.83\n'

@@ -171,13 +171,13 @@ MEASURED = {
 
 
 @pytest.mark.parametrize("name", MEASURED)
-def test_measured_trials(measured_file, measured_recording, name):
+def test_measured_trials(file_of, recording_of, name):
     """Of the measured walks only two hold a whole stride."""
     forces, level = MEASURED[name]
-    recording = measured_recording(name, forces)
+    recording = recording_of(name, forces)
     own = None
     if "subject4" in name:
-        own = markers_of_model(read_osim(measured_file("subject4/addbiomechanics_scaled.osim")))
+        own = markers_of_model(read_osim(file_of("subject4/addbiomechanics_scaled.osim")))
     assert [v.level for v in verdicts(recording, own)] == ([] if level is None else [level])
 
 

@@ -11,17 +11,17 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from kinertia.trial.sampled_time import runs
-from recorded_walks import WALKS
+from recordings import WALKS
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
 from walk_on_plates import walk as simple_walk
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_recording):
+def walk(request, recording_of):
     """A measured walk and the labels of its feet."""
     markers, forces = WALKS[request.param]
-    recording = measured_recording(markers, forces)
+    recording = recording_of(markers, forces)
     feet = choose_marker_set(recording.markers.labels).foot_labels()
     return recording, {
         side: [one for one in labels if one in recording.markers.labels] for side, labels in feet.items()
@@ -118,9 +118,9 @@ def test_a_walk_on_one_long_plate(walk):
     assert load_places_trouble(one, feet) == ""
 
 
-def test_squats_on_one_plate(measured_recording):
+def test_squats_on_one_plate(recording_of):
     """The load is between the feet all the time: not of another trial, but both feet on one plate."""
-    squats = measured_recording("subject4/squats1.trc", "subject4/squats1_grf.mot")
+    squats = recording_of("subject4/squats1.trc", "subject4/squats1_grf.mot")
     feet = read_marker_set(Path(__file__).parents[1] / "subject4.toml").foot_labels()
     plates = squats.plates
     force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
@@ -159,9 +159,9 @@ def test_plates_that_are_exchanged():
     "files",
     [("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"), WALKS["gait2354"]],
 )
-def test_belts_that_are_exchanged(measured_recording, files, apart_m):
+def test_belts_that_are_exchanged(recording_of, files, apart_m):
     """Each load lies on the other belt, and goes there as it would on its own."""
-    run = measured_recording(*files)
+    run = recording_of(*files)
     feet = choose_marker_set(run.markers.labels).foot_labels()
     offset_m = np.array([[0.0, 0.0, apart_m], [0.0, 0.0, -apart_m]])
     trouble = load_places_trouble(moved(run, offset_m), feet)
@@ -186,9 +186,9 @@ def test_both_feet_on_a_plate():
     assert "both feet are on it (plate 1 from 0.7" in doubt
 
 
-def test_a_foot_that_swings_is_on_no_plate(measured_recording):
+def test_a_foot_that_swings_is_on_no_plate(recording_of):
     """A runner's centre of pressure that is off the foot is not the other foot's, which is in the air."""
-    run = measured_recording("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
+    run = recording_of("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot")
     feet = choose_marker_set(run.markers.labels).foot_labels()
     doubts = load_places_doubts(moved(run, (0.0, 0.0, 0.13)), feet)
     assert doubts

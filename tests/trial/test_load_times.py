@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.load_places import load_places_trouble
-from recorded_walks import WALKS
+from recordings import WALKS
 
 RUNS = {
     "rajagopal": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
@@ -25,13 +25,13 @@ def said_of(recording, rate=1.0, late_s=0.0):
 
 
 @pytest.fixture(params=RUNS)
-def run(request, measured_recording):
-    return measured_recording(*RUNS[request.param])
+def run(request, recording_of):
+    return recording_of(*RUNS[request.param])
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_recording):
-    return measured_recording(*WALKS[request.param])
+def walk(request, recording_of):
+    return recording_of(*WALKS[request.param])
 
 
 @pytest.mark.parametrize("rate", [0.95, 0.98, 0.99, 1.01, 1.02, 1.05])
@@ -87,9 +87,9 @@ def test_two_contacts_do_not_tell_a_rate_from_a_clock(walk):
     assert percent == pytest.approx(5.0, abs=2.5)
 
 
-def test_three_contacts_exclude_a_rate_that_is_far_off(measured_recording):
+def test_three_contacts_exclude_a_rate_that_is_far_off(recording_of):
     """To be 100 ms late in the middle of 2.4 s, forces would have to be 10 % slow."""
-    trouble = said_of(measured_recording(*WALKS["rajagopal"]), late_s=0.1)
+    trouble = said_of(recording_of(*WALKS["rajagopal"]), late_s=0.1)
     assert trouble.startswith("the forces are ")
     assert "rate" not in trouble
 

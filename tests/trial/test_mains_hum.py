@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.trial.mains_hum import hum_doubts, hum_trouble
-from recorded_walks import WALKS
+from recordings import WALKS
 
 OTHERS = {
     "run": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
@@ -18,8 +18,8 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
-def test_sound_forces(name, measured_recording):
-    plates = measured_recording(*{**WALKS, **OTHERS}[name]).plates
+def test_sound_forces(name, recording_of):
+    plates = recording_of(*{**WALKS, **OTHERS}[name]).plates
     assert hum_trouble(plates) == ""
     assert hum_doubts(plates) == []
 
@@ -27,8 +27,8 @@ def test_sound_forces(name, measured_recording):
 @pytest.mark.parametrize("name", WALKS)
 @pytest.mark.parametrize("mains_hz", [50.0, 60.0])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_hum(name, mains_hz, axis, measured_recording):
-    plates = measured_recording(*WALKS[name]).plates
+def test_hum(name, mains_hz, axis, recording_of):
+    plates = recording_of(*WALKS[name]).plates
     hum = np.sin(2 * np.pi * mains_hz * plates.time + 1.0)
     for size, refused in ((8.0, False), (25.0, True)):
         force = plates.force.copy()

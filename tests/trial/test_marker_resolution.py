@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
-from recorded_walks import WALKS
+from recordings import WALKS
 
 OTHERS = {
     "run": ("field/rajagopal_run/motion_capture_run.trc", None),
@@ -24,13 +24,13 @@ def all_of(markers):
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
-def test_sound_recordings(name, measured_recording):
-    assert not any(all_of(measured_recording(*{**WALKS, **OTHERS}[name]).markers))
+def test_sound_recordings(name, recording_of):
+    assert not any(all_of(recording_of(*{**WALKS, **OTHERS}[name]).markers))
 
 
 @pytest.fixture(params=WALKS)
-def walk(request, measured_recording):
-    return measured_recording(*WALKS[request.param]).markers
+def walk(request, recording_of):
+    return recording_of(*WALKS[request.param]).markers
 
 
 @pytest.mark.parametrize("times", [2, 3, 4])

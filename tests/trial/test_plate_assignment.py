@@ -311,10 +311,10 @@ REAL = {
 
 
 @pytest.fixture(scope="module")
-def real(measured_recording):
+def real(recording_of):
     def read(name):
         files, feet, window = REAL[name]
-        return measured_recording(*files), feet, window
+        return recording_of(*files), feet, window
 
     return read
 

@@ -11,7 +11,7 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_table, write_table
 from kinertia.trial.exchanged_torques import exchanged_torques_doubts
 from kinertia.trial.torque_columns import torque_columns_doubts
-from recorded_walks import WALKS
+from recordings import WALKS
 
 GROUPS = {
     "gait2354/subject01_walk1_grf.mot": (
@@ -41,11 +41,11 @@ SOUND = [
 
 
 @pytest.fixture
-def changed(measured_file, tmp_path):
+def changed(file_of, tmp_path):
     """Loads of a measured force file whose forces, points and torques, (k, 3) of each plate, a function replaced."""
 
     def change(name, how):
-        table, path = read_table(measured_file(name)), tmp_path / "grf.mot"
+        table, path = read_table(file_of(name)), tmp_path / "grf.mot"
         values = table.values.copy()
         places = [
             [[table.labels.index(identifier + axis) for axis in "xyz"] for identifier in group]
@@ -62,15 +62,15 @@ def changed(measured_file, tmp_path):
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_sound_files(measured_file, name):
-    plates = read_forces(measured_file(name))
+def test_sound_files(file_of, name):
+    plates = read_forces(file_of(name))
     assert torque_columns_doubts(plates) == []
     assert exchanged_torques_doubts(plates) == []
 
 
 @pytest.mark.parametrize("name", ["plug-in gait a", "plug-in gait b"])
-def test_plates_of_a_c3d_file_have_no_torque_columns(measured_recording, name):
-    assert torque_columns_doubts(measured_recording(*WALKS[name]).plates) == []
+def test_plates_of_a_c3d_file_have_no_torque_columns(recording_of, name):
+    assert torque_columns_doubts(recording_of(*WALKS[name]).plates) == []
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -132,7 +132,7 @@ def test_what_an_unloaded_plate_reads_is_no_torque_of_the_other(changed, name, s
 
 @pytest.mark.parametrize("middle", [(0.0, 0.0, 0.0), (0.9, 0.0, 0.3)])
 @pytest.mark.parametrize("name", GROUPS)
-def test_forces_at_a_point_that_stays_with_all_their_moments(changed, measured_file, name, middle):
+def test_forces_at_a_point_that_stays_with_all_their_moments(changed, file_of, name, middle):
     """They are the same loads, and nothing is wrong with them."""
 
     def at_the_middle(groups):
@@ -142,15 +142,15 @@ def test_forces_at_a_point_that_stays_with_all_their_moments(changed, measured_f
             for force, point, torque in groups
         ]
 
-    moved, whole = changed(name, at_the_middle), read_forces(measured_file(name))
+    moved, whole = changed(name, at_the_middle), read_forces(file_of(name))
     loaded = whole.force[..., 1] > 20.0
     np.testing.assert_allclose(moved.moment[loaded], whole.moment[loaded], atol=1e-3)
     assert torque_columns_doubts(moved) == []
 
 
-def test_said_of_a_trial(changed, measured_recording):
+def test_said_of_a_trial(changed, recording_of):
     """By `check` and by every fit: both ask for these."""
-    recording = measured_recording(*WALKS["gait2354"])
+    recording = recording_of(*WALKS["gait2354"])
     marker_set = choose_marker_set(recording.markers.labels)
     feet = {
         side: [one for one in own if one in recording.markers.labels] for side, own in marker_set.foot_labels().items()

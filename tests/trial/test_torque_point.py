@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.torque_point import torque_point_doubts
-from recorded_walks import WALKS
+from recordings import WALKS
 
 OTHERS = {
     "OpenCap": ("subject4/walking1.trc", "subject4/walking1_grf.mot"),
@@ -21,13 +21,13 @@ MISTAKEN = {**WALKS, "OpenCap": OTHERS["OpenCap"], "run": OTHERS["run"]}
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
-def test_free_moments(name, measured_recording):
-    assert torque_point_doubts(measured_recording(*{**WALKS, **OTHERS}[name]).plates) == []
+def test_free_moments(name, recording_of):
+    assert torque_point_doubts(recording_of(*{**WALKS, **OTHERS}[name]).plates) == []
 
 
 @pytest.mark.parametrize("name", MISTAKEN)
-def test_moments_about_the_middle(name, measured_recording):
-    plates = measured_recording(*MISTAKEN[name]).plates
+def test_moments_about_the_middle(name, recording_of):
+    plates = recording_of(*MISTAKEN[name]).plates
     point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
     loaded = plates.force[..., 1] > FIRM_LOAD_N
     used = np.flatnonzero(loaded.sum(axis=0) > 20)

@@ -40,9 +40,9 @@ def said_of(recording, which=(), matrix=None, offset_m=(0.0, 0.0, 0.0)):
 
 @pytest.mark.parametrize("name", WALKS)
 @pytest.mark.parametrize("which", [(0,), (1,), (0, 1)])
-def test_what_is_named_is_true(measured_recording, name, which):
+def test_what_is_named_is_true(recording_of, name, which):
     """Loads in the middle of a plate may leave two corrections; then none is named."""
-    walk = measured_recording(name)
+    walk = recording_of(name)
     named = 0
     for cause, matrix in MISTAKES.items():
         trouble = said_of(walk, which, matrix)
@@ -58,5 +58,5 @@ def test_what_is_named_is_true(measured_recording, name, which):
 
 @pytest.mark.parametrize("name", WALKS)
 @pytest.mark.parametrize("offset_m", [(0.0, 0.0, 0.0), (0.12, 0.0, 0.0), (0.0, 0.0, 0.2), (-0.3, 0.0, 0.1)])
-def test_sound_and_displaced_plates_are_not_called_turned(measured_recording, name, offset_m):
-    assert "which no other" not in said_of(measured_recording(name), offset_m=offset_m)
+def test_sound_and_displaced_plates_are_not_called_turned(recording_of, name, offset_m):
+    assert "which no other" not in said_of(recording_of(name), offset_m=offset_m)

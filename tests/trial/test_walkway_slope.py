@@ -27,22 +27,22 @@ OTHERS = [
 ]
 
 
-def read(measured_recording, name):
-    markers = measured_recording(name).markers
+def read(recording_of, name):
+    markers = recording_of(name).markers
     if "r_calc" in markers.labels:
         return markers, OPENCAP
     return markers, choose_marker_set(markers.labels).foot_labels()
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
-def test_sound_floors(name, measured_recording):
-    assert walkway_slope_doubts(*read(measured_recording, name)) == []
+def test_sound_floors(name, recording_of):
+    assert walkway_slope_doubts(*read(recording_of, name)) == []
 
 
 @pytest.mark.parametrize("degrees", [1.5, -3.0])
 @pytest.mark.parametrize("name", WALKS)
-def test_tilted_cameras(name, degrees, measured_recording):
-    markers, feet = read(measured_recording, name)
+def test_tilted_cameras(name, degrees, recording_of):
+    markers, feet = read(recording_of, name)
     way = markers.positions[-1] - markers.positions[0]
     axis = "z" if np.nanmax(abs(way[:, 0])) > np.nanmax(abs(way[:, 2])) else "x"
     turn = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
@@ -52,7 +52,7 @@ def test_tilted_cameras(name, degrees, measured_recording):
 
 
 @pytest.mark.parametrize("name", WALKS[:3])
-def test_a_level_floor_that_is_turned(name, measured_recording):
-    markers, feet = read(measured_recording, name)
+def test_a_level_floor_that_is_turned(name, recording_of):
+    markers, feet = read(recording_of, name)
     turn = Rotation.from_euler("y", 40, degrees=True).as_matrix()
     assert walkway_slope_doubts(replace(markers, positions=markers.positions @ turn.T), feet) == []

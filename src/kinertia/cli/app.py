@@ -28,7 +28,7 @@ all segments out, with a motion that they and the forces explain.
 [bold]In which order[/]
 
 kinertia demo                 see it work, on a synthetic person
-kinertia demo --measured      see it work, on a measured walk
+kinertia demo --measured      see it work on a measured walk (downloads 0.9 MB)
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
 kinertia markers FILE         which marker set is it? draft one of your own

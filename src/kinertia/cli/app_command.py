@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from kinertia.cli.measured_demo import FILES
+from kinertia.cli.measured_demo import write_measured_lab
+from kinertia.cli.synthetic_demo import write_synthetic_lab
 from kinertia.cli.terminal import out, print_json
 from kinertia.errors import KinertiaError
 
+_EXAMPLES: dict[str, Callable[[Path], object]] = {"measured": write_measured_lab, "synthetic": write_synthetic_lab}
 _HOW = 'pip install "kinertia[app]"'
 
 
@@ -49,7 +52,7 @@ def app(
         raise KinertiaError(problem) from None
     library = Library(Path.home() / "Kinertia" if folder is None else folder)
     with library.opened():
-        server = Server(library, port, FILES, prepare=True)
+        server = Server(library, port, _EXAMPLES, prepare=True)
         if as_json:
             print_json({"address": server.address, "library": str(library.folder)})
         else:

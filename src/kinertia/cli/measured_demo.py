@@ -1,4 +1,4 @@
-"""`kinertia demo --measured`: a measured walk that the package brings along, fitted as `kinertia fit` does."""
+"""`kinertia demo --measured`: OpenSim's gait2354 example, downloaded once, fitted as `kinertia fit` does."""
 
 from __future__ import annotations
 
@@ -10,15 +10,45 @@ from kinertia.estimation.prepare import Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import command_line, provenance_of
+from kinertia.io.samples import SHA256, sample_walk
 from kinertia.io.subject_file import read_subject
 from kinertia.report.files import save_fit
 
-FILES = Path(__file__).with_name("measured_walk")
-"""The walk with its subject file and licence; README.txt tells where it comes from."""
+_SUBJECT = """# OpenSim's gait2354 example: https://github.com/opensim-org/opensim-models, Pipelines/Gait2354_Simbody.
+
+[subject]
+name = "gait2354"
+sex = "male"
+mass_kg = 72.6
+height_m = 1.803
+
+[model]
+static = "subject01_static.trc"
+
+[[trial]]
+markers = "subject01_walk1.trc"
+forces = "subject01_walk1_grf.mot"
+loads = "subject01_walk1_grf.xml"
+"""
+
+
+def write_measured_lab(folder: Path, progress: Progress = lambda stage, share: None) -> Path:
+    """Copy the sample walk into a folder, which is made if need be, with a subject file; returns the latter.
+
+    Raises:
+        KinertiaError: it is not on this computer and cannot be downloaded.
+    """
+    source = sample_walk(progress)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in SHA256:
+        shutil.copyfile(source / name, folder / name)
+    subject = folder / "subject.toml"
+    subject.write_text(_SUBJECT, encoding="utf-8")
+    return subject
 
 
 def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, share: None) -> Fit:
-    """Copy the measured walk to `folder`/lab, fit it, and write the results of the fit into `folder`.
+    """Copy the sample walk to `folder`/lab, fit it, and write the results of the fit into `folder`.
 
     Args:
         folder: is made if need be.
@@ -26,11 +56,11 @@ def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, sha
 
     Raises:
         FileError: the folder cannot be written to.
+        KinertiaError: the walk is not on this computer and cannot be downloaded.
     """
     folder = Path(folder)
     with complete_folder(folder, "demo") as work:
-        shutil.copytree(FILES, work / "lab", copy_function=shutil.copyfile)
-        wanted = read_subject(work / "lab" / "subject.toml")
+        wanted = read_subject(write_measured_lab(work / "lab", progress))
         fit = fit_subject(wanted, progress)
         command = command_line(["kinertia", "demo", "--measured", "-o", str(folder)])
         save_fit(fit, work, provenance_of(wanted, command), force=True)

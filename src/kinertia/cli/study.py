@@ -10,7 +10,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from kinertia.cli.measured_demo import FILES as MEASURED_WALK
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome, add_command
 from kinertia.cli.terminal import out, plain_table, shown_progress
@@ -215,20 +214,20 @@ def sensitivity(
 def faults(
     walks: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SUBJECT]...", help="Subject files of sound walks to spoil besides the package's two."),
+        typer.Argument(metavar="[SUBJECT]...", help="Subject files of sound walks to spoil besides the synthetic one."),
     ] = None,
     workers: Workers = None,
     output: Output = Path("out"),
     force: Force = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Is a wrong measurement named? Fifty known mistakes in real walks, one at a time.
+    """Is a wrong measurement named? Fifty known mistakes in sound walks, one at a time.
 
     Swapped labels, wrong axes, units, clocks and zeros, another person's static
-    trial and the like are made in the files of sound walks: a measured and a
-    synthetic one that come with Kinertia, and yours. Each goes to kinertia
-    check, and to kinertia fit where that has no doubts. What is said of sound
-    walks, and of ten synthetic people in sound laboratories, is counted, too.
+    trial and the like are made in the files of sound walks: a synthetic one,
+    and yours. Each goes to kinertia check, and to kinertia fit where that has
+    no doubts. What is said of sound walks, and of ten synthetic people in
+    sound laboratories, is counted, too.
 
     [bold]Examples[/]
 
@@ -240,7 +239,7 @@ def faults(
     given = [read_subject(path) for path in walks or ()]
     with TemporaryDirectory() as folder, shown_progress() as progress:
         sources = {"synthetic walk": synthetic_walk(Path(folder) / "lab")}
-        for wanted in (read_subject(MEASURED_WALK / "subject.toml"), *given):
+        for wanted in given:
             name = wanted.subject.name
             sources[name if name not in sources else f"{name} ({len(sources)})"] = wanted
         sound, outcomes = run_faults(sources, workers=workers, progress=lambda share: progress("mistakes", share))

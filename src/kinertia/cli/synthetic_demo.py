@@ -19,7 +19,7 @@ from kinertia.estimation.prepare import Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import command_line, provenance_of
-from kinertia.io.subject_file import read_subject, with_settings
+from kinertia.io.subject_file import SubjectFile, read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.files import save_fit
@@ -80,6 +80,17 @@ def truth_of(made: SyntheticTrial, fit: Fit) -> Truth:
     return Truth(made.bsp, {trial.name: loads[:, columns]})
 
 
+def write_synthetic_lab(
+    folder: Path, seed: int = 1, noise: LabNoise | None = None
+) -> tuple[SubjectFile, SyntheticTrial]:
+    """Write the files of a synthetic laboratory, with a subject file; what that wants, and the walk behind them."""
+    truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
+    subject = unlike_literature(walking_subject(), truth_rng)
+    trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
+    recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
+    return read_subject(write_lab(folder, recordings)), trial
+
+
 def run_demo(
     folder: str | Path,
     seed: int = 1,
@@ -102,11 +113,7 @@ def run_demo(
     folder = Path(folder)
     with complete_folder(folder, "demo") as work:
         progress("measuring", 0.0)
-        truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
-        subject = unlike_literature(walking_subject(), truth_rng)
-        trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
-        recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
-        wanted = read_subject(write_lab(work / "lab", recordings))
+        wanted, trial = write_synthetic_lab(work / "lab", seed, noise)
         static, inputs, marker_set = read_inputs(wanted, progress)
         provenance = provenance_of(wanted, command_line(["kinertia", "demo", "-o", str(folder)]))
         fits = []

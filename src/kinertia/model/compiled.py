@@ -9,15 +9,15 @@ temporary files.
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
+
+import platformdirs
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -71,7 +71,7 @@ def cache_folder() -> Path:
     for name in SOURCES:
         text.update((package / name).read_bytes())
     name = f"kinertia-{text.hexdigest()[:16]}"
-    places = (Path(__file__).parent / "__pycache__", _user_cache() / "kinertia", Path(tempfile.gettempdir()))
+    places = (Path(__file__).parent / "__pycache__", _user_cache(), Path(tempfile.gettempdir()))
     return next((place / name for place in places if _writable(place / name)), places[-1] / name)
 
 
@@ -91,11 +91,7 @@ def set_compiled() -> None:
 
 
 def _user_cache() -> Path:
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
-    if sys.platform == "darwin":
-        return Path("~/Library/Caches").expanduser()
-    return Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
+    return platformdirs.user_cache_path("kinertia", appauthor=False)
 
 
 def _writable(folder: Path) -> bool:

@@ -2,15 +2,18 @@
 
 import pytest
 
-from kinertia.cli.measured_demo import FILES
+from kinertia.cli.measured_demo import write_measured_lab
+from kinertia.cli.synthetic_demo import write_synthetic_lab
 
 
 @pytest.fixture(scope="module")
-def app(tmp_path_factory):
+def app(tmp_path_factory, sample_walk):
     pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
     from app_server import running
 
-    with running(tmp_path_factory.mktemp("app") / "library", FILES) as served:
+    with running(
+        tmp_path_factory.mktemp("app") / "library", {"measured": write_measured_lab, "synthetic": write_synthetic_lab}
+    ) as served:
         yield served
 
 

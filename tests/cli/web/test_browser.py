@@ -151,9 +151,9 @@ def test_the_demos_laboratory_files_to_the_verdict(tab, demo_run):
     tab.quiet()
 
 
-def test_a_walk_with_a_model_to_the_verdict(tab, shared_data):
+def test_a_walk_with_a_model_to_the_verdict(tab, measured_folder):
     files = ("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml", "scaled.osim")
-    tab.drop(*(shared_data / "rajagopal_walk" / name for name in files)).arrived()
+    tab.drop(*(measured_folder / "rajagopal_walk" / name for name in files)).arrived()
     assert tab.page.get_by_label("scaled.osim is used as").input_value() == "osim"
     text = "[subject]\nmass_kg = 85.0\n[model]\nosim = 'scaled.osim'\n[[trial]]\nmarkers = 'motion_capture_walk.trc'\n"
     text += "forces = 'grf_walk.mot'\nloads = 'grf_walk.xml'\nwindow_s = [0.85, 1.15]\n"
@@ -340,11 +340,11 @@ def test_an_unknown_marker_is_assigned_by_a_click(tab, app):
     tab.quiet()
 
 
-def test_labels_of_markers_do_not_overprint_one_another(browser, app, shared_data):
+def test_labels_of_markers_do_not_overprint_one_another(browser, app, measured_folder):
     files = ("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml", "scaled.osim")
     person = app.library.add("Labels")
     for name in files:
-        shutil.copyfile(shared_data / "rajagopal_walk" / name, person.folder / name)
+        shutil.copyfile(measured_folder / "rajagopal_walk" / name, person.folder / name)
     recognise(person)
     for viewport in (DESKTOP, PHONE):
         tab = Tab(browser, app, viewport)

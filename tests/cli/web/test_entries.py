@@ -58,15 +58,15 @@ def test_c3d_files_are_recognised_and_what_lacks_is_said_as_by_the_command_line(
     assert wanted.subject.name == "Anna"
 
 
-def test_forces_and_loads_go_with_their_walk(person, shared_data):
-    put(person, shared_data / "gait2354", *GAIT2354)
+def test_forces_and_loads_go_with_their_walk(person, measured_folder):
+    put(person, measured_folder / "gait2354", *GAIT2354)
     recognise(person)
     walk = "subject01_walk1.trc"
     assert used(person) == dict(zip(GAIT2354, ("static", "trial", f"forces:{walk}", f"loads:{walk}"), strict=True))
 
 
-def test_a_model_takes_the_place_of_a_static_trial_that_is_not_there(person, shared_data):
-    put(person, shared_data / "rajagopal_walk", *RAJAGOPAL[1:], "scaled.osim")
+def test_a_model_takes_the_place_of_a_static_trial_that_is_not_there(person, measured_folder):
+    put(person, measured_folder / "rajagopal_walk", *RAJAGOPAL[1:], "scaled.osim")
     recognise(person)
     walk = "motion_capture_walk.trc"
     assert used(person) == {walk: "trial", "grf_walk.mot": f"forces:{walk}", "grf_walk.xml": f"loads:{walk}"} | {
@@ -76,8 +76,8 @@ def test_a_model_takes_the_place_of_a_static_trial_that_is_not_there(person, sha
     assert trouble(person) == ""
 
 
-def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, shared_data):
-    put(person, shared_data / "rajagopal_walk", *RAJAGOPAL, "scaled.osim")
+def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, measured_folder):
+    put(person, measured_folder / "rajagopal_walk", *RAJAGOPAL, "scaled.osim")
     recognise(person)
     assert used(person)["static_walk_1.trc"] == "static"
     assert "scaled.osim" not in used(person)
@@ -90,8 +90,8 @@ def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, shared_data)
     assert trouble(person) == ""
 
 
-def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person, shared_data):
-    put(person, shared_data / "gait2354", *GAIT2354)
+def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person, measured_folder):
+    put(person, measured_folder / "gait2354", *GAIT2354)
     recognise(person)
     static, walk, forces, _ = GAIT2354
     text = person.subject.read_text(encoding="utf-8")
@@ -117,8 +117,8 @@ def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person
     assert forces not in used(person)
 
 
-def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, shared_data):
-    put(person, shared_data / "gait2354", *GAIT2354)
+def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, measured_folder):
+    put(person, measured_folder / "gait2354", *GAIT2354)
     recognise(person)
     static, walk, forces, _ = GAIT2354
     shutil.copyfile(person.folder / forces, person.folder / "other_grf.mot")
@@ -128,19 +128,19 @@ def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, 
     assert forces not in used(person)
 
 
-def test_forces_of_a_static_trial_are_said_to_be_that(person, shared_data):
-    put(person, shared_data / "subject4", "static1.trc", "static1_grf.mot")
+def test_forces_of_a_static_trial_are_said_to_be_that(person, measured_folder):
+    put(person, measured_folder / "subject4", "static1.trc", "static1_grf.mot")
     recognise(person)
     (row,) = [row for row in file_table(person.files(), entries(person)) if row.name == "static1_grf.mot"]
     assert row.kind == "forces of a static trial, by its name: not needed, of that only the markers are used"
     assert row.use == ""
 
 
-def test_forces_of_another_person_are_not_taken(tmp_path, shared_data):
+def test_forces_of_another_person_are_not_taken(tmp_path, measured_folder):
     library = Library(tmp_path)
     anna, ben = library.add("Anna"), library.add("Ben")
-    put(anna, shared_data / "gait2354", *GAIT2354[:2])
-    put(ben, shared_data / "gait2354", *GAIT2354[2:])
+    put(anna, measured_folder / "gait2354", *GAIT2354[:2])
+    put(ben, measured_folder / "gait2354", *GAIT2354[2:])
     recognise(anna)
     assert used(anna) == {GAIT2354[0]: "static", GAIT2354[1]: "trial"}
 

@@ -308,8 +308,10 @@ def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def measured(shared_data) -> Fit:
-    walked, static = (read_recording(shared_data / "pig_c3d" / f"subject_b_{kind}.c3d") for kind in ("walk", "static"))
+def measured(measured_folder) -> Fit:
+    walked, static = (
+        read_recording(measured_folder / "pig_c3d" / f"subject_b_{kind}.c3d") for kind in ("walk", "static")
+    )
     return estimate_bsp(Subject(name="B", sex="female"), static, [TrialInput(walked)], Settings(method="simultaneous"))
 
 

@@ -53,8 +53,8 @@ def old_text(text: bytes, changes) -> bytes:
 
 
 @pytest.mark.parametrize("name", [MODELS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in MODELS[1:])])
-def test_only_mass_properties_change(opensim, shared_data, tmp_path, name):
-    ours = read_osim(shared_data / name)
+def test_only_mass_properties_change(opensim, measured_folder, tmp_path, name):
+    ours = read_osim(measured_folder / name)
     wanted = other_bsp(ours.bsp)
     path = tmp_path / "out.osim"
     changes = write_osim(path, ours, wanted)
@@ -65,20 +65,20 @@ def test_only_mass_properties_change(opensim, shared_data, tmp_path, name):
     theirs = opensim_table(opensim, path)
     for segment, row in zip(wanted.segments, wanted.table(), strict=True):
         np.testing.assert_allclose(theirs[segment], row, rtol=1e-15)
-    before, after = (warnings_of(opensim, p, tmp_path / f"{p.stem}.log") for p in (shared_data / name, path))
+    before, after = (warnings_of(opensim, p, tmp_path / f"{p.stem}.log") for p in (measured_folder / name, path))
     assert after == before
     assert_opensim_agrees(path, read_osim(path))
 
 
-def test_nothing_changes_without_a_change(shared_data, tmp_path):
-    ours = read_osim(shared_data / MODELS[0])
+def test_nothing_changes_without_a_change(measured_folder, tmp_path):
+    ours = read_osim(measured_folder / MODELS[0])
     path = tmp_path / "out.osim"
     assert write_osim(path, ours, ours.bsp).empty
     assert path.read_bytes() == ours.content
 
 
-def test_one_body_changes_alone(shared_data, tmp_path):
-    ours = read_osim(shared_data / MODELS[2])
+def test_one_body_changes_alone(measured_folder, tmp_path):
+    ours = read_osim(measured_folder / MODELS[2])
     i = ours.bsp.segments.index("torso")
     torso = BodySegmentParameters(
         ("torso",), ours.bsp.mass_kg[i : i + 1] + 1, ours.bsp.com_m[i : i + 1], ours.bsp.inertia_kgm2[i : i + 1]
@@ -117,8 +117,8 @@ def test_properties_that_the_file_leaves_out_or_empty(tmp_path):
 
 
 @pytest.mark.parametrize("name", [MODELS[0], pytest.param(MODELS[3], marks=pytest.mark.slow)])
-def test_markers_and_joints_that_moved(opensim, shared_data, tmp_path, name):
-    ours = read_osim(shared_data / name)
+def test_markers_and_joints_that_moved(opensim, measured_folder, tmp_path, name):
+    ours = read_osim(measured_folder / name)
     positions = {m.label: m.position + np.array([0.01, -0.02, 0.03]) for m in ours.skeleton.markers[::5]}
     shift = np.array([0.004, -0.005, 0.006])
     path = tmp_path / "out.osim"
@@ -177,10 +177,10 @@ def test_the_27_dof_model_as_a_file(opensim, tmp_path):
     assert_opensim_agrees(path, ours)
 
 
-def test_bodies_are_welded_to_those_of_the_file(opensim, shared_data, tmp_path):
+def test_bodies_are_welded_to_those_of_the_file(opensim, measured_folder, tmp_path):
     """In format 4 and in format 3, where the joint stands in its body."""
     (tmp_path / "old.osim").write_text(old_model())
-    for source in (shared_data / MODELS[0], tmp_path / "old.osim"):
+    for source in (measured_folder / MODELS[0], tmp_path / "old.osim"):
         ours = read_osim(source)
         parent = ours.skeleton.segments[-1]
         row = np.array([[3.0, -0.1, 0.2, 0.05, 0.03, 0.02, 0.04, 0.001, -0.002, 0.0]])

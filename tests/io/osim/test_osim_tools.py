@@ -26,9 +26,9 @@ def loads_above_threshold(folder: Path, into: Path) -> Path:
     return into / f"{name}.xml"
 
 
-def test_inverse_dynamics_of_a_walk_is_opensims(opensim, shared_data, tmp_path):
+def test_inverse_dynamics_of_a_walk_is_opensims(opensim, measured_folder, tmp_path):
     """gait2354: the same coordinates (6 Hz) and loads; curves within 1 % of their peak."""
-    folder = shared_data / "gait2354"
+    folder = measured_folder / "gait2354"
     ours = read_osim(folder / "subject01_scaled.osim")
     skeleton = ours.skeleton
     table = read_sto(folder / "opensim_results" / "ik.mot")[list(skeleton.coordinates)]

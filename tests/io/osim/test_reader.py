@@ -39,23 +39,23 @@ def written(tmp_path):
 
 
 @pytest.mark.parametrize("name", [MODELS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in MODELS[1:])])
-def test_opensim_agrees_on_markers_forces_and_mass_matrix(opensim, shared_data, name):
-    ours = read_osim(shared_data / name)
-    assert_opensim_agrees(shared_data / name, ours)
+def test_opensim_agrees_on_markers_forces_and_mass_matrix(opensim, measured_folder, name):
+    ours = read_osim(measured_folder / name)
+    assert_opensim_agrees(measured_folder / name, ours)
 
 
-def test_a_file_that_opensim_converted_is_the_same_model(opensim, shared_data, tmp_path):
+def test_a_file_that_opensim_converted_is_the_same_model(opensim, measured_folder, tmp_path):
     path = tmp_path / "converted.osim"
-    opensim.Model(str(shared_data / MODELS[0])).printToXML(str(path))
-    first, second = read_osim(shared_data / MODELS[0]), read_osim(path)
+    opensim.Model(str(measured_folder / MODELS[0])).printToXML(str(path))
+    first, second = read_osim(measured_folder / MODELS[0]), read_osim(path)
     assert b'Version="40600"' in second.content
     assert [c.name for c in first.coordinates] == [c.name for c in second.coordinates]
     np.testing.assert_array_equal(first.bsp.table(), second.bsp.table())
     assert_opensim_agrees(path, second)
 
 
-def test_coordinates_ranges_locks_and_couplings(shared_data):
-    ours = read_osim(shared_data / MODELS[2])
+def test_coordinates_ranges_locks_and_couplings(measured_folder):
+    ours = read_osim(measured_folder / MODELS[2])
     by_name = {c.name: c for c in ours.coordinates}
     assert len(by_name) == 39
     assert by_name["knee_angle_r"].range == (0.0, 2.0944)
@@ -74,8 +74,8 @@ def test_coordinates_ranges_locks_and_couplings(shared_data):
     assert len(ours.skeleton.markers) == 41
 
 
-def test_all_coordinates_of_the_file_are_given_back(shared_data):
-    ours = read_osim(shared_data / MODELS[2])
+def test_all_coordinates_of_the_file_are_given_back(measured_folder):
+    ours = read_osim(measured_folder / MODELS[2])
     q = random_states(ours, 4, 1.0).q
     every = ours.all_coordinates(ours.skeleton, q)
     column = [c.name for c in ours.coordinates].index
@@ -86,9 +86,9 @@ def test_all_coordinates_of_the_file_are_given_back(shared_data):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_degrees_where_opensim_has_degrees(opensim, shared_data, name):
-    ours = read_osim(shared_data / name)
-    theirs = opensim.Model(str(shared_data / name))
+def test_degrees_where_opensim_has_degrees(opensim, measured_folder, name):
+    ours = read_osim(measured_folder / name)
+    theirs = opensim.Model(str(measured_folder / name))
     theirs.initSystem()
     coordinate_set = theirs.getCoordinateSet()
     rotational = opensim.Coordinate.Rotational

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import shutil
 import traceback
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from starlette.applications import Starlette
@@ -27,9 +28,12 @@ from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import complete_folder, expect_own_folder
+from kinertia.io.samples import SIZE_MB
 from kinertia.report.measures_picture import measures_picture
 
 Action = Callable[[Request], Awaitable[Response]]
+Example = Callable[[Path], object]
+"""Writes the files of a person to try the page with into a folder."""
 _STATIC = Path(__file__).with_name("static")
 _FORMS = ("files", "recognise", "remove", "entries", "keep", "text", "delete", "copy", "rename", *KINDS)
 """Addresses below a person's that forms are sent to."""
@@ -37,13 +41,13 @@ _SECTIONS = {"check": "check", "fit": "results"}
 """Where on a person's page it is seen how far a check or a fit is."""
 
 
-def application(library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> Starlette:
-    """The pages of a library; `stop` ends the server, `example` is a folder to try it with."""
-    actions = _Actions(library, jobs, stop, example)
+def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples: Mapping[str, Example]) -> Starlette:
+    """The pages of a library; `stop` ends the server, `examples` by their kind are people to try it with."""
+    actions = _Actions(library, jobs, stop, examples)
     routes: list[BaseRoute] = [
         Route("/", actions.home),
         Route("/people", actions.add, methods=["POST"]),
-        Route("/example", actions.add_example, methods=["POST"]),
+        Route("/example/{kind}", actions.add_example, methods=["POST"]),
         Route("/compare", actions.compare),
         Route("/compare/page", actions.compared),
         Route("/measures.csv", actions.measures_sheet),
@@ -80,11 +84,11 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], example:
 class _Actions:
     """What the addresses do."""
 
-    def __init__(self, library: Library, jobs: Jobs, stop: Callable[[], None], example: Path | None) -> None:
+    def __init__(self, library: Library, jobs: Jobs, stop: Callable[[], None], examples: Mapping[str, Example]) -> None:
         self._library = library
         self._jobs = jobs
         self._stop = stop
-        self._example = example
+        self._examples = examples
 
     async def home(self, request: Request) -> Response:
         """Everybody in the library, and a place to drop files for somebody new."""
@@ -95,7 +99,8 @@ class _Actions:
             people=people,
             folder=self._library.folder,
             limits=LIMITS,
-            example=self._example is not None,
+            examples=tuple(self._examples),
+            size_mb=SIZE_MB,
         )
 
     async def add(self, request: Request) -> Response:
@@ -106,13 +111,20 @@ class _Actions:
         return JSONResponse({"address": answer.headers["location"]}) if wants_json else answer
 
     async def add_example(self, request: Request) -> Response:
-        """The measured walk that comes with Kinertia, ready to be checked and fitted."""
-        if self._example is None:
-            raise HTTPException(404, "there is no example")
-        person = self._library.add("Example")
-        for path in self._example.iterdir():
-            if path.suffix.lower() in ENDINGS:
-                shutil.copyfile(path, person.folder / path.name)
+        """A person to try the page with, ready to be checked and fitted; where one cannot be had, the others."""
+        kind = request.path_params["kind"]
+        if kind not in self._examples:
+            raise HTTPException(404, "there is no such example")
+        with TemporaryDirectory() as folder:
+            try:
+                await run_in_threadpool(self._examples[kind], Path(folder))
+            except KinertiaError as error:
+                others = [other for other in self._examples if other != kind]
+                return page(request, "trouble.html.j2", 422, sentence=str(error), examples=others, size_mb=SIZE_MB)
+            person = self._library.add(f"Example, {kind}")
+            for path in Path(folder).iterdir():
+                if path.suffix.lower() in ENDINGS:
+                    shutil.copyfile(path, person.folder / path.name)
         await run_in_threadpool(recognise, person)
         self._jobs.add(person, "check")
         return to(request, "people", person.name)

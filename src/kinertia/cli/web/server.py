@@ -7,16 +7,16 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
+from types import MappingProxyType
 
 import uvicorn
 
 from kinertia.cli.web.guard import Guard
 from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library
-from kinertia.cli.web.routes import application
+from kinertia.cli.web.routes import Example, application
 from kinertia.errors import SettingsError
 
 _PATIENCE_S = 3
@@ -30,13 +30,19 @@ class Server:
         address: what to open in the browser; nothing answers without its token.
     """
 
-    def __init__(self, library: Library, port: int = 0, example: Path | None = None, prepare: bool = False) -> None:
+    def __init__(
+        self,
+        library: Library,
+        port: int = 0,
+        examples: Mapping[str, Example] = MappingProxyType({}),
+        prepare: bool = False,
+    ) -> None:
         """Take the port, but answer nothing yet.
 
         Args:
             library: people and their results.
             port: of 127.0.0.1; 0 takes a free one.
-            example: folder with a subject file to try it with.
+            examples: people to try it with: what writes their files into a folder, by their kind.
             prepare: compile beforehand, where that is not done, what the first fit would compile.
 
         Raises:
@@ -47,7 +53,7 @@ class Server:
         token = secrets.token_urlsafe(24)
         self.address = f"http://127.0.0.1:{port}/{token}/"
         self._jobs = Jobs(prepare)
-        app = application(library, self._jobs, self.stop, example)
+        app = application(library, self._jobs, self.stop, examples)
         config = uvicorn.Config(
             Guard(app, token, port),
             ws="none",

@@ -1,0 +1,45 @@
+"""Recordings that tests run on: measured ones where they are on this machine, and always synthetic ones.
+
+Files are named as in `measured_data`; those under `synthetic/` are written by `synthetic_lab`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeVar
+
+from measured_data import find
+
+K = TypeVar("K")
+V = TypeVar("V", str, tuple[str | None, ...])
+
+SYNTHETIC = "synthetic/"
+
+
+def is_here(names: str | Iterable[str | None]) -> bool:
+    """Whether tests can read these files on this machine."""
+    wanted = [names] if isinstance(names, str) else [name for name in names if name is not None]
+    return all(name.startswith(SYNTHETIC) or find(name) is not None for name in wanted)
+
+
+def here(recordings: Iterable[V]) -> list[V]:
+    """Of these files, or tuples of files, those that are on this machine: parameters of a test."""
+    return [names for names in recordings if is_here(names)]
+
+
+def named_here(recordings: dict[K, V]) -> dict[K, V]:
+    """The same of files by a name."""
+    return {key: names for key, names in recordings.items() if is_here(names)}
+
+
+WALKS = named_here(
+    {
+        "synthetic": ("synthetic/walk.trc", "synthetic/walk_grf.mot"),
+        "synthetic c3d": ("synthetic/walk.c3d", None),
+        "gait2354": ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+        "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
+        "plug-in gait a": ("pig_c3d/subject_a_walk.c3d", None),
+        "plug-in gait b": ("pig_c3d/subject_b_walk.c3d", None),
+    }
+)
+"""Markers and forces of sound walks, as the fixture `recording_of` takes them."""
