@@ -49,11 +49,12 @@ the usual pipeline and its model kept as it is: [peers](peers.md).
 
 ## The study's noise, from starts 50 % off
 
-RMS errors of the study's 49 parameters, mean over {sections["draws"]} draws: the walk of the package (1.14 m/s, one
-stride and margins, 41 markers, 100 Hz), the study's sinusoidal noise on every marker coordinate, every parameter of the
-start off by uniform +/-50 %. Both estimators see the same starts and markers and know the skeleton. The simultaneous
-estimate also knows that the start is within some 50 % ({UNIFORM_SD:.2f} of its value as standard deviation), that left
-mirrors right, and the total mass within 0.5 %. It reads the noise from the markers, as `kinertia fit` does.
+RMS errors of the 49 parameters of [the study](study.md), mean over {sections["draws"]} draws: the walk of the package
+(1.14 m/s, one stride and margins, 41 markers, 100 Hz), the study's sinusoidal noise on every marker coordinate,
+every parameter of the start off by uniform +/-50 %. Both estimators see the same starts and markers and know the
+skeleton. The simultaneous estimate also knows that the start is within some 50 % ({UNIFORM_SD:.2f} of its value as
+standard deviation), that left mirrors right, and the total mass within 0.5 %. It reads the noise from the markers, as
+`kinertia fit` does.
 
 {sections["study"]}
 

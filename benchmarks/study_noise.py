@@ -104,6 +104,6 @@ def study_section(draws: Sequence[dict[str, tuple[float, float, float]]], bounds
         rows.append([name, f"{mass:.2f}", f"{1e3 * com:.1f}", f"{inertia:.3f}"])
     rows += bounds
     rows.append(["published: Table 1, two-level", "1.71", "180", "0.382"])
-    rows.append(["published: 2007, splines and prior", "1.33", "21.6", "0.0745"])
+    rows.append(["published: IEEE TBME 54:782 (2007), splines and prior", "1.33", "21.6", "0.0745"])
     rows.append(["**aim**", "0.90", "15.0", "0.030"])
     return table(["estimate", "mass (kg)", "CoM (mm)", "inertia (kg m2)"], rows)

@@ -1,17 +1,24 @@
-"""Draw the figures of the pages from the package's own synthetic walker.
+"""Draw the figures of the pages from the package's own synthetic walker, and the README's from a measured walk.
 
-    python docs/tools/figures.py
+    python docs/tools/figures.py [GAIT2354]
 
-The timeline of measured frames has the times of OpenSim's Rajagopal walk.
+The timeline of measured frames has the times of OpenSim's Rajagopal walk. GAIT2354 is a folder with OpenSim's example
+of that name and its scaled model (`subject01_scaled.osim`). Without it the README's figure stays as it is. That figure
+needs OpenSim, and `benchmarks` on PYTHONPATH.
 """
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 
 from kinertia.model.skeleton import Pose
@@ -24,6 +31,12 @@ X, Y, Z, GREY, FORCE, RESIDUAL = "#D55E00", "#009E73", "#0072B2", "#777777", "#0
 SIDE, FRONT = (0, 1), (2, 1)
 """The two ground axes that a view shows."""
 _FRAME_M = 0.13
+_MASS_KG = 72.6
+_USE_COLORS = {
+    "use": ("#E8F5EE", "#009E73"),
+    "use with care": ("#FFF6DB", "#E0A800"),
+    "do not use": ("#FBE9E2", "#D55E00"),
+}
 
 
 def main() -> None:
@@ -35,6 +48,11 @@ def main() -> None:
         figure.savefig(FOLDER / f"{name}.svg", metadata={"Date": None}, bbox_inches="tight")
         plt.close(figure)
     (FOLDER / "measures.svg").write_text(measures_picture(), encoding="utf-8", newline="\n")
+    if len(sys.argv) > 1:
+        with TemporaryDirectory() as work:
+            figure = knee_moment(Path(sys.argv[1]).resolve(), Path(work))
+        figure.savefig(FOLDER / "moments.svg", metadata={"Date": None})
+        plt.close(figure)
 
 
 def frames(trial: SyntheticTrial) -> plt.Figure:
@@ -114,6 +132,72 @@ def window(trial: SyntheticTrial) -> plt.Figure:
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(left=False)
     return figure
+
+
+def knee_moment(data: Path, work: Path) -> plt.Figure:
+    """A knee moment of the gait2354 walk with its 95 % band, OpenSim's over it, and what the fit says of the plates."""
+    out = work / "fit"
+    walk = [data / "subject01_walk1.trc", "--forces", data / "subject01_walk1_grf.mot"]
+    walk += ["--loads", data / "subject01_walk1_grf.xml", "--model", data / "subject01_scaled.osim"]
+    subprocess.run(["kinertia", "fit", *walk, "--calibrate", f"--mass={_MASS_KG}", "-o", out, "--quiet"], check=True)
+    curves = pd.read_csv(out / "cycles.csv").query("side == 'r' and stride == 1 and quantity == 'knee_angle_moment'")
+    stride = pd.read_csv(out / "spatiotemporal.csv").query("side == 'r' and stride == 1").iloc[0]
+    percent, ours, band = (curves[name].to_numpy() for name in ("percent", "value", "sd"))
+    time = stride["start_s"] + percent / 100 * stride["stride_time_s"]
+    theirs = _opensim_moments(data, work)["knee_angle_r_moment"]
+
+    figure = plt.figure(figsize=(7.6, 4.1), facecolor="white")
+    axes = figure.add_axes((0.09, 0.285, 0.88, 0.6))
+    axes.axhline(0.0, color="#bbbbbb", linewidth=0.8, zorder=0)
+    interval = axes.fill_between(percent, ours - 1.96 * band, ours + 1.96 * band, color=FORCE, alpha=0.22, linewidth=0)
+    (line,) = axes.plot(percent, ours, color=FORCE, linewidth=2.2)
+    (other,) = axes.plot(
+        percent, np.interp(time, theirs.index, theirs) / _MASS_KG, color="#222222", linewidth=1.5, linestyle=(0, (5, 2))
+    )
+    axes.axvline(stride["stance_percent"], ymax=0.62, color=GREY, linewidth=0.8, linestyle=":")
+    axes.text(stride["stance_percent"] + 1, axes.get_ylim()[0], "toe off", color=GREY, va="bottom", fontsize=9.5)
+    axes.set(xlim=(0, 100), xlabel="gait cycle (%)", ylabel="knee extension moment (N m/kg)")
+    axes.yaxis.label.set_size(10)
+    axes.xaxis.label.set_size(10)
+    axes.tick_params(labelsize=9.5, color=GREY)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["bottom", "left"]].set_color(GREY)
+    names = ["Kinertia", "its 95 % interval", "OpenSim inverse dynamics"]
+    axes.legend([line, interval, other], names, frameon=False, fontsize=10, loc="upper right")
+    figure.text(0.09, 0.935, "Right knee, measured walk (OpenSim's gait2354 example)", fontsize=12, weight="bold")
+    _verdict_strip(figure, json.loads((out / "fit.json").read_text(encoding="utf-8")))
+    return figure
+
+
+def _opensim_moments(data: Path, work: Path) -> pd.DataFrame:
+    """OpenSim's IK and ID with its scaled model: coordinates at 6 Hz, forces as measured."""
+    import opensim
+
+    from opensim_runs import inverse_dynamics, inverse_kinematics, quietly, setup_weights, without_forces
+
+    with quietly(work / "opensim.log"):
+        model = opensim.Model(str(data / "subject01_scaled.osim"))
+        weights = setup_weights(data / "subject01_Setup_IK.xml")
+        inverse_kinematics(model, data / "subject01_walk1.trc", work / "ik.mot", weights)
+        without_forces(data / "subject01_scaled.osim", work / "model.osim")
+        loads = data / "subject01_walk1_grf.xml"
+        return inverse_dynamics(work / "model.osim", work / "ik.mot", loads, work / "moments.sto", 6.0)
+
+
+def _verdict_strip(figure: plt.Figure, fitted: dict) -> None:
+    """What the fit says of its joint moments and of the left plate, below the curves."""
+    use = next(one["use"] for one in fitted["uses"] if one["output"] == "joint moments")
+    crosstalk = fitted["calibration"]["plate left: free moment"]
+    found, usual = (1e3 * crosstalk[name] for name in ("value", "prior_sd"))
+    fill, edge = _USE_COLORS[use]
+    strip = figure.add_axes((0.015, 0.03, 0.97, 0.125))
+    strip.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[], facecolor=fill)
+    strip.spines[:].set_visible(False)
+    strip.axvspan(0, 0.008, color=edge, linewidth=0)
+    strip.text(0.025, 0.7, f"Joint moments: {use}.", va="center", fontsize=10.5, weight="bold")
+    number = f"{found:.1f}".replace("-", "\N{MINUS SIGN}")
+    text = f"Left plate: apparent vertical-moment error of {number} N m per kN (usual: within {usual:.1f}), corrected."
+    strip.text(0.025, 0.28, text, va="center", fontsize=10.5)
 
 
 def _place(trial: SyntheticTrial, pose: Pose, frame: int, segment: int) -> np.ndarray:
