@@ -1,6 +1,7 @@
 """Takes a report apart again."""
 
 import base64
+import gzip
 import json
 import re
 from html.parser import HTMLParser
@@ -33,8 +34,8 @@ class Elements(HTMLParser):
 
 def figures_of(page):
     """The figures as plotly gets them, by the id of their element."""
-    scripts = re.findall(r'<script type="application/json" data-for="([^"]+)">(.*?)</script>', page, re.DOTALL)
-    return {name: json.loads(text) for name, text in scripts}
+    scripts = re.findall(r'<script type="text/plain" data-for="([^"]+)">(.*?)</script>', page)
+    return {name: json.loads(gzip.decompress(base64.b64decode(text))) for name, text in scripts}
 
 
 def numbers(array):

@@ -18,6 +18,7 @@ from kinertia.report.figure import Figure, compact
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.plotly_script import TRACE_TYPES
 from kinertia.report.plots import as_plotly
 from kinertia.report.style import BLUE, between
 from kinertia.report.time_figures import (
@@ -42,7 +43,7 @@ def test_plotly_accepts_every_name_and_value_of_every_figure(which, request):
     for figure in figures.values():
         checked = go.Figure(figure["data"], figure["layout"])
         assert len(checked.data) == len(figure["data"])
-        assert {trace.type for trace in checked.data} <= {"scatter", "bar", "pie"}, "all that the basic bundle draws"
+        assert {trace.type for trace in checked.data} <= set(TRACE_TYPES)
     with pytest.raises(ValueError, match="lien"):
         go.Figure([{**figure["data"][0], "lien": {"width": 2}}])
 

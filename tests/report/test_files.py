@@ -64,7 +64,7 @@ def test_fit_json_keeps_its_contract(saved):
     assert fit_summary["converged"] == fit.converged
     (trial,) = fit_summary["trials"]
     assert trial["name"] == "early"
-    assert trial["n_frames"] == 364
+    assert trial["n_frames"] == 270
     assert trial["n_dynamic_frames"] == len(fit.trials[0].time) == 31
     assert trial["window_s"] == pytest.approx([2.8, 3.1])
     assert {"read", "ik", "estimate", "total"} <= set(trial["seconds"])

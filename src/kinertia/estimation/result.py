@@ -38,8 +38,7 @@ class FitPictures(Protocol):
     Those over time are of one trial; its name left out, of the first.
 
     Raises:
-        KinertiaError: no such trial, no strides or error bars to draw from (says which figure there is in its place),
-            or plotly (the extra `plots`) is missing.
+        KinertiaError: no such trial, no strides or error bars to draw from (says which figure there is in its place).
     """
 
     def moments(self, trial: str | None = None) -> Figure:

@@ -1,6 +1,6 @@
 """`report.html`: one self-contained file.
 
-plotly.js is in the page once; its policy (Content-Security-Policy) forbids every request.
+plotly.js is in the page once, compressed; its policy (Content-Security-Policy) forbids every request.
 """
 
 from __future__ import annotations

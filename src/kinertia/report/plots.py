@@ -14,7 +14,6 @@ from kinertia.io.norms_file import read_norms
 from kinertia.report.body_figure import Shown, body_figure
 from kinertia.report.bsp_figures import change_figure, departure_figure, information_figure
 from kinertia.report.cycle_figures import cycle_figure
-from kinertia.report.extras import expect_plotly
 from kinertia.report.figure import Figure
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.panels import plain, sentence_figure
@@ -29,12 +28,7 @@ T = TypeVar("T")
 
 
 def as_plotly(figure: Figure) -> go.Figure:
-    """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed.
-
-    Raises:
-        KinertiaError: plotly is not installed.
-    """
-    expect_plotly()
+    """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed."""
     from kinertia.report.notebook_figure import NotebookFigure
 
     return NotebookFigure(figure.data, figure.layout, figure.frames)

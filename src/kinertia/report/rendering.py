@@ -14,6 +14,7 @@ from jinja2.bccache import Bucket
 from markupsafe import Markup
 
 from kinertia.io.provenance import VERSION
+from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
 
 
@@ -51,7 +52,7 @@ def templates_of(package: str) -> jinja2.Environment:
 @cache
 def _environment() -> jinja2.Environment:
     environment = templates_of("kinertia.report")
-    environment.globals["asset"] = _asset
+    environment.globals.update(asset=_asset, packed_script=lambda: Markup(packed_script()))
     environment.filters["fixed"] = fixed
     return environment
 

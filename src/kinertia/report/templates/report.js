@@ -22,12 +22,12 @@
     return whole;
   }
 
-  const plots = [...document.querySelectorAll(".plot")].map((element) => ({ element, width: 0, spec: null }));
+  const plots = [...document.querySelectorAll(".plot")].map((element) => ({ element, width: 0, spec: null, drawn: false }));
 
   function draw(plot, width) {
-    if (!plot.spec) {
-      const told = document.querySelector(`script[data-for="${plot.element.id}"]`);
-      plot.spec = JSON.parse(told.textContent);
+    if (!plot.spec) return; // not unpacked yet
+    if (!plot.drawn) {
+      plot.drawn = true;
       const flat = arrangement(plot.spec.layout, width);
       if (matchMedia("(pointer: coarse)").matches) flat.dragmode = false; // a finger scrolls the page
       plot.width = width;
@@ -51,7 +51,13 @@
     next += 1;
     soon(drawNext, { timeout: 200 });
   }
-  drawNext();
+  async function start() {
+    await loadPlotly();
+    const specs = await Promise.all(plots.map((plot) => figureOf(plot.element.id)));
+    plots.forEach((plot, k) => (plot.spec = specs[k]));
+    drawNext();
+  }
+  if (canUnpack) start();
 
   document.querySelectorAll("details").forEach((part) =>
     part.addEventListener("toggle", () => {
@@ -62,7 +68,7 @@
   let waiting = 0;
   window.addEventListener("resize", () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => printing || plots.filter((plot) => plot.spec && !closed(plot)).forEach((plot) => draw(plot, room(plot))), 150);
+    waiting = setTimeout(() => printing || plots.filter((plot) => plot.drawn && !closed(plot)).forEach((plot) => draw(plot, room(plot))), 150);
   });
   window.addEventListener("beforeprint", () => {
     printing = true;

@@ -61,15 +61,14 @@
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
-  document.addEventListener("click", (event) => {
+  document.addEventListener("click", async (event) => {
     const button = event.target.closest(".save button");
     if (!button) return;
     const id = button.closest(".save").dataset.of;
     const element = document.getElementById(id);
     const form = button.dataset.form;
-    if (form === "csv") {
-      const told = document.querySelector(`script[data-for="${id}"]`);
-      download(`${id}.csv`, table(JSON.parse(told.textContent)));
+    if (form === "csv" && canUnpack) {
+      download(`${id}.csv`, table(await figureOf(id)));
     } else if (element.dataset.drawn) {
       const { width, height } = element.getBoundingClientRect();
       Plotly.downloadImage(element, { format: form, width, height, scale: form === "png" ? PNG_SCALE : 1, filename: id });

@@ -1,0 +1,43 @@
+"""plotly.js for reports: the script of the installed plotly package, compressed once per installation.
+
+A report carries it, and unpacks it when it is opened, so that it stays one file that needs no network.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+from kinertia.model.compiled import cache_folder
+from kinertia.report.packing import packed
+
+TRACE_TYPES = ("bar", "scatter", "scatter3d")
+"""Types of traces that figures have; the last one in notebooks only."""
+_BEST = 9
+
+
+def script_path() -> Path:
+    """The script in the plotly package, which is not loaded."""
+    spec = find_spec("plotly")
+    assert spec is not None, "plotly is a dependency"
+    assert spec.origin is not None
+    return Path(spec.origin).parent / "package_data" / "plotly.min.js"
+
+
+def packed_script() -> str:
+    """The script, gzip in base64; compressed anew only where another plotly was installed since."""
+    script = script_path()
+    state = script.stat()
+    kept = cache_folder() / f"plotly-{state.st_size}-{state.st_mtime_ns}.txt"
+    with suppress(OSError):
+        return kept.read_text(encoding="ascii")
+    text = packed(script.read_bytes(), _BEST)
+    with suppress(OSError):  # where nothing can be kept, every report compresses it
+        for older in kept.parent.glob("plotly-*.txt"):
+            older.unlink()
+        half = kept.with_suffix(f".{os.getpid()}")
+        half.write_text(text, encoding="ascii")
+        half.replace(kept)
+    return text
