@@ -10,7 +10,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from kinertia.cli.measured_demo import FILES
+from kinertia.cli.measured_demo import write_measured_lab
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.server import Server
 
@@ -22,7 +22,7 @@ _PATIENCE_MS = 300_000
 def main() -> None:
     """Try the measured walk, and take the picture of its page."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as engine:
-        server = Server(Library(Path(folder) / "Kinertia"), example=FILES)
+        server = Server(Library(Path(folder) / "Kinertia"), examples={"measured": write_measured_lab})
         with server.in_background() as address:
             browser = engine.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
             page = browser.new_page(viewport={"width": 1200, "height": 1840})

@@ -17,12 +17,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from kinertia.cli.measured_demo import write_measured_lab
 from measured_data import data_folder
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (*sorted((ROOT / "docs").glob("*.md")), ROOT / "README.md")
 MEASURED = ("gait2354", "pig_c3d", "rajagopal_walk")
 """Marks of examples that run beside the files of this folder among the measured data; others run in an empty folder."""
+
+NOTEBOOKS = ("paper_figure", "opensim_day")
+"""Of the site, by their names in docs/notebooks."""
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!-- example: (\w+)(, slow)? -->")
@@ -63,6 +67,14 @@ def link_measured(name: str, folder: Path) -> None:
     for file in (data_folder() / name).iterdir():
         if file.is_file() and not file.name.startswith("subject_a"):
             (folder / file.name).symlink_to(file)
+
+
+def put_files(notebook: str, folder: Path) -> None:
+    """The measured files that a notebook finds beside it."""
+    if notebook == "paper_figure":
+        write_measured_lab(folder / "measured" / "lab")
+    else:
+        link_measured("rajagopal_walk", folder)
 
 
 def difference(shown: str, real: str) -> str | None:

@@ -1,8 +1,8 @@
 """Run the notebooks of the site, keep what they show, and write each as a page beside it.
 
-    python docs/tools/notebooks.py
+    PYTHONPATH=benchmarks python docs/tools/notebooks.py
 
-Needs the extra "docs", and the measured trials beside the repository.
+Needs the extra "docs" and measured data (`measured_data`).
 """
 
 from __future__ import annotations
@@ -15,21 +15,18 @@ import nbformat
 from nbclient import NotebookClient
 from nbconvert import MarkdownExporter
 
-from examples import ROOT, link_measured
+from examples import NOTEBOOKS, ROOT, put_files
 
 FOLDER = ROOT / "docs" / "notebooks"
-MEASURED = {"paper_figure": None, "opensim_day": "rajagopal_walk"}
-"""Each notebook, and the folder of measured trials that it runs beside."""
 
 
 def main() -> None:
     """Run and write all."""
-    for name, measured in MEASURED.items():
+    for name in NOTEBOOKS:
         path = FOLDER / f"{name}.ipynb"
         notebook = nbformat.read(path, as_version=4)
         with TemporaryDirectory() as folder:
-            if measured is not None:
-                link_measured(measured, Path(folder))
+            put_files(name, Path(folder))
             NotebookClient(notebook, timeout=600, resources={"metadata": {"path": folder}}).execute()
         for cell in notebook.cells:
             cell.metadata.pop("execution", None)  # when, which is of no interest

@@ -2,7 +2,8 @@
 
     python docs/tools/pictures.py [DEMO]
 
-DEMO is a folder that `kinertia demo -o DEMO` has written; left out, the demo runs first. Needs Chromium.
+DEMO is a folder that `kinertia demo -o DEMO` has written; left out, the demo runs first. Needs Chromium, and the sample
+walk (`kinertia demo --measured`).
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from tempfile import TemporaryDirectory
 from playwright.sync_api import Page, sync_playwright
 
 import kinertia
+from kinertia.cli.measured_demo import write_measured_lab
 
 FOLDER = Path(__file__).resolve().parents[1] / "figures"
-WALK = Path(kinertia.__file__).parent / "cli" / "measured_walk"
 PAGES = {
     "report": ("report.html", "#verdict", [".headline", ".uses", "#body-mass", "#changes"], 1160),
     "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 1130),
@@ -53,8 +54,8 @@ def main() -> None:
         if len(sys.argv) < 2:
             subprocess.run(["kinertia", "demo", "-o", demo, "--quiet"], check=True)
         check = Path(made) / "check"
-        recorded = [WALK / "static.c3d", WALK / "walk.c3d"]
-        subprocess.run(["kinertia", "check", *recorded, "--mass", "41.5", "-o", check, "--quiet"], check=False)
+        subject = write_measured_lab(Path(made) / "lab")
+        subprocess.run(["kinertia", "check", subject, "-o", check, "--quiet"], check=False)
         with sync_playwright() as engine:
             browser = engine.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
             for name, (page, part, marked, height) in PAGES.items():

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from examples import ROOT, difference, link_measured
+from examples import NOTEBOOKS, ROOT, difference, put_files
+from kinertia.io.samples import VARIABLE
 
 FOLDER = ROOT / "docs" / "notebooks"
-MEASURED = {"paper_figure": None, "opensim_day": "rajagopal_walk"}
 
 
 def cells(name):
@@ -22,14 +22,14 @@ def printed(cell):
 
 
 def test_every_notebook_is_known_and_has_been_run():
-    assert {path.stem for path in FOLDER.glob("*.ipynb")} == set(MEASURED)
-    for name in MEASURED:
+    assert {path.stem for path in FOLDER.glob("*.ipynb")} == set(NOTEBOOKS)
+    for name in NOTEBOOKS:
         numbers = [cell["execution_count"] for cell in cells(name)]
         assert numbers == list(range(1, len(numbers) + 1))
         assert not [out for cell in cells(name) for out in cell["outputs"] if out["output_type"] == "error"]
 
 
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("name", NOTEBOOKS)
 def test_pages_show_what_the_notebooks_show(name):
     page = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
     for cell in cells(name):
@@ -39,11 +39,10 @@ def test_pages_show_what_the_notebooks_show(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MEASURED)
-def test_notebooks_run(name, tmp_path, monkeypatch, capsys, request):
-    if MEASURED[name] is not None:
-        request.getfixturevalue("measured_folder")
-        link_measured(MEASURED[name], tmp_path)
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_notebooks_run(name, tmp_path, monkeypatch, capsys, measured_folder):
+    monkeypatch.setenv(VARIABLE, str(measured_folder))
+    put_files(name, tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(SVG=lambda path: (tmp_path / path).read_text()))
     namespace = {}

@@ -45,4 +45,4 @@ def expect_every_exported_name(site: Path) -> None:
     api_page = "".join(page.read_text(encoding="utf-8") for page in (site / "api").glob("*.html"))
     for name in kinertia.__all__:
         assert re.search(rf'id="kinertia\.[\w.]*{name}"', api_page), name
-    assert (site / "search" / "search_index.js").is_file()
+    assert (site / "search" / "search_index.json").is_file()
