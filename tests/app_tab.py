@@ -5,7 +5,6 @@ import shutil
 from urllib.parse import urlsplit
 
 from chromium import DESKTOP, playwright
-from kinertia.cli.measured_demo import FILES
 from kinertia.io.provenance import sha256
 
 PATIENCE_MS = 120_000
@@ -116,9 +115,9 @@ class Tab:
         self.page.close()
 
 
-def with_everything(person):
-    """Files, findings and results, without computing any."""
-    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+def with_everything(person, lab):
+    """Files of a laboratory's folder, findings and results, without computing any."""
+    for path in (*lab.glob("*.c3d"), lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
     person.check.mkdir()
     found = [{"title": "walk", "verdicts": [{"level": level, "sentence": "s"} for level in ("fail", "caution")]}]

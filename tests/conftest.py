@@ -49,9 +49,12 @@ NOT_HERE = (
     f"measured recordings: none in the folder that {samples.VARIABLE} names, in shared/data beside the repository "
     "or in the cache of kinertia demo --measured; tests ran on synthetic ones"
 )
-SUBJECT = """[subject]
+SUBJECT = """# A synthetic person, with the markers of Plug-in Gait.
+[subject]
 name = "synthetic walker"
 sex = "male"
+mass_kg = 72.6
+height_m = 1.803
 
 [model]
 static = "static.c3d"
@@ -96,14 +99,21 @@ def measured_folder() -> Path:
 
 @pytest.fixture(scope="session")
 def synthetic_lab(tmp_path_factory) -> Path:
-    """Folder of the files of `synthetic_lab.write_synthetic_lab`, with `subject.toml` for those in C3D."""
+    """Folder of the files of `synthetic_lab.write_synthetic_lab`."""
+    return once(tmp_path_factory, "synthetic-lab", write_synthetic_lab)
+
+
+@pytest.fixture(scope="session")
+def c3d_lab(tmp_path_factory, synthetic_lab) -> Path:
+    """Folder of those in C3D alone: `static.c3d`, `walk.c3d`, and `subject.toml`."""
 
     def make(folder: Path) -> Path:
-        write_synthetic_lab(folder)
+        for name in ("static.c3d", "walk.c3d"):
+            shutil.copyfile(synthetic_lab / name, folder / name)
         (folder / "subject.toml").write_text(SUBJECT, encoding="utf-8")
         return folder
 
-    return once(tmp_path_factory, "synthetic-lab", make)
+    return once(tmp_path_factory, "c3d-lab", make)
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,6 @@
 """Recordings that tests run on: measured ones where they are on this machine, and always synthetic ones.
 
-Files are named as in `measured_data`; those under `synthetic/` are written by `synthetic_lab`.
+Files are named as in `measured_data`; those under `synthetic/` are written by `c3d_lab`.
 """
 
 from __future__ import annotations

@@ -123,12 +123,12 @@ def test_progress_tells_the_time_left_of_the_stage(monkeypatch):
 
 
 @pytest.fixture
-def person(tmp_path, measured_walk):
+def person(tmp_path, c3d_lab):
     """A folder with the two C3D files of one person."""
     folder = tmp_path / "anna [b]"
     folder.mkdir()
     for kind in ("walk", "static"):
-        shutil.copyfile(measured_walk / f"{kind}.c3d", folder / f"{kind}.c3d")
+        shutil.copyfile(c3d_lab / f"{kind}.c3d", folder / f"{kind}.c3d")
     return folder
 
 

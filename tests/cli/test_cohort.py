@@ -24,12 +24,12 @@ from kinertia.studies.cohort_cluster import ClusterSize, doubts_of_workers, loca
 
 
 @pytest.fixture
-def lacking(tmp_path, measured_walk):
+def lacking(tmp_path, c3d_lab):
     """A study in which nobody can be fitted: one person without a subject file, one whose file has an error."""
     study = tmp_path / "study"
-    shutil.copytree(measured_walk, study / "Anna")
+    shutil.copytree(c3d_lab, study / "Anna")
     (study / "Anna" / "subject.toml").unlink()
-    shutil.copytree(measured_walk, study / "Ben")
+    shutil.copytree(c3d_lab, study / "Ben")
     subject = study / "Ben" / "subject.toml"
     subject.write_text(subject.read_text(encoding="utf-8").replace("mass_kg", "mas_kg"), encoding="utf-8")
     return study
@@ -43,9 +43,9 @@ def hashes(folder):
     }
 
 
-def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, measured_walk, tmp_path):
-    shutil.copytree(measured_walk, lacking / "Clara")
-    shutil.copytree(measured_walk, lacking / "Dora")
+def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, c3d_lab, tmp_path):
+    shutil.copytree(c3d_lab, lacking / "Clara")
+    shutil.copytree(c3d_lab, lacking / "Dora")
     dora = lacking / "Dora" / "subject.toml"
     dora.write_text(dora.read_text(encoding="utf-8").replace("walk.c3d", "walk.trc"), encoding="utf-8")
     (lacking / "Dora" / "walk.trc").touch()

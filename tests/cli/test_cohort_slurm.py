@@ -41,9 +41,9 @@ def test_what_cannot_be_asked_for_says_where(text, line, words, tmp_path):
     assert caught.value.line == line
 
 
-def test_without_slurm_it_says_what_to_do(tmp_path, measured_walk, monkeypatch):
+def test_without_slurm_it_says_what_to_do(tmp_path, c3d_lab, monkeypatch):
     (tmp_path / "slurm.toml").write_text("", encoding="utf-8")
-    (tmp_path / "people.csv").write_text(f"subject\n{measured_walk / 'subject.toml'}\n", encoding="utf-8")
+    (tmp_path / "people.csv").write_text(f"subject\n{c3d_lab / 'subject.toml'}\n", encoding="utf-8")
     monkeypatch.setattr("kinertia.studies.cohort_slurm.which", lambda name: None)
     command = ("cohort", tmp_path / "people.csv", "-o", tmp_path / "out", "--slurm", tmp_path / "slurm.toml")
     outcome = run(*command)

@@ -18,8 +18,8 @@ def test_the_version_is_told_without_loading_the_commands():
 
 
 @pytest.mark.slow
-def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(measured_walk, tmp_path):
-    loaded = loaded_by("fit", measured_walk / "subject.toml", "-o", tmp_path / "out", "--quiet")
+def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(c3d_lab, tmp_path):
+    loaded = loaded_by("fit", c3d_lab / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "report.html").is_file()
     assert loaded >= C3D
     assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, "pandas", "kinertia.cli.check", "kinertia.cli.study"}
@@ -33,8 +33,8 @@ def test_a_fit_of_text_files_does_not_load_the_reader_of_c3d(demo_run, tmp_path)
 
 
 @pytest.mark.slow
-def test_a_check_loads_no_pictures_or_studies(measured_walk, tmp_path):
-    loaded = loaded_by("check", measured_walk / "subject.toml", "-o", tmp_path / "out", "--quiet")
+def test_a_check_loads_no_pictures_or_studies(c3d_lab, tmp_path):
+    loaded = loaded_by("check", c3d_lab / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "check.html").is_file()
     assert not loaded & {*SLOW, *SYNTHETIC, "kinertia.cli.fit"}
 

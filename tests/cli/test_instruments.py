@@ -15,17 +15,17 @@ from kinertia.settings import Instruments
 
 
 @pytest.fixture(scope="module")
-def session(measured_walk, tmp_path_factory):
+def session(c3d_lab, tmp_path_factory):
     """The file of the measured walk alone, and the outcome of the command."""
     path = tmp_path_factory.mktemp("session") / "instruments.toml"
-    return path, run("instruments", measured_walk / "subject.toml", "-o", path)
+    return path, run("instruments", c3d_lab / "subject.toml", "-o", path)
 
 
-def subject_with(folder, measured_walk, entries):
+def subject_with(folder, c3d_lab, entries):
     """The measured walk's subject file with these lines under [instruments]."""
-    text = (measured_walk / "subject.toml").read_text(encoding="utf-8")
+    text = (c3d_lab / "subject.toml").read_text(encoding="utf-8")
     for name in ("static.c3d", "walk.c3d"):
-        text = text.replace(f'"{name}"', f'"{(measured_walk / name).as_posix()}"')
+        text = text.replace(f'"{name}"', f'"{(c3d_lab / name).as_posix()}"')
     path = folder / "subject.toml"
     path.write_text(f"{text}\n[instruments]\n{entries}\n", encoding="utf-8")
     return path
@@ -44,9 +44,9 @@ def test_the_command_writes_what_it_shows(session):
 
 
 @pytest.mark.slow
-def test_a_fit_leaves_out_what_it_has_said_itself(session, measured_walk, tmp_path):
+def test_a_fit_leaves_out_what_it_has_said_itself(session, c3d_lab, tmp_path):
     path, _ = session
-    own = prepare_subject(subject_with(tmp_path, measured_walk, f'session = "{path.as_posix()}"'))
+    own = prepare_subject(subject_with(tmp_path, c3d_lab, f'session = "{path.as_posix()}"'))
     assert own.uncertainty.instruments.session == ()
     assert any("nothing of others; what 1 person" in note for note in own.notes)
     (person,) = read_session(path)
@@ -54,19 +54,19 @@ def test_a_fit_leaves_out_what_it_has_said_itself(session, measured_walk, tmp_pa
     for known in person.files:
         text = text.replace(known, f"of somebody else: {known}")
     (tmp_path / "others.toml").write_text(text, encoding="utf-8")
-    helped = prepare_subject(subject_with(tmp_path, measured_walk, 'session = "others.toml"'))
+    helped = prepare_subject(subject_with(tmp_path, c3d_lab, 'session = "others.toml"'))
     (information,) = helped.uncertainty.instruments.session
     np.testing.assert_array_equal(information.information, person.information)
     (tmp_path / "elsewhere.toml").write_text(text.replace('"plate 1", "plate 2"', '"left", "right"'), encoding="utf-8")
     with pytest.raises(SessionError, match="none of the session's plates"):
-        prepare_subject(subject_with(tmp_path, measured_walk, 'session = "elsewhere.toml"'))
+        prepare_subject(subject_with(tmp_path, c3d_lab, 'session = "elsewhere.toml"'))
 
 
-def test_what_the_laboratory_states_is_used_and_checked(measured_walk, tmp_path):
-    ready = prepare_subject(subject_with(tmp_path, measured_walk, "plate_sd_mm = 2\nclock_sd_ms = 0.5"))
+def test_what_the_laboratory_states_is_used_and_checked(c3d_lab, tmp_path):
+    ready = prepare_subject(subject_with(tmp_path, c3d_lab, "plate_sd_mm = 2\nclock_sd_ms = 0.5"))
     known = ready.uncertainty.instruments
     assert (known.plate["x"].sd, known.clock_s.sd) == (0.002, 0.0005)
-    outcome = run("fit", subject_with(tmp_path, measured_walk, "plate_sd_mm = -2"), "-o", tmp_path / "out")
+    outcome = run("fit", subject_with(tmp_path, c3d_lab, "plate_sd_mm = -2"), "-o", tmp_path / "out")
     assert outcome.status == 2
     assert "plate_sd_mm = -2" in outcome.err
 
@@ -118,8 +118,8 @@ loads = "{walk.as_posix()}_grf.xml"
         (["subject.toml", "-o", "subject.toml"], "not a file that kinertia instruments wrote"),
     ],
 )
-def test_what_cannot_be_is_refused_first(arguments, words, measured_walk, monkeypatch):
-    monkeypatch.chdir(measured_walk)
+def test_what_cannot_be_is_refused_first(arguments, words, c3d_lab, monkeypatch):
+    monkeypatch.chdir(c3d_lab)
     outcome = run("instruments", *arguments)
     assert outcome.status == 2
     assert words in outcome.err

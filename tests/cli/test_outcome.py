@@ -30,29 +30,29 @@ def test_every_command_has_the_option():
     assert lacking <= groups | {"kinertia"}
 
 
-def test_init_says_what_is_to_be_filled_in(tmp_path, measured_walk):
+def test_init_says_what_is_to_be_filled_in(tmp_path, c3d_lab):
     for name in ("static.c3d", "walk.c3d"):
-        shutil.copyfile(measured_walk / name, tmp_path / name)
+        shutil.copyfile(c3d_lab / name, tmp_path / name)
     content = told("init", tmp_path)
     text = (tmp_path / "subject.toml").read_text(encoding="utf-8")
     assert content["subject_file"] == str(tmp_path / "subject.toml")
     assert content["fill_in"] == [line.split()[1] for line in text.splitlines() if "FILL IN:" in line] == ["sex"]
 
 
-def test_markers_says_which_preset_is_recognised(measured_walk, tmp_path):
-    content = told("markers", measured_walk / "static.c3d", "-o", tmp_path / "own.toml")
+def test_markers_says_which_preset_is_recognised(c3d_lab, tmp_path):
+    content = told("markers", c3d_lab / "static.c3d", "-o", tmp_path / "own.toml")
     assert content["recognised"] == "plug-in-gait"
     assert {"LASI", "RASI"} <= set(content["labels"])
     assert content["draft"] == str(tmp_path / "own.toml")
-    shown = run("markers", measured_walk / "static.c3d").out
+    shown = run("markers", c3d_lab / "static.c3d").out
     for preset in content["presets"]:
         assert f"{preset['labels'] - len(preset['absent'])} of {preset['labels']}" in shown
 
 
-def test_check_says_what_it_shows_and_fails_as_without(measured_walk, tmp_path):
-    content = told("check", measured_walk / "walk.c3d")
+def test_check_says_what_it_shows_and_fails_as_without(c3d_lab, tmp_path):
+    content = told("check", c3d_lab / "walk.c3d")
     assert content["recordings"][0]["name"] == "walk.c3d"
-    content = told("check", measured_walk / "walk.c3d", "--mass", 90, status=1)
+    content = told("check", c3d_lab / "walk.c3d", "--mass", 90, status=1)
     assert "fail" in {verdict["level"] for verdict in content["recordings"][0]["verdicts"]}
     (tmp_path / "broken.c3d").write_bytes(b"no motion" * 100)
     content = told("check", tmp_path / "broken.c3d", status=2)
@@ -87,12 +87,12 @@ def test_fit_has_the_rows_of_its_table(demo_run, tmp_path):
     np.testing.assert_allclose(rows.estimate, table.estimate, rtol=1e-9)
 
 
-def test_instruments_says_what_its_file_holds(measured_demo, measured_walk, tmp_path, monkeypatch):
+def test_instruments_says_what_its_file_holds(measured_demo, c3d_lab, tmp_path, monkeypatch):
     monkeypatch.setattr(instruments_module, "fit_subject", lambda wanted, progress: measured_demo.fit)
-    content = told("instruments", measured_walk / "subject.toml", "-o", tmp_path / "instruments.toml")
+    content = told("instruments", c3d_lab / "subject.toml", "-o", tmp_path / "instruments.toml")
     (person,) = read_session(Path(content["file"]))
     assert content["people"] == [person.name]
-    gain = content["found"]["plate 2"]["gain"]
+    gain = next(found["gain"] for found in content["found"].values() if "gain" in found)
     written = (tmp_path / "instruments.toml").read_text(encoding="utf-8")
     assert f"gain_percent = {100 * gain['value']:.3f}"[:-2] in written
 
@@ -133,6 +133,6 @@ def test_an_error_is_no_result(tmp_path):
     assert "holds no file of markers" in outcome.err
 
 
-def test_words_come_back_after_a_command_for_scripts(measured_walk):
-    told("markers", measured_walk / "static.c3d")
-    assert "plug-in-gait is recognised by itself" in run("markers", measured_walk / "static.c3d").out
+def test_words_come_back_after_a_command_for_scripts(c3d_lab):
+    told("markers", c3d_lab / "static.c3d")
+    assert "plug-in-gait is recognised by itself" in run("markers", c3d_lab / "static.c3d").out

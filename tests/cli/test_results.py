@@ -10,6 +10,7 @@ from scipy.io import loadmat
 
 from command_line import run
 from kinertia.report.saved_fit import FIT_FILE
+from report_page import figures_of
 
 
 @pytest.fixture
@@ -42,8 +43,8 @@ def test_the_report_with_norms(fit, results):
     outcome = run("report", results, "--norms", file)
     assert outcome.status == 0, outcome.err
     assert "note" not in outcome.out
-    page = (results / "report.html").read_text(encoding="utf-8")
-    assert page.count("norm, mean ") > 20
+    figures = figures_of((results / "report.html").read_text(encoding="utf-8"))
+    assert json.dumps(figures).count("norm, mean ") > 20
     file.write_text("quantity,percent,mean,sd\nknee_angle_moment,0,0,1\nkneecap,0,0,1\n")
     outcome = run("report", results, "--norms", file)
     assert outcome.status == 0

@@ -34,10 +34,10 @@ def encoding(request):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, measured_walk):
+def folder(tmp_path_factory, c3d_lab):
     folder = tmp_path_factory.mktemp("terminal") / NAME
     folder.mkdir()
-    shutil.copyfile(measured_walk / "walk.c3d", folder / f"{NAME}.c3d")
+    shutil.copyfile(c3d_lab / "walk.c3d", folder / f"{NAME}.c3d")
     return folder
 
 

@@ -157,10 +157,10 @@ def test_another_model_is_refused():
         with_measures(prior, WALKER.skeleton, stated(), MASS_KG, HEIGHT_M)
 
 
-def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(measured_walk, tmp_path):
-    text = (measured_walk / "subject.toml").read_text(encoding="utf-8")
+def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(c3d_lab, tmp_path):
+    text = (c3d_lab / "subject.toml").read_text(encoding="utf-8")
     for name in ("static.c3d", "walk.c3d"):
-        text = text.replace(f'"{name}"', f'"{(measured_walk / name).as_posix()}"')
+        text = text.replace(f'"{name}"', f'"{(c3d_lab / name).as_posix()}"')
     sheet = measures_sheet().replace("between crotch and knee,,0.7", "between crotch and knee,60,0.7")
     sheet = sheet.replace("the calf where it is largest,,0.5", "the calf where it is largest,15,0.5")
     assert ",60,0.7," in sheet

@@ -135,9 +135,9 @@ def test_left_mirrors_right_unless_told_otherwise(short_fit):
 
 
 @pytest.mark.usefixtures("few_evaluations")
-def test_settings_and_subject_reach_the_result(measured_walk, short_fit):
+def test_settings_and_subject_reach_the_result(c3d_lab, short_fit):
     """De Leva's table, 84 parameters, a fixed cutoff, and a mass that the file contradicts."""
-    walk, static = (read_recording(measured_walk / f"{kind}.c3d") for kind in ("walk", "static"))
+    walk, static = (read_recording(c3d_lab / f"{kind}.c3d") for kind in ("walk", "static"))
     shares = []
     fit = estimate_bsp(
         Subject(name="A", sex="male", mass_kg=44.0),

@@ -31,8 +31,8 @@ def test_a_static_trial_is_missing_where_one_is_needed(subject):
         read_inputs(subject)
 
 
-def test_a_prosthesis_is_no_mirror_image(measured_walk):
-    wanted = read_subject(measured_walk / "subject.toml")
+def test_a_prosthesis_is_no_mirror_image(c3d_lab):
+    wanted = read_subject(c3d_lab / "subject.toml")
     wanted = wanted.model_copy(update={"segments": {"shank_l": KnownSegment(prosthesis=True)}})
     with pytest.raises(SettingsError, match=r"shank_l: a prosthesis is no mirror image .* symmetry = false"):
         prepare_subject(with_settings(wanted, method="two-level"))

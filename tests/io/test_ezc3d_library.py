@@ -25,9 +25,9 @@ def _python(code, *arguments):
 
 
 @pytest.mark.slow
-def test_without_ezc3d_a_c3d_file_says_what_to_install(measured_walk):
+def test_without_ezc3d_a_c3d_file_says_what_to_install(c3d_lab):
     code = "from kinertia.cli.app import main; main(['check', sys.argv[1]])"
-    done = _python(code, measured_walk / "walk.c3d")
+    done = _python(code, c3d_lab / "walk.c3d")
     assert done.returncode == 2
     last = done.stderr.splitlines()[-1]
     for part in ("walk.c3d", "ezc3d", "conda install -c conda-forge ezc3d", "TRC"):
@@ -71,19 +71,19 @@ def like_windows(monkeypatch):
 
 
 @pytest.mark.parametrize("relative", [False, True], ids=["whole path", "from here"])
-def test_a_name_with_umlauts_is_read_on_windows(measured_walk, tmp_path, monkeypatch, like_windows, relative):
+def test_a_name_with_umlauts_is_read_on_windows(c3d_lab, tmp_path, monkeypatch, like_windows, relative):
     folder = tmp_path / "Müller"
     folder.mkdir()
-    shutil.copyfile(measured_walk / "static.c3d", folder / "Stehen größer.c3d")
+    shutil.copyfile(c3d_lab / "static.c3d", folder / "Stehen größer.c3d")
     monkeypatch.chdir(tmp_path)
     name = "Müller/Stehen größer.c3d"
-    recording, expected = read_c3d(name if relative else tmp_path / name), read_c3d(measured_walk / "static.c3d")
+    recording, expected = read_c3d(name if relative else tmp_path / name), read_c3d(c3d_lab / "static.c3d")
     np.testing.assert_array_equal(recording.markers.positions, expected.markers.positions)
     assert recording.name == "Stehen größer"
 
 
-def test_a_name_with_umlauts_is_written_on_windows(measured_walk, tmp_path, like_windows):
-    recording = read_c3d(measured_walk / "static.c3d")
+def test_a_name_with_umlauts_is_written_on_windows(c3d_lab, tmp_path, like_windows):
+    recording = read_c3d(c3d_lab / "static.c3d")
     path = tmp_path / "Müller.c3d"
     write_c3d(path, recording)
     assert read_c3d(path).markers.labels == recording.markers.labels

@@ -3,6 +3,7 @@
 import re
 import shutil
 import tomllib
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,18 @@ from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Settings
+from recordings import here
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured data are not at {DATA}")
+TRIALS = ("DJ1", "squats1", "walking1", "walking2", "walkingTI1", "walkingTO1", "walkingTS1")
+LABORATORIES = {
+    "gait2354": (
+        "subject01_static.trc",
+        [("subject01_walk1.trc", "subject01_walk1_grf.mot", "subject01_walk1_grf.xml")],
+    ),
+    "rajagopal_walk": ("static_walk_1.trc", [("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")]),
+    "subject4": ("static1.trc", [(f"{t}.trc", f"{t}_grf.mot", f"{t}_external_forces.xml") for t in TRIALS]),
+}
+"""By folder: the static trial; markers, forces and loads of the others."""
 
 
 def completed(text):
@@ -27,30 +37,12 @@ def draft(folder, text):
     return read_subject(folder / "subject.toml")
 
 
-@needs_data
-@pytest.mark.parametrize(
-    ("name", "static", "trials"),
-    [
-        (
-            "gait2354",
-            "subject01_static.trc",
-            [("subject01_walk1.trc", "subject01_walk1_grf.mot", "subject01_walk1_grf.xml")],
-        ),
-        (
-            "rajagopal_walk",
-            "static_walk_1.trc",
-            [("motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")],
-        ),
-        (
-            "subject4",
-            "static1.trc",
-            [(f"{t}.trc", f"{t}_grf.mot", f"{t}_external_forces.xml") for t in ("squats1", "walking1", "walking2")],
-        ),
-    ],
-)
-def test_init_matches_measured_files(name, static, trials, tmp_path):
-    text = init_subject(DATA / name)
-    for file in (DATA / name).iterdir():
+@pytest.mark.parametrize("name", ["gait2354", *here(["rajagopal_walk", "subject4"])])
+def test_init_matches_the_files_of_a_laboratory(name, tmp_path, sample_walk, file_of):
+    static, trials = LABORATORIES[name]
+    folder = sample_walk / name if name == "gait2354" else file_of(name)
+    text = init_subject(folder)
+    for file in folder.iterdir():
         (tmp_path / file.name).touch()
     with pytest.raises(FileError, match="lacks 'sex'"):
         draft(tmp_path, text)
@@ -62,15 +54,14 @@ def test_init_matches_measured_files(name, static, trials, tmp_path):
     assert "Left out" not in text
 
 
-@needs_data
-def test_init_takes_the_first_of_two_subjects_and_says_so(tmp_path):
-    text = init_subject(DATA / "pig_c3d")
-    for file in (DATA / "pig_c3d").iterdir():
-        (tmp_path / file.name).touch()
+def test_init_takes_the_first_of_two_subjects_and_says_so(tmp_path, c3d_lab):
+    for subject, kind in product("ab", ("static", "walk")):
+        shutil.copyfile(c3d_lab / f"{kind}.c3d", tmp_path / f"subject_{subject}_{kind}.c3d")
+    text = init_subject(tmp_path)
     result = draft(tmp_path, completed(text))
     assert result.model.static.name == "subject_a_static.c3d"
     assert [trial.markers.name for trial in result.trials] == ["subject_a_walk.c3d"]
-    assert (result.subject.mass_kg, result.subject.height_m) == pytest.approx((41.5, 1.61))
+    assert (result.subject.mass_kg, result.subject.height_m) == pytest.approx((72.6, 1.803))
     left_out = next(line for line in text.splitlines() if line.startswith("# Left out"))
     assert "subject_b_static.c3d, subject_b_walk.c3d" in left_out
 
@@ -129,12 +120,12 @@ def test_init_matches_short_names_that_are_whole_words_of_the_force_files(tmp_pa
     assert found == {trial: f"{forces}.mot", "walk_1": "walk_1_forces.mot"}
 
 
-def laboratory(tmp_path, force_folder):
+def laboratory(tmp_path, sample_walk, force_folder):
     """Markers of a person in a folder, forces in another one."""
     person = tmp_path / "person"
     for name in ("MarkerData", force_folder):
         (person / name).mkdir(parents=True)
-    data = DATA / "gait2354"
+    data = sample_walk / "gait2354"
     for name in ("subject01_static.trc", "subject01_walk1.trc"):
         shutil.copy(data / name, person / "MarkerData")
     for name in ("subject01_walk1_grf.mot", "subject01_walk1_grf.xml"):
@@ -142,10 +133,9 @@ def laboratory(tmp_path, force_folder):
     return person
 
 
-@needs_data
 @pytest.mark.parametrize("force_folder", ["ID", "MarkerData/forces"])
-def test_init_finds_forces_in_folders_beside_and_within(tmp_path, force_folder):
-    person = laboratory(tmp_path, force_folder)
+def test_init_finds_forces_in_folders_beside_and_within(tmp_path, sample_walk, force_folder):
+    person = laboratory(tmp_path, sample_walk, force_folder)
     path = person / "MarkerData" / "subject.toml"
     text = init_subject(path.parent)
     beside = "../ID" if force_folder == "ID" else "forces"
@@ -156,9 +146,8 @@ def test_init_finds_forces_in_folders_beside_and_within(tmp_path, force_folder):
     assert trial.forces.samefile(person / force_folder / "subject01_walk1_grf.mot")
 
 
-@needs_data
-def test_init_finds_forces_in_a_folder_of_forces_beside_the_one_above(tmp_path):
-    person = laboratory(tmp_path, "ForceData")
+def test_init_finds_forces_in_a_folder_of_forces_beside_the_one_above(tmp_path, sample_walk):
+    person = laboratory(tmp_path, sample_walk, "ForceData")
     folder = person / "MarkerData" / "Mocap"
     folder.mkdir()
     for file in [file for file in folder.parent.iterdir() if file.is_file()]:
@@ -184,10 +173,9 @@ def test_init_leaves_folders_alone_that_it_may_not_look_into(tmp_path, monkeypat
     assert 'markers = "walk.trc"' in init_subject(here)
 
 
-@needs_data
-def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path):
-    person = laboratory(tmp_path, "ID")
-    shutil.copy(DATA / "gait2354" / "subject01_walk1.trc", person / "ID" / "subject02_walk1.trc")
+def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path, sample_walk):
+    person = laboratory(tmp_path, sample_walk, "ID")
+    shutil.copy(sample_walk / "gait2354" / "subject01_walk1.trc", person / "ID" / "subject02_walk1.trc")
     text = init_subject(person / "MarkerData")
     assert "# No forces were found for subject01_walk1.trc" in text
     assert "# forces = " in text
@@ -246,9 +234,9 @@ def test_init_without_recordings(tmp_path):
         init_subject(tmp_path / "nowhere")
 
 
-def test_the_only_model_takes_the_place_of_a_static_trial_that_no_name_tells(tmp_path, measured_walk):
+def test_the_only_model_takes_the_place_of_a_static_trial_that_no_name_tells(tmp_path, c3d_lab):
     for name in ("first.c3d", "second.c3d"):
-        shutil.copyfile(measured_walk / "static.c3d", tmp_path / name)
+        shutil.copyfile(c3d_lab / "static.c3d", tmp_path / name)
     (tmp_path / "scaled.osim").touch()
     content = tomllib.loads(init_subject(tmp_path))
     assert content["model"] == {"osim": "scaled.osim"}
@@ -299,9 +287,9 @@ def test_folders_that_hold_markers_are_named_however_deep(tmp_path):
         init_subject(tmp_path)
 
 
-def test_a_sheet_of_measures_is_taken_up(tmp_path, measured_walk):
+def test_a_sheet_of_measures_is_taken_up(tmp_path, c3d_lab):
     for name in ("static.c3d", "walk.c3d"):
-        shutil.copyfile(measured_walk / name, tmp_path / name)
+        shutil.copyfile(c3d_lab / name, tmp_path / name)
     assert "prior" not in tomllib.loads(init_subject(tmp_path))
     (tmp_path / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
     text = init_subject(tmp_path)

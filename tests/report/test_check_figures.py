@@ -18,9 +18,9 @@ from report_page import figures_of, numbers
 
 
 @pytest.fixture(scope="module")
-def walked(measured_walk):
-    recording = read_recording(measured_walk / "walk.c3d")
-    return check_recording(recording, mass_kg=41.5)
+def walked(c3d_lab):
+    recording = read_recording(c3d_lab / "walk.c3d")
+    return check_recording(recording, mass_kg=72.6)
 
 
 def test_ground_is_blue_or_red_in_contacts_and_grey_where_no_fit_can_use_the_frames(walked):
@@ -39,8 +39,8 @@ def test_ground_is_blue_or_red_in_contacts_and_grey_where_no_fit_can_use_the_fra
             walked.recording.plates.time[0],
             walked.recording.plates.time[-1],
         )
-    blue, red = (drawn[k][-1]["fillcolor"] for k in (1, 0))
-    assert (blue, red) == ("#0072B2", "#D55E00"), "the left foot is on the first plate, the right on the second"
+    blue, red = (drawn[k][-1]["fillcolor"] for k in (0, 1))
+    assert (blue, red) == ("#0072B2", "#D55E00"), "the right foot is on the first plate, the left on the second"
 
 
 def test_forces_keep_their_peaks(walked):

@@ -13,9 +13,9 @@ from kinertia.studies.cohort_record import inputs_of, prepare_folder
 
 
 @pytest.fixture
-def job(measured_walk, tmp_path):
+def job(c3d_lab, tmp_path):
     """A person whose gait trial is the static trial, which no fit can use."""
-    shutil.copytree(measured_walk, tmp_path / "A")
+    shutil.copytree(c3d_lab, tmp_path / "A")
     subject = tmp_path / "A" / "subject.toml"
     text = subject.read_text(encoding="utf-8").replace('markers = "walk.c3d"', 'markers = "static.c3d"')
     subject.write_text(text, encoding="utf-8")

@@ -66,7 +66,7 @@ def test_fit_json_keeps_its_contract(saved):
     assert trial["name"] == "early"
     assert trial["n_frames"] == 270
     assert trial["n_dynamic_frames"] == len(fit.trials[0].time) == 31
-    assert trial["window_s"] == pytest.approx([2.8, 3.1])
+    assert trial["window_s"] == pytest.approx([1.2, 1.5])
     assert {"read", "ik", "estimate", "total"} <= set(trial["seconds"])
     assert trial["seconds"]["read"] == 0.25
     assert set(trial["marker_rms_m"]) == {"ik", "final"}

@@ -47,12 +47,12 @@ ON_PAPER_PX = 1100
 
 
 @pytest.fixture(scope="module")
-def pages(demo_run, fit, two_level, measured_walk, tmp_path_factory):
+def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
     """A page of every kind, made when it is first asked for."""
     folder = tmp_path_factory.mktemp("pages")
 
     def check():
-        wanted = files_by_name([measured_walk / "static.c3d", measured_walk / "walk.c3d"])
+        wanted = files_by_name([c3d_lab / "static.c3d", c3d_lab / "walk.c3d"])
         recordings, mistakes = check_files(PersonFiles(wanted))
         return save_check_page(recordings, [], [*mistakes, "lost.trc: no such file"], folder / "check")
 

@@ -11,9 +11,9 @@ from kinertia.studies.cohort_record import RECORD, Place, Record, keep, prepare_
 
 
 @pytest.fixture
-def subject(measured_walk, tmp_path):
+def subject(c3d_lab, tmp_path):
     """A subject file of one's own to change."""
-    shutil.copytree(measured_walk, tmp_path / "Anna")
+    shutil.copytree(c3d_lab, tmp_path / "Anna")
     return tmp_path / "Anna" / "subject.toml"
 
 

@@ -13,7 +13,7 @@ from walk_on_plates import walk as simple_walk
 FEW_STEPS = [("r", 0), ("l", 0)]
 
 
-def measured_walk(steps, edge_s=0.04, stance_s=0.6, belt_m_s=0.0, **more):
+def c3d_lab(steps, edge_s=0.04, stance_s=0.6, belt_m_s=0.0, **more):
     """Loads as long as the feet look to stand: in the simple walk these are slow `edge_s` before and after."""
     markers = simple_walk(steps, stance_s - 2 * edge_s, belt_m_s=belt_m_s, **more).markers
     early = late(simple_walk(steps, stance_s, belt_m_s=belt_m_s, **more), -edge_s)
@@ -38,7 +38,7 @@ def late(recording, by_s):
 @pytest.mark.parametrize("steps", [FEW_STEPS, ALL_STEPS], ids=["two plates", "all steps"])
 @pytest.mark.parametrize("factor", [1.2, 0.8, 2.0])
 def test_a_wrong_rate_is_no_late_clock(steps, factor):
-    trouble = load_places_trouble(marked_at(measured_walk(steps), factor), FEET)
+    trouble = load_places_trouble(marked_at(c3d_lab(steps), factor), FEET)
     assert trouble.startswith("markers and forces do not run at the same speed, by a factor of about ")
     assert float(trouble.partition("of about ")[2].partition(":")[0]) == pytest.approx(factor, rel=0.02)
 
@@ -46,12 +46,12 @@ def test_a_wrong_rate_is_no_late_clock(steps, factor):
 @pytest.mark.parametrize("late_s", [-0.1, 0.1])
 def test_a_late_clock_is_no_wrong_rate(late_s):
     word = "late" if late_s > 0 else "early"
-    assert f" ms {word}" in load_places_trouble(late(measured_walk(FEW_STEPS), late_s), FEET)
+    assert f" ms {word}" in load_places_trouble(late(c3d_lab(FEW_STEPS), late_s), FEET)
 
 
 def test_loads_that_a_belt_takes_along_are_late():
     """On a fast belt, loads that come late are under no foot."""
-    run = measured_walk(ALL_STEPS, 0.08, 0.2, stride_m=3 * STRIDE_M, belt_m_s=3 * STRIDE_M)
+    run = c3d_lab(ALL_STEPS, 0.08, 0.2, stride_m=3 * STRIDE_M, belt_m_s=3 * STRIDE_M)
     assert load_places_trouble(run, FEET) == ""
     trouble = load_places_trouble(late(run, 0.1), FEET)
     assert trouble.startswith("the forces are ")

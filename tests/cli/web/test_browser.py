@@ -15,7 +15,7 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import DESKTOP, PHONE, picture, playwright
-from kinertia.cli.measured_demo import FILES
+from command_line import fitted
 from kinertia.cli.web import work
 from kinertia.cli.web.entries import recognise
 from kinertia.io.marker_set_file import read_marker_set
@@ -40,11 +40,11 @@ CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
 pytestmark = pytest.mark.slow
 
 
-def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(tab, tmp_path, measured_demo):
+def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(tab, tmp_path, c3d_lab):
     folder = tmp_path / "Subject A"
     folder.mkdir()
     for name in ("static.c3d", "walk.c3d"):
-        shutil.copyfile(FILES / name, folder / name)
+        shutil.copyfile(c3d_lab / name, folder / name)
     (folder / "letter.pdf").write_text("not for Kinertia")
     tab.drop(folder)
     playwright.expect(tab.page.locator(".problems")).to_contain_text("a '.pdf' file is none that Kinertia reads")
@@ -52,10 +52,11 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
     tab.arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
     playwright.expect(tab.page.locator(".message.caution")).to_contain_text("lacks 'sex'")
-    tab.fill(sex="male", mass="41,5", height="1.61").check().checked()
+    tab.fill(sex="male", mass="72,6", height="1.803").check().checked()
     playwright.expect(tab.page.locator("section[aria-labelledby=check] .headline")).to_be_in_viewport()
     verdict = tab.estimate().verdict()
-    ours, theirs = load_fit(tab.person().results), measured_demo.fit
+    theirs = load_fit(fitted(tmp_path / "out", c3d_lab / "subject.toml").folder)
+    ours = load_fit(tab.person().results)
     assert (ours.estimate.table() == theirs.estimate.table()).all()
     assert "Do not use" in verdict or "Usable" in verdict or "passed" in verdict
     with tab.page.expect_download() as download:
@@ -68,16 +69,16 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
     tab.quiet()
 
 
-def test_a_folder_is_dragged_onto_the_page_and_an_archive_is_refused(tab, tmp_path):
+def test_a_folder_is_dragged_onto_the_page_and_an_archive_is_refused(tab, tmp_path, c3d_lab):
     folder = tmp_path / "Dragged"
     folder.mkdir()
     for name in ("static.c3d", "walk.c3d"):
-        shutil.copyfile(FILES / name, folder / name)
+        shutil.copyfile(c3d_lab / name, folder / name)
     tab.drag(folder).arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Dragged"
     assert tab.page.get_by_label("static.c3d is used as").input_value() == "static"
     with zipfile.ZipFile(tmp_path / "session.zip", "w") as archive:
-        archive.write(FILES / "walk.c3d", "walk.c3d")
+        archive.write(c3d_lab / "walk.c3d", "walk.c3d")
     tab.page.get_by_text("Add files").click()
     tab.drag(tmp_path / "session.zip")
     said = "session.zip: not taken: an archive is not unpacked here; unpack it, and drop the folder"
@@ -114,8 +115,8 @@ def test_a_person_is_called_as_the_files_are(browser, tmp_path, names, person):
         tab.quiet()
 
 
-def test_a_measured_segment_and_a_rucksack_are_entered_in_the_form(tab):
-    tab.drop(FILES / "walk.c3d", FILES / "static.c3d").arrived().fill(sex="male", mass="41.5", height="1.61")
+def test_a_measured_segment_and_a_rucksack_are_entered_in_the_form(tab, c3d_lab):
+    tab.drop(c3d_lab / "walk.c3d", c3d_lab / "static.c3d").arrived().fill(sex="male", mass="72.6", height="1.803")
     page = tab.page
     page.get_by_text("Segments that were measured").click()
     page.get_by_label("Segment", exact=True).first.fill("thigh_r")
@@ -164,11 +165,11 @@ def test_a_walk_with_a_model_to_the_verdict(tab, measured_folder):
     tab.quiet()
 
 
-def test_what_was_entered_is_kept_when_files_come_or_go_and_on_other_pages(tab, tmp_path):
+def test_what_was_entered_is_kept_when_files_come_or_go_and_on_other_pages(tab, tmp_path, c3d_lab):
     folder = tmp_path / "Anna"
     folder.mkdir()
     for name in ("static.c3d", "walk.c3d"):
-        shutil.copyfile(FILES / name, folder / name)
+        shutil.copyfile(c3d_lab / name, folder / name)
     (folder / "list.csv").write_text("a,b\n1,2\n")
     tab.drop(folder).arrived()
     tab.fill(sex="male", mass="41,5")
@@ -198,9 +199,9 @@ def test_what_was_entered_is_kept_when_files_come_or_go_and_on_other_pages(tab, 
     tab.quiet()
 
 
-def test_a_form_in_which_nobody_typed_is_not_sent(tab):
+def test_a_form_in_which_nobody_typed_is_not_sent(tab, c3d_lab):
     """What the page came with is compared with what stands there, in fields of every kind."""
-    tab.drop(FILES / "walk.c3d", FILES / "static.c3d").arrived()
+    tab.drop(c3d_lab / "walk.c3d", c3d_lab / "static.c3d").arrived()
     kept = []
     tab.page.on("request", lambda request: request.url.endswith("/keep") and kept.append(request.url))
     tab.page.reload()
@@ -216,9 +217,11 @@ def test_a_form_in_which_nobody_typed_is_not_sent(tab):
     tab.quiet()
 
 
-def test_a_wrong_mass_is_said_in_place(tab):
-    tab.drop(FILES / "walk.c3d", FILES / "static.c3d").arrived().fill(sex="male", mass="4150", height="1.61").check()
-    assert "mass_kg = 4150" in tab.message()
+def test_a_wrong_mass_is_said_in_place(tab, c3d_lab):
+    tab.drop(c3d_lab / "walk.c3d", c3d_lab / "static.c3d").arrived().fill(
+        sex="male", mass="7260", height="1.803"
+    ).check()
+    assert "mass_kg = 7260" in tab.message()
     assert tab.page.get_by_role("button", name="Estimate", exact=True).count() == 0
     tab.fill(mass="heavy").check()
     assert "'heavy' is not a number; write it like 72.6" in tab.message()
@@ -229,16 +232,16 @@ def test_a_wrong_mass_is_said_in_place(tab):
     tab.quiet()
 
 
-def test_a_missing_static_trial_is_said_in_place(tab):
-    tab.drop(FILES / "walk.c3d").arrived().fill(sex="male").check()
+def test_a_missing_static_trial_is_said_in_place(tab, c3d_lab):
+    tab.drop(c3d_lab / "walk.c3d").arrived().fill(sex="male").check()
     assert "[model] lacks 'static'" in tab.message()
     tab.quiet()
 
 
-def test_a_file_that_is_no_motion_is_said_in_place(tab, tmp_path):
+def test_a_file_that_is_no_motion_is_said_in_place(tab, tmp_path, c3d_lab):
     (tmp_path / "broken.c3d").write_bytes(b"this is no motion" * 100)
-    tab.drop(tmp_path / "broken.c3d", FILES / "static.c3d").arrived()
-    tab.fill(sex="male", mass="41.5", height="1.61").check().checked()
+    tab.drop(tmp_path / "broken.c3d", c3d_lab / "static.c3d").arrived()
+    tab.fill(sex="male", mass="72.6", height="1.803").check().checked()
     assert "broken.c3d" in tab.message()
     tab.quiet()
 
@@ -257,10 +260,10 @@ def press(page, name, key="Enter", most=60):
     raise AssertionError(f"no way to {name} by the keyboard")
 
 
-def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
+def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch, c3d_lab):
     monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
     person = app.library.add("Keyboard")
-    with_everything(person)
+    with_everything(person, c3d_lab)
     tab = Tab(browser, app).home()
     page = tab.page
     for control in ("Choose files", "Choose a folder", "Try it with a measured walk", "Compare Keyboard"):
@@ -283,10 +286,10 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch):
     tab.quiet()
 
 
-def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monkeypatch):
+def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monkeypatch, c3d_lab):
     monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
     person = app.library.add("Rows by keyboard")
-    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+    for path in (*c3d_lab.glob("*.c3d"), c3d_lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
     (person.folder / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
     tab = Tab(browser, app)
@@ -316,9 +319,9 @@ def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monk
     tab.quiet()
 
 
-def test_an_unknown_marker_is_assigned_by_a_click(tab, app):
+def test_an_unknown_marker_is_assigned_by_a_click(tab, app, c3d_lab):
     person = app.library.add("Unknown marker")
-    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+    for path in (*c3d_lab.glob("*.c3d"), c3d_lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
     tab.page.goto(f"{app.address}people/{quote(person.name)}/markers")
     canvas = tab.page.locator("canvas")
@@ -361,9 +364,9 @@ def test_labels_of_markers_do_not_overprint_one_another(browser, app, measured_f
         tab.quiet()
 
 
-def test_a_marker_tells_its_label_when_it_is_pointed_at(tab, app):
+def test_a_marker_tells_its_label_when_it_is_pointed_at(tab, app, c3d_lab):
     person = app.library.add("Pointed at")
-    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+    for path in (*c3d_lab.glob("*.c3d"), c3d_lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
     tab.page.add_init_script(WRITTEN)
     tab.page.goto(f"{app.address}people/{quote(person.name)}/markers")
@@ -378,11 +381,11 @@ def test_a_marker_tells_its_label_when_it_is_pointed_at(tab, app):
     tab.quiet()
 
 
-def test_pages_have_no_barriers_fit_a_phone_and_are_dark_where_the_system_is(browser, app):
+def test_pages_have_no_barriers_fit_a_phone_and_are_dark_where_the_system_is(browser, app, c3d_lab):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     tab = Tab(browser, app).home()
     if app.library.person("Barrier-free") is None:
-        with_everything(app.library.add("Barrier-free"))
+        with_everything(app.library.add("Barrier-free"), c3d_lab)
     for path in ("", "people/Barrier-free", "people/Barrier-free/markers", "compare", "people/nobody"):
         tab.page.goto(app.address + path)
         tab.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")

@@ -45,8 +45,8 @@ GAIT2354 = ("subject01_static.trc", "subject01_walk1.trc", "subject01_walk1_grf.
 RAJAGOPAL = ("static_walk_1.trc", "motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")
 
 
-def test_c3d_files_are_recognised_and_what_lacks_is_said_as_by_the_command_line(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_c3d_files_are_recognised_and_what_lacks_is_said_as_by_the_command_line(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     assert used(person) == {"static.c3d": "static", "walk.c3d": "trial"}
     assert "[subject] lacks 'sex'" in trouble(person)
@@ -145,11 +145,11 @@ def test_forces_of_another_person_are_not_taken(tmp_path, measured_folder):
     assert used(anna) == {GAIT2354[0]: "static", GAIT2354[1]: "trial"}
 
 
-def test_what_was_corrected_stays_when_files_are_added_or_removed(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_what_was_corrected_stays_when_files_are_added_or_removed(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     write_form(person, {"sex": "female", "mass_kg": "50", USE + "walk.c3d": "", USE + "static.c3d": "static"})
-    shutil.copyfile(measured_walk / "static.c3d", person.folder / "walk2.c3d")
+    shutil.copyfile(c3d_lab / "static.c3d", person.folder / "walk2.c3d")
     recognise(person)
     assert used(person) == {"static.c3d": "static", "walk2.c3d": "trial"}
     assert entries(person)["subject"]["mass_kg"] == 50.0
@@ -159,8 +159,8 @@ def test_what_was_corrected_stays_when_files_are_added_or_removed(person, measur
     assert "trial" in trouble(person)
 
 
-def test_a_sheet_of_measures_is_used_until_it_is_put_aside(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_a_sheet_of_measures_is_used_until_it_is_put_aside(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     write_form(person, {"sex": "male"})
     (person.folder / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
@@ -175,8 +175,8 @@ def test_a_sheet_of_measures_is_used_until_it_is_put_aside(person, measured_walk
     assert "measures.csv" not in used(person), "what was put aside stays so"
 
 
-def test_two_files_for_one_use_are_an_error(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_two_files_for_one_use_are_an_error(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     before = person.subject.read_text(encoding="utf-8")
     with pytest.raises(SettingsError, match=r"static.c3d and walk.c3d are both used as static; choose one"):
@@ -185,16 +185,16 @@ def test_two_files_for_one_use_are_an_error(person, measured_walk):
 
 
 @pytest.mark.parametrize(("mass", "sentence"), [("4150", "mass_kg = 4150"), ("-3", "mass_kg = -3")])
-def test_an_impossible_mass_has_the_command_lines_message(person, measured_walk, mass, sentence):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_an_impossible_mass_has_the_command_lines_message(person, c3d_lab, mass, sentence):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     write_form(person, {"sex": "male", "mass_kg": mass})
     assert sentence in trouble(person)
     assert trouble(person) in " ".join(run("check", person.subject).err.split())
 
 
-def test_what_is_no_number_is_said_and_nothing_is_written(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_what_is_no_number_is_said_and_nothing_is_written(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     before = person.subject.read_text(encoding="utf-8")
     with pytest.raises(SettingsError, match=r"Body mass \(kg\): 'heavy' is not a number; write it like 72.6"):
@@ -207,8 +207,8 @@ def test_what_is_no_number_is_said_and_nothing_is_written(person, measured_walk)
     assert person.subject.read_text(encoding="utf-8") == before
 
 
-def test_a_subject_file_that_was_dropped_is_used_with_all_its_entries(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_a_subject_file_that_was_dropped_is_used_with_all_its_entries(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     (person.folder / "anna spring.toml").write_text(
         '[subject]\nsex = "f"\nmass_kg = 50\nknee_width_mm = 100.0\n[model]\nstatic = "C:\\\\lab\\\\static.c3d"\n'
         '[[trial]]\nname = "second"\nmarkers = "../lab/walk.c3d"\nwindow_s = [2.8, 3.4]\n'
@@ -227,10 +227,10 @@ def test_a_subject_file_that_was_dropped_is_used_with_all_its_entries(person, me
     assert (wanted.subject.mass_kg, wanted.subject.knee_width_mm) == (51.0, 100.0)
 
 
-def test_no_file_outside_the_folder_is_read(person, tmp_path, measured_walk):
-    put(person, measured_walk, "walk.c3d")
+def test_no_file_outside_the_folder_is_read(person, tmp_path, c3d_lab):
+    put(person, c3d_lab, "walk.c3d")
     outside = (tmp_path / "elsewhere.c3d").as_posix()
-    shutil.copyfile(measured_walk / "static.c3d", outside)
+    shutil.copyfile(c3d_lab / "static.c3d", outside)
     write_text(person, f'[subject]\nsex="f"\n[model]\nstatic="{outside}"\n[[trial]]\nmarkers="walk.c3d"\n')
     assert "no such file" in trouble(person)
     within = within_folder(
@@ -282,8 +282,8 @@ def test_the_form_has_every_entry_of_the_person():
     assert not shown["mass_kg"].choices
 
 
-def test_age_population_and_what_is_attached_reach_the_subject_file(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_age_population_and_what_is_attached_reach_the_subject_file(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     text = person.subject.read_text(encoding="utf-8")
     attached = '[[attached]]\nname = "rucksack"\nsegment = "torso"\nmass_kg = "8.0 +- 0.1"\n'
@@ -295,8 +295,8 @@ def test_age_population_and_what_is_attached_reach_the_subject_file(person, meas
     assert (wanted["age_years"], wanted["population"]) == (11.5, "child")
 
 
-def test_the_marker_set_is_chosen_among_the_presets(person, measured_walk):
-    put(person, measured_walk, "static.c3d", "walk.c3d")
+def test_the_marker_set_is_chosen_among_the_presets(person, c3d_lab):
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     field = marker_set_field(entries(person))
     assert field.choices == tuple(preset_names())

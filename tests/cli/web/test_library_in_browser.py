@@ -12,7 +12,6 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_server import running
 from app_tab import PATIENCE_MS, Tab, with_everything
 from chromium import playwright
-from kinertia.cli.measured_demo import FILES
 from kinertia.cli.web import work
 
 WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share': 0.3}), flush=True)\ntime.sleep(90)"
@@ -21,10 +20,10 @@ WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share
 pytestmark = pytest.mark.slow
 
 
-def ready(library, name):
+def ready(library, name, c3d_lab):
     """Somebody who can be fitted."""
     person = library.add(name)
-    for path in (*FILES.glob("*.c3d"), FILES / "subject.toml"):
+    for path in (*c3d_lab.glob("*.c3d"), c3d_lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
     return person
 
@@ -129,9 +128,9 @@ def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run,
         tab.quiet()
 
 
-def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app):
+def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_lab):
     person = ready(app.library, "Person to rename")
-    with_everything(person)
+    with_everything(person, c3d_lab)
     outcome = json.loads((person.results / "outcome.json").read_text())
     (person.results / "outcome.json").write_text(json.dumps({**outcome, "inputs": person.inputs}))
     tab.page.goto(f"{app.address}people/{quote(person.name)}")
@@ -145,10 +144,10 @@ def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app):
     tab.quiet()
 
 
-def test_a_report_reaches_nothing(browser, app):
+def test_a_report_reaches_nothing(browser, app, c3d_lab):
     """Whatever a file made a report say, it has no way to the page, the library or the network."""
     person = app.library.add("Curious report")
-    with_everything(person)
+    with_everything(person, c3d_lab)
     tries = {
         "asked": "fetch(location.href.replace('results/report.html', 'subject.toml')).then(() => 'yes', () => 'no')",
         "out": "fetch('http://127.0.0.1:9/').then(() => 'yes', () => 'no')",

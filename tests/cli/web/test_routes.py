@@ -20,8 +20,8 @@ from kinertia.report.measures_picture import measures_picture
 
 
 @pytest.fixture
-def app(tmp_path, measured_walk):
-    with running(tmp_path / "library", measured_walk) as served:
+def app(tmp_path, c3d_lab):
+    with running(tmp_path / "library", c3d_lab) as served:
         yield served
 
 
@@ -44,9 +44,9 @@ def test_people_are_compared_as_on_the_command_line(app, measured_demo):
     assert "written by the command line" in app.ask("/people/Anna").text
 
 
-def test_the_sheet_of_measures_is_saved_as_the_command_line_writes_it(app, measured_walk):
+def test_the_sheet_of_measures_is_saved_as_the_command_line_writes_it(app, c3d_lab):
     person = app.library.add("Anna")
-    shutil.copyfile(measured_walk / "walk.c3d", person.folder / "walk.c3d")
+    shutil.copyfile(c3d_lab / "walk.c3d", person.folder / "walk.c3d")
     linked = app.ask("/people/Anna").text
     for name, content in (("measures.csv", measures_sheet()), ("measures.svg", measures_picture())):
         assert f'href="{app.root}/{name}" download' in linked
@@ -112,14 +112,14 @@ def test_a_renamed_person_has_another_address(app):
     assert [person.name for person in app.library.people()] == ["Änne b"]
 
 
-def test_estimate_takes_what_is_in_the_form(app, measured_walk, monkeypatch):
+def test_estimate_takes_what_is_in_the_form(app, c3d_lab, monkeypatch):
     added = []
     monkeypatch.setattr(Jobs, "add", lambda self, person, kind: added.append(kind))
     person = app.library.add("Anna")
-    for path in measured_walk.iterdir():
+    for path in c3d_lab.iterdir():
         shutil.copyfile(path, person.folder / path.name)
     before = person.subject.read_text()
-    assert app.post("/people/Anna/fit", "mass_kg=41.5").status == 303
+    assert app.post("/people/Anna/fit", "mass_kg=72.6").status == 303
     assert person.subject.read_text() == before, "nothing was changed, so comments stay"
     assert app.post("/people/Anna/fit", "mass_kg=44").status == 303
     assert read_subject(person.subject).subject.mass_kg == 44.0
@@ -142,10 +142,10 @@ def test_text_that_cannot_be_read_is_shown_again(app):
     assert "mass_kg" not in person.subject.read_text()
 
 
-def test_entries_are_kept_before_something_else_takes_their_place(app, measured_walk):
+def test_entries_are_kept_before_something_else_takes_their_place(app, c3d_lab):
     person = app.library.add("Anna")
     for name in ("static.c3d", "walk.c3d"):
-        shutil.copyfile(measured_walk / name, person.folder / name)
+        shutil.copyfile(c3d_lab / name, person.folder / name)
     assert app.post("/people/Anna/keep", "sex=male").status == 200
     assert not person.subject.exists(), "nothing was recognised yet"
     app.post("/people/Anna/recognise")

@@ -86,10 +86,10 @@ def test_other_shapes_stay_for_the_command_lines_message():
         assert [each.written for each in rows(content)] == [0, 0]
 
 
-def test_they_reach_the_fit_and_mistakes_have_the_command_lines_message(tmp_path, measured_walk):
+def test_they_reach_the_fit_and_mistakes_have_the_command_lines_message(tmp_path, c3d_lab):
     person = Library(tmp_path / "library").add("Anna")
     for name in ("static.c3d", "walk.c3d"):
-        (person.folder / name).write_bytes((measured_walk / name).read_bytes())
+        (person.folder / name).write_bytes((c3d_lab / name).read_bytes())
     recognise(person)
     form = {"sex": "male", "mass_kg": "41,5", "height_m": "1,61"}
     form |= {"segment:0:segment": "thigh_r", "segment:0:mass_kg": "4,9 +- 0,4"}

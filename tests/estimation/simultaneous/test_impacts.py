@@ -53,12 +53,12 @@ def test_knots_are_no_closer_than_every_second_frame():
 
 
 @pytest.mark.slow
-def test_the_clock_follows_forces_that_are_moved(measured_walk):
+def test_the_clock_follows_forces_that_are_moved(c3d_lab):
     """Its heel strike is sharp. With it as sure as other frames the clock was 12.5 ms late where forces were 8 ms
     earlier, and 9.8 ms where they were 20 ms earlier, +-0.5 ms; 34 ms apart. A clock that may be sound counts as sound:
     it stays at zero over some 15 ms.
     """
-    walk, static = (read_recording(measured_walk / f"{kind}.c3d") for kind in ("walk", "static"))
+    walk, static = (read_recording(c3d_lab / f"{kind}.c3d") for kind in ("walk", "static"))
     late = {}
     for moved_ms in (-20.0, -8.0, 0.0, 8.0, 15.0):
         plates = replace(walk.plates, time=walk.plates.time + moved_ms / 1e3)
