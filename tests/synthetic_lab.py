@@ -66,7 +66,8 @@ def write_synthetic_lab(folder: Path) -> Path:
     _write_walk(folder, "walk", recorded)
     _write_walk(folder, "other", _recorded(person, second, Manner(pace=1.1)))
     feet = _plate_feet(recorded)
-    forces = [_FORCE.format(name=foot, body=f"foot_{foot}", plate=k) for k, foot in enumerate(feet, start=1)]
+    names = {"r": "right", "l": "left"}
+    forces = [_FORCE.format(name=names[foot], body=f"foot_{foot}", plate=k) for k, foot in enumerate(feet, start=1)]
     (folder / "walk_grf.xml").write_text(_LOADS.format(forces="\n".join(forces), file="walk_grf.mot"), encoding="utf-8")
     export_osim(folder / "scaled.osim", person.skeleton, person.literature)
     with_widths = _recorded(with_plug_in_gait(person), third)

@@ -46,16 +46,16 @@ def test_subject_file(lab):
     assert outcome.err.splitlines() == ["reading"]
 
 
-def test_widths_of_joints_may_come_from_elsewhere(tmp_path, recording_of, measured_folder):
+def test_widths_of_joints_may_come_from_elsewhere(tmp_path, recording_of, c3d_lab):
     """Plug-in Gait has no medial markers; TRC files have no widths, the walk's C3D and the subject file may."""
-    static = recording_of("pig_c3d/subject_b_static.c3d").markers
+    static = recording_of("synthetic/static.c3d").markers
     write_trc(tmp_path / "static.trc", static)
-    subject = "[subject]\nsex = 'female'\nmass_kg = 45.0\nheight_m = 1.505\nWIDTHS\n[model]\nstatic = 'static.trc'\n"
+    subject = "[subject]\nsex = 'male'\nmass_kg = 72.6\nheight_m = 1.803\nWIDTHS\n[model]\nstatic = 'static.trc'\n"
     subject += "[[trial]]\nmarkers = 'walk.c3d'\n"
-    shutil.copy(measured_folder / "pig_c3d" / "subject_b_walk.c3d", tmp_path / "walk.c3d")
+    shutil.copy(c3d_lab / "walk.c3d", tmp_path / "walk.c3d")
     (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", ""))
     assert "all landmarks that the model needs" in text(run("check", tmp_path))
-    walk = recording_of("pig_c3d/subject_b_walk.c3d").markers
+    walk = recording_of("synthetic/walk.c3d").markers
     write_trc(tmp_path / "walk.trc", walk)
     (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", "").replace("c3d", "trc"))
     outcome = run("check", tmp_path)
@@ -239,16 +239,16 @@ def test_model(measured_folder, tmp_path, monkeypatch):
     assert "needs --height and --sex" in text(run("check", model))
 
 
-def test_impossible_model_is_status_1(measured_folder, tmp_path):
-    content = (measured_folder / "rajagopal_walk" / "scaled.osim").read_text()
+def test_impossible_model_is_status_1(synthetic_lab, tmp_path):
+    content = (synthetic_lab / "scaled.osim").read_text()
     broken, count = re.subn(
-        r'(<Body name="tibia_l">.*?<inertia>)[^<]*', r"\g<1>0.9 0.0076 0.076 0 0 0", content, count=1, flags=re.DOTALL
+        r'(<Body name="shank_l">.*?<inertia>)[^<]*', r"\g<1>0.9 0.0076 0.076 0 0 0", content, count=1, flags=re.DOTALL
     )
     assert count == 1
     (tmp_path / "broken.osim").write_text(broken)
     outcome = run("check", tmp_path / "broken.osim")
     assert outcome.status == 1
-    assert "fail: physically impossible: tibia_l: triangle inequality iyy + izz > ixx violated" in text(outcome)
+    assert "fail: physically impossible: shank_l: triangle inequality iyy + izz > ixx violated" in text(outcome)
 
 
 @pytest.mark.slow
@@ -268,16 +268,16 @@ def test_every_measured_file_gets_an_answer(measured_folder):
     assert seen == {0, 1, 2}
 
 
-def test_subject_file_with_a_model(measured_folder, tmp_path):
+def test_subject_file_with_a_model(synthetic_lab, tmp_path):
     """The markers are the model's: as for `kinertia fit`, no preset is asked for."""
-    data = measured_folder / "subject4"
+    data = synthetic_lab
     (tmp_path / "subject.toml").write_text(
-        f'[subject]\nname = "four"\nmass_kg = 60.0\n[model]\nosim = "{data / "addbiomechanics_scaled.osim"}"\n'
-        f'[[trial]]\nmarkers = "{data / "walking1.trc"}"\nforces = "{data / "walking1_grf.mot"}"\n'
-        f'loads = "{data / "walking1_external_forces.xml"}"\n'
+        f'[subject]\nname = "four"\nmass_kg = 72.6\n[model]\nosim = "{data / "scaled.osim"}"\n'
+        f'[[trial]]\nmarkers = "{data / "walk.trc"}"\nforces = "{data / "walk_grf.mot"}"\n'
+        f'loads = "{data / "walk_grf.xml"}"\n'
     )
     printed = text(run("check", tmp_path / "subject.toml"))
-    assert re.search(r"marker set addbiomechanics_scaled\.osim: \d+ of its \d+ labels", printed)
+    assert re.search(r"marker set scaled\.osim: \d+ of its \d+ labels", printed)
     assert "no marker set fits" not in printed
     assert "unknown foot" not in printed
     assert "pass: every foot on the ground stands on a plate from" in printed
@@ -304,9 +304,9 @@ def test_model_that_is_doubted_in_a_subject_file(measured_folder, tmp_path):
     assert "tibia_r and tibia_l (30 mm)" in (tmp_path / "out" / "check.html").read_text()
 
 
-def test_model_of_other_markers_in_a_subject_file(lab, measured_folder):
+def test_model_of_other_markers_in_a_subject_file(lab, synthetic_lab):
     """None shared fails; none in the model is an error, as it is to a fit."""
-    model = measured_folder / "subject4" / "addbiomechanics_scaled.osim"
+    model = synthetic_lab / "scaled.osim"
     body = f'[[trial]]\nmarkers = "{lab / "other.trc"}"\nforces = "{lab / "walk_grf.mot"}"\n'
     (lab / "s.toml").write_text(f'[subject]\nname = "s"\nmass_kg = 72.6\n[model]\nosim = "{model}"\n{body}')
     labels = (lab / "walk.trc").read_text().splitlines(keepends=True)
@@ -315,7 +315,7 @@ def test_model_of_other_markers_in_a_subject_file(lab, measured_folder):
     (lab / "other.trc").write_text("".join(labels))
     outcome = run("check", lab / "s.toml")
     assert outcome.status == 1, outcome.err
-    assert "fail: no label of the model addbiomechanics_scaled.osim is in the file" in text(outcome)
+    assert "fail: no label of the model scaled.osim is in the file" in text(outcome)
     bare, count = re.subn(r"<MarkerSet.*?</MarkerSet>", "", model.read_text(), flags=re.DOTALL)
     assert count == 1
     (lab / "bare.osim").write_text(bare)

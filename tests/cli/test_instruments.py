@@ -86,8 +86,8 @@ def test_people_who_contradict_each_other_are_named():
     assert contradiction.startswith("clock: late: +10.0 ms by the trials of A, +2.0 by those of the others")
 
 
-def test_columns_of_force_files_are_plates_only_where_somebody_says_so(measured_folder, tmp_path):
-    walk = measured_folder / "gait2354" / "subject01_walk1"
+def test_columns_of_force_files_are_plates_only_where_somebody_says_so(sample_walk, tmp_path):
+    walk = sample_walk / "gait2354" / "subject01_walk1"
     text = f"""
 [subject]
 mass_kg = 72.6

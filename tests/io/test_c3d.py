@@ -4,6 +4,7 @@ import pytest
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.errors import FileError
 from kinertia.io.c3d import read_c3d
+from recordings import here, is_here
 
 GRAVITY = 9.80665
 CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)  # mm, type 2: z down
@@ -34,24 +35,26 @@ def expect_centre_of_pressure(plates, x, z, force):
 
 
 VARIETY = {
-    "bts.c3d": (675, 22, 6),
-    "duplicate_labels.c3d": (1050, 22, 0),
-    "ist.c3d": (134, 24, 2),
-    "motion_analysis_walk.c3d": (151, 37, 2),
-    "plates_kistler_type3.c3d": "has no points",
-    "plates_type1.c3d": (634, 22, 1),
-    "rotations_only.c3d": (340, 36, 0),
-    "subject_prefixed_labels.c3d": (333, 86, 2),
+    "synthetic/walk.c3d": (270, 35, 2),
+    "c3d_variety/bts.c3d": (675, 22, 6),
+    "c3d_variety/duplicate_labels.c3d": (1050, 22, 0),
+    "c3d_variety/ist.c3d": (134, 24, 2),
+    "c3d_variety/motion_analysis_walk.c3d": (151, 37, 2),
+    "c3d_variety/plates_kistler_type3.c3d": "has no points",
+    "c3d_variety/plates_type1.c3d": (634, 22, 1),
+    "c3d_variety/rotations_only.c3d": (340, 36, 0),
+    "c3d_variety/subject_prefixed_labels.c3d": (333, 86, 2),
 }
 
 
-LARGE = ("bts.c3d", "plates_kistler_type3.c3d")
+LARGE = ("c3d_variety/bts.c3d", "c3d_variety/plates_kistler_type3.c3d")
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE)) for name in VARIETY])
-def test_every_maker(measured_folder, name):
-    expected = VARIETY[name]
-    path = measured_folder / "c3d_variety" / name
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE)) for name in here(VARIETY)]
+)
+def test_every_maker(file_of, name):
+    expected, path = VARIETY[name], file_of(name)
     if isinstance(expected, str):
         with pytest.raises(FileError, match=expected):
             read_c3d(path)
@@ -76,11 +79,11 @@ def centres_of_pressure(plates, p, threshold_n=100.0):
     return plates.time[loaded], point, (moment - np.cross(point, force))[:, 1]
 
 
-WALKS = ["pig_c3d/subject_a_walk", "pig_c3d/subject_b_walk", "c3d_variety/ist", "c3d_variety/bts",
+WALKS = ["synthetic/walk", "pig_c3d/subject_a_walk", "pig_c3d/subject_b_walk", "c3d_variety/ist", "c3d_variety/bts",
          "c3d_variety/motion_analysis_walk", "c3d_variety/subject_prefixed_labels"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize("name", [name for name in WALKS if is_here(f"{name}.c3d")])
 def test_centre_of_pressure_lies_within_the_corners(file_of, name):
     plates = read_c3d(file_of(f"{name}.c3d")).plates
     for p in range(len(plates.names)):
@@ -92,14 +95,18 @@ def test_centre_of_pressure_lies_within_the_corners(file_of, name):
         assert plates.force[:, p, 1].min() >= 0
 
 
-FEET = {"plate 1": "L", "plate 2": "R"}
+FEET = {
+    "synthetic/walk.c3d": ("R", "L"),
+    "pig_c3d/subject_a_walk.c3d": ("L", "R"),
+    "pig_c3d/subject_b_walk.c3d": ("R", "L"),
+}
+"""By file: whose foot is on the first plate, and on the second."""
 
 
-@pytest.mark.parametrize("subject", "ab")
-def test_centre_of_pressure_runs_under_the_stance_foot(file_of, subject):
-    recording = read_c3d(file_of(f"pig_c3d/subject_{subject}_walk.c3d"))
-    for p, name in enumerate(recording.plates.names):
-        side = FEET[name] if subject == "a" else {"L": "R", "R": "L"}[FEET[name]]
+@pytest.mark.parametrize("file", here(FEET))
+def test_centre_of_pressure_runs_under_the_stance_foot(file_of, file):
+    recording = read_c3d(file_of(file))
+    for p, side in enumerate(FEET[file]):
         time, point, _ = centres_of_pressure(recording.plates, p, 200.0)
         heel, toe = recording.markers.select([f"{side}HEE", f"{side}TOE"]).positions.swapaxes(0, 1)
         middle = np.column_stack(
@@ -108,9 +115,9 @@ def test_centre_of_pressure_runs_under_the_stance_foot(file_of, subject):
         assert np.median(np.linalg.norm(point[:, [0, 2]] - middle, axis=1)) < 0.12
 
 
-@pytest.mark.parametrize("subject", "ab")
-def test_force_on_the_person_brakes_then_drives(file_of, subject):
-    recording = read_c3d(file_of(f"pig_c3d/subject_{subject}_walk.c3d"))
+@pytest.mark.parametrize("file", here(FEET))
+def test_force_on_the_person_brakes_then_drives(file_of, file):
+    recording = read_c3d(file_of(file))
     pelvis = recording.markers.select(["LASI"]).positions[:, 0]
     forward = pelvis[-1] - pelvis[0]
     for p in range(2):
@@ -132,8 +139,8 @@ def test_static_trials_weigh_the_subject(file_of, subject, mass_kg, height_m):
     assert all(0.01 < value < 1.2 for value in recording.measurements.values())
 
 
-def test_plug_in_gait_outputs_go_and_virtual_markers_stay(measured_folder):
-    recording = read_c3d(measured_folder / "pig_c3d" / "subject_a_walk.c3d")
+def test_plug_in_gait_outputs_go_and_virtual_markers_stay(file_of):
+    recording = read_c3d(file_of("pig_c3d/subject_a_walk.c3d"))
     labels = recording.markers.labels
     assert {"RHEE", "LFEO", "CentreOfMass"} <= set(labels)
     assert not [label for label in labels if label.endswith(("Angles", "Force", "Moment", "Power"))]
@@ -384,8 +391,9 @@ def test_files_that_are_no_trial(tmp_path):
         read_c3d(write_c3d(tmp_path / "x.c3d", points * np.nan, labels))
 
 
-def test_real_file_cut_anywhere(measured_folder, tmp_path):
-    whole = (measured_folder / "pig_c3d" / "subject_b_walk.c3d").read_bytes()
+@pytest.mark.parametrize("file", here(["synthetic/walk.c3d", "pig_c3d/subject_b_walk.c3d"]))
+def test_a_file_cut_anywhere(file_of, tmp_path, file):
+    whole = file_of(file).read_bytes()
     for size in (10, 600, 20_000, 200_000, len(whole) - 20_000):
         (tmp_path / "x.c3d").write_bytes(whole[:size])
         with pytest.raises(FileError, match="truncated"):

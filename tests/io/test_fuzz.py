@@ -12,6 +12,8 @@ import fuzz
 from command_line import run
 from kinertia.errors import FileError
 from kinertia.io.recording import read_recording
+from measured_data import places
+from recordings import here
 
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of time and memory are Linux'")
 
@@ -30,14 +32,12 @@ def test_damaged_files(tmp_path, seed, cases, commands):
     assert 0.05 * cases < int(done.stdout) < 0.8 * cases, "damage that matters, and damage that does not"
 
 
-REPRODUCERS = ["c3d_142", "c3d_176", "c3d_189", "c3d_246", "c3d_259", "c3d_306"]
+REPRODUCERS = [path for place in places() for path in sorted((place.parent / "reproducers").glob("*.c3d"))]
+"""Files beside the measured data, where they are on this machine."""
 
 
-@pytest.mark.parametrize("name", REPRODUCERS)
-def test_c3d_files_on_which_ezc3d_crashes_or_hangs(measured_folder, name):
-    path = measured_folder.parent / "reproducers" / f"{name}.c3d"
-    if not path.is_file():
-        pytest.skip(f"needs {path}, which is not part of the package")
+@pytest.mark.parametrize("path", REPRODUCERS, ids=lambda path: path.stem)
+def test_c3d_files_on_which_ezc3d_crashes_or_hangs(path):
     outcome = run("check", path)
     assert outcome.status == 2
     (line,) = [line for line in outcome.err.splitlines() if line != "reading"]
@@ -84,15 +84,14 @@ def test_osim_of_a_version_that_is_no_number(small, version):
     assert "line 2: format" in outcome.err
 
 
+@pytest.mark.parametrize("model", here(["synthetic/scaled.osim", "rajagopal_walk/scaled.osim"]))
 @pytest.mark.parametrize("frame", range(8))
-def test_osim_with_a_renamed_offset_frame(measured_folder, tmp_path, frame):
-    text = (measured_folder / "rajagopal_walk" / "scaled.osim").read_text(encoding="utf-8")
-    parts = text.split('name="tibia_r_offset"')
+def test_osim_with_a_renamed_offset_frame(file_of, tmp_path, frame, model):
+    text = file_of(model).read_text(encoding="utf-8")
+    name = next(name for name in ('name="tibia_r_offset"', 'name="shank_r_offset"') if name in text)
+    parts = text.split(name)
     at = 1 + frame % (len(parts) - 1)
-    (tmp_path / "model.osim").write_text(
-        'name="tibia_r_offset"'.join(parts[:at]) + 'name="renamed"' + 'name="tibia_r_offset"'.join(parts[at:]),
-        encoding="utf-8",
-    )
+    (tmp_path / "model.osim").write_text(name.join(parts[:at]) + 'name="renamed"' + name.join(parts[at:]), "utf-8")
     assert run("check", tmp_path / "model.osim").status in (0, 1, 2)
 
 

@@ -5,6 +5,7 @@ import pytest
 from kinertia.errors import FileError
 from kinertia.io.ground_forces import read_forces, read_forces_with_notes
 from kinertia.io.sto import write_sto
+from recordings import here, is_here
 
 GRAVITY = 9.80665
 
@@ -65,6 +66,7 @@ def named(name):
 
 
 REAL = {
+    "synthetic/walk_grf": ("synthetic/walk_grf.xml", ("r", "l")),
     "gait2354/subject01_walk1_grf": ("gait2354/subject01_walk1_grf.xml", ("r", "l")),
     "rajagopal_walk/grf_walk": ("rajagopal_walk/grf_walk.xml", ("r", "l")),
     "subject4/squats1_grf": ("subject4/squats1_external_forces.xml", ("r", "r", "r")),
@@ -72,11 +74,11 @@ REAL = {
 }
 
 
-@pytest.mark.parametrize("name", REAL)
-def test_real_files_with_and_without_loads_file(measured_folder, name):
+@pytest.mark.parametrize("name", [name for name in REAL if is_here(f"{name}.mot")])
+def test_whole_files_with_and_without_loads_file(file_of, name):
     xml, feet = REAL[name]
-    by_name = read_forces(measured_folder / f"{name}.mot")
-    by_identifier = read_forces(measured_folder / f"{name}.mot", measured_folder / xml)
+    by_name = read_forces(file_of(f"{name}.mot"))
+    by_identifier = read_forces(file_of(f"{name}.mot"), file_of(xml))
     np.testing.assert_array_equal(by_name.force, by_identifier.force)
     np.testing.assert_array_equal(by_name.moment, by_identifier.moment)
     assert by_identifier.declared_feet == feet
@@ -84,6 +86,7 @@ def test_real_files_with_and_without_loads_file(measured_folder, name):
 
 
 WEIGHTS = {
+    "synthetic/walk_grf": (1.35, 1.94, 72.6),
     "gait2354/subject01_walk1_grf": (0.0, 2.5, 72.6),
     "rajagopal_walk/grf_walk": (0.6, 1.8, 85.0),
     "subject4/squats1_grf": (0.0, 13.45, 60.0),
@@ -91,17 +94,18 @@ WEIGHTS = {
 }
 
 
-@pytest.mark.parametrize("name", WEIGHTS)
-def test_mean_vertical_force_is_body_weight(measured_folder, name):
+@pytest.mark.parametrize("name", [name for name in WEIGHTS if is_here(f"{name}.mot")])
+def test_mean_vertical_force_is_body_weight(file_of, name):
     start, end, mass_kg = WEIGHTS[name]
-    plates = read_forces(measured_folder / f"{name}.mot")
+    plates = read_forces(file_of(f"{name}.mot"))
     during = (plates.time >= start) & (plates.time <= end)
     mean = plates.force[during, :, 1].sum(axis=1).mean() / GRAVITY
     assert mean == pytest.approx(mass_kg, rel=0.02)
 
 
-def test_point_of_application_is_kept_where_loaded(measured_folder):
-    plates = read_forces(measured_folder / "rajagopal_walk" / "grf_walk.mot")
+@pytest.mark.parametrize("name", here(["synthetic/walk_grf.mot", "rajagopal_walk/grf_walk.mot"]))
+def test_point_of_application_is_kept_where_loaded(file_of, name):
+    plates = read_forces(file_of(name))
     loaded = plates.force[:, 0, 1] > 100
     x = plates.moment[loaded, 0, 2] / plates.force[loaded, 0, 1]
     assert x.min() > -1.0

@@ -2,13 +2,15 @@ import pytest
 
 from kinertia.errors import FileError, MarkerSetError
 from kinertia.io.marker_set_file import choose_marker_set, preset_names, read_marker_set
-from kinertia.io.recording import read_recording
 from kinertia.model.marker_set import check_marker_set, nearest_labels
+from recordings import here
 
 STATICS = {
     "gait2354/subject01_static.trc": "Cleveland Clinic",
     "rajagopal_walk/static_walk_1.trc": "Rajagopal",
     "pig_c3d/subject_a_static.c3d": "Plug-in Gait",
+    "synthetic/static.trc": "Cleveland Clinic",
+    "synthetic/static.c3d": "Plug-in Gait",
     "pig_c3d/subject_b_static.c3d": "Plug-in Gait",
 }
 SMALL = """
@@ -21,13 +23,13 @@ pelvis = ["RA", "LA", "LB"]
 """
 
 
-@pytest.mark.parametrize(("path", "name"), STATICS.items())
-def test_each_preset_finds_its_own_files(measured_folder, path, name):
-    assert choose_marker_set(read_recording(measured_folder / path).markers.labels).name == name
+@pytest.mark.parametrize("path", here(STATICS))
+def test_each_preset_finds_its_own_files(recording_of, path):
+    assert choose_marker_set(recording_of(path).markers.labels).name == STATICS[path]
 
 
-def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(measured_folder):
-    known = read_recording(measured_folder / "subject4/static1.trc").markers.labels
+def test_a_set_without_preset_lists_what_is_missing_and_the_nearest_labels(recording_of):
+    known = recording_of("synthetic/static.trc").markers.labels
     labels = [f"{label}_1" for label in known]
     with pytest.raises(MarkerSetError, match=r"no marker-set preset fits.*nearest: ") as caught:
         choose_marker_set(labels)

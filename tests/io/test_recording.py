@@ -92,16 +92,15 @@ def test_statics_need_no_forces(files):
         assert recording.mass_kg is None
 
 
-def test_forces_of_a_force_file_go_before_those_of_the_c3d_file(files, measured_folder):
-    recording = read_recording(measured_folder / "pig_c3d" / "subject_b_static.c3d", files / "walk_grf.mot")
+def test_forces_of_a_force_file_go_before_those_of_the_c3d_file(files, c3d_lab):
+    recording = read_recording(c3d_lab / "walk.c3d", files / "walk_grf.mot")
     assert recording.plates.names == ("ground_force",)
-    assert recording.mass_kg == 47.5
-    assert "subject_b_static.c3d: its own force plates were not used, the force file was" in recording.notes
+    assert recording.mass_kg == pytest.approx(72.6)
+    assert "walk.c3d: its own force plates were not used, the force file was" in recording.notes
 
 
-def test_loads_file_alone_names_its_forces(measured_folder):
-    folder = measured_folder / "gait2354"
-    recording = read_recording(folder / "subject01_walk1.trc", loads_path=folder / "subject01_walk1_grf.xml")
+def test_loads_file_alone_names_its_forces(file_of):
+    recording = read_recording(file_of("synthetic/walk.trc"), loads_path=file_of("synthetic/walk_grf.xml"))
     assert recording.plates.declared_feet == ("r", "l")
     assert recording.plates.names == ("right", "left")
 

@@ -9,9 +9,11 @@ from kinertia.io.recording_date import recording_date, session_date
 from kinertia.io.subject_file import read_subject
 
 
-def test_files_that_say_it_and_files_that_do_not(measured_folder, c3d_lab, tmp_path):
-    assert recording_date(measured_folder / "c3d_variety" / "bts.c3d") == date(2019, 5, 24)
-    # Nexus wrote days of processing only
+def test_a_c3d_file_that_says_it(file_of):
+    assert recording_date(file_of("c3d_variety/bts.c3d")) == date(2019, 5, 24)
+
+
+def test_files_that_say_it_and_files_that_do_not(c3d_lab, tmp_path):
     assert recording_date(c3d_lab / "walk.c3d") is None
     (tmp_path / "walk.tsv").write_text("NO_OF_FRAMES\t2\nTIME_STAMP\t2024-02-29, 15:21:26.000\t1.5\n", encoding="utf-8")
     assert recording_date(tmp_path / "walk.tsv") == date(2024, 2, 29)

@@ -7,6 +7,7 @@ from hypothesis.extra import numpy as hnp
 
 from kinertia.errors import FileError
 from kinertia.io.sto import read_sto, read_table, write_sto
+from recordings import here
 
 HEADER = "walk\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\nendheader\n"
 TABLE = "time\ta\tb\n0\t1\t2\n0.5\t3\t4\n"
@@ -23,6 +24,7 @@ def write(tmp_path):
 
 
 REAL = {
+    "synthetic/walk_grf.mot": (2700, 18, False),
     "gait2354/opensim_results/ik.mot": (73, 23, True),
     "gait2354/opensim_results/inverse_dynamics.sto": (73, 23, False),
     "gait2354/subject01_walk1_grf.mot": (1501, 18, True),
@@ -32,13 +34,13 @@ REAL = {
 }
 
 
-@pytest.mark.parametrize("name", REAL)
-def test_real_files_as_opensim_reads_them(measured_folder, opensim, name):
+@pytest.mark.parametrize("name", here(REAL))
+def test_whole_files_as_opensim_reads_them(file_of, opensim, name):
     rows, columns, in_degrees = REAL[name]
-    table = read_sto(measured_folder / name)
+    table = read_sto(file_of(name))
     assert table.shape == (rows, columns)
     assert table.attrs["in_degrees"] is in_degrees
-    theirs = opensim.TimeSeriesTable(str(measured_folder / name))
+    theirs = opensim.TimeSeriesTable(str(file_of(name)))
     assert tuple(table.columns) == theirs.getColumnLabels()
     np.testing.assert_array_equal(table.to_numpy(), theirs.getMatrix().to_numpy())
     np.testing.assert_array_equal(table.index, theirs.getIndependentColumn())

@@ -10,9 +10,10 @@ from kinertia.errors import FileError
 from kinertia.io.recording import read_recording
 
 
+@pytest.mark.parametrize("name", ["pig_c3d/subject_a_walk.c3d"])
 @pytest.mark.parametrize("kind", ["tsv", pytest.param("csv", marks=pytest.mark.slow)])
-def test_a_measured_walk_comes_back(measured_folder, tmp_path, monkeypatch, kind):
-    walk = read_recording(measured_folder / "pig_c3d" / "subject_a_walk.c3d")
+def test_a_walk_comes_back(recording_of, tmp_path, monkeypatch, kind, name):
+    walk = recording_of(name)
     corners = np.stack([plate @ lab_files.LAB for plate in walk.plates.corners])
     x, y = (
         corners[:, one].mean(axis=1) - corners[:, two].mean(axis=1) for one, two in (([0, 3], [1, 2]), ([0, 1], [2, 3]))

@@ -9,6 +9,7 @@ from hypothesis.extra import numpy as hnp
 from kinertia.errors import FileError
 from kinertia.io.trc import read_trc, read_trc_recording, write_trc
 from kinertia.trial.data import Markers
+from recordings import here
 
 HEADER = (
     "PathFileType\t4\t(X/Y/Z)\tx.trc\n"
@@ -31,6 +32,8 @@ def write(tmp_path):
 
 
 REAL = {
+    "synthetic/static.trc": (20, 49, 100),
+    "synthetic/walk.trc": (270, 41, 100),
     "gait2354/subject01_static.trc": (300, 49, 60),
     "gait2354/subject01_walk1.trc": (151, 41, 60),
     "rajagopal_walk/motion_capture_walk.trc": (238, 41, 100),
@@ -41,20 +44,20 @@ REAL = {
 }
 
 
-@pytest.mark.parametrize("name", REAL)
-def test_real_files(measured_folder, name):
+@pytest.mark.parametrize("name", here(REAL))
+def test_whole_files(file_of, name):
     frames, count, rate = REAL[name]
-    markers = read_trc(measured_folder / name)
+    markers = read_trc(file_of(name))
     assert markers.positions.shape == (frames, count, 3)
     assert markers.rate_hz == pytest.approx(rate, rel=1e-9)
     height = np.nanmax(markers.positions[..., 1]) - np.nanmin(markers.positions[..., 1])
     assert 1.2 < height < 2.0
 
 
-@pytest.mark.parametrize("name", REAL)
-def test_real_files_as_opensim_reads_them(measured_folder, opensim, name):
-    table = opensim.TimeSeriesTableVec3(str(measured_folder / name))
-    markers = read_trc(measured_folder / name)
+@pytest.mark.parametrize("name", here(REAL))
+def test_whole_files_as_opensim_reads_them(file_of, opensim, name):
+    table = opensim.TimeSeriesTableVec3(str(file_of(name)))
+    markers = read_trc(file_of(name))
     assert markers.labels == table.getColumnLabels()
     scale = 1000.0 if "subject4" not in name else 1.0
     for frame in (0, len(markers.time) // 2, len(markers.time) - 1):
@@ -63,8 +66,8 @@ def test_real_files_as_opensim_reads_them(measured_folder, opensim, name):
         np.testing.assert_allclose(scale * markers.positions[frame], theirs, atol=1e-6, equal_nan=True)
 
 
-def test_rounded_times_are_put_back_on_their_grid(measured_folder):
-    recording = read_trc_recording(measured_folder / "gait2354" / "subject01_walk1.trc")
+def test_rounded_times_are_put_back_on_their_grid(file_of):
+    recording = read_trc_recording(file_of("gait2354/subject01_walk1.trc"))
     markers, notes = recording.markers, recording.notes
     assert recording.length_unit == "mm"
     np.testing.assert_allclose(markers.time, np.arange(151) / 60, atol=1e-12)

@@ -30,6 +30,8 @@ _WORDS = {
     "forearm": ("ulna", "radius", "forearm", "lowerarm", "hand", "wrist"),
 }
 """How the names of the bodies of each segment begin."""
+_LEAST_LENGTH_M = 0.01
+"""Joints nearer to each other are a mistake in the model: they tell neither length nor direction of a segment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +157,7 @@ def _segment_frame(segment: str, body: Place, centres: Mapping[str, FloatArray])
     ends |= {"upper_arm": ("shoulder", "elbow"), "forearm": ("elbow", "wrist")}
     if segment[:-2] in ends:
         near, far = (centres.get(name + side) for name in ends[segment[:-2]])
-        if near is not None and far is not None:
+        if near is not None and far is not None and np.linalg.norm(near - far) > _LEAST_LENGTH_M:
             rotation = frame(near - far, rotation[:, 2])
         return rotation, origin if near is None else near
     if segment[:-2] == "foot":
@@ -181,7 +183,8 @@ def _geometry(
         for name, (near, far) in ends.items():
             if f"{near}_{side}" in centres and f"{far}_{side}" in centres:
                 length = float(np.linalg.norm(centres[f"{near}_{side}"] - centres[f"{far}_{side}"]))
-                lengths[f"{name}_{side}"] = length
+                if length > _LEAST_LENGTH_M:
+                    lengths[f"{name}_{side}"] = length
     x, y, z = lumbar
     u, v, w = mid_hip
     return BodyGeometry((float(x), float(y), float(z)), (float(u), float(v), float(w)), lengths)

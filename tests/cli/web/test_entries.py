@@ -42,7 +42,7 @@ def used(person):
 
 
 GAIT2354 = ("subject01_static.trc", "subject01_walk1.trc", "subject01_walk1_grf.mot", "subject01_walk1_grf.xml")
-RAJAGOPAL = ("static_walk_1.trc", "motion_capture_walk.trc", "grf_walk.mot", "grf_walk.xml")
+LAB = ("static.trc", "walk.trc", "walk_grf.mot", "walk_grf.xml")
 
 
 def test_c3d_files_are_recognised_and_what_lacks_is_said_as_by_the_command_line(person, c3d_lab):
@@ -58,40 +58,40 @@ def test_c3d_files_are_recognised_and_what_lacks_is_said_as_by_the_command_line(
     assert wanted.subject.name == "Anna"
 
 
-def test_forces_and_loads_go_with_their_walk(person, measured_folder):
-    put(person, measured_folder / "gait2354", *GAIT2354)
+def test_forces_and_loads_go_with_their_walk(person, sample_walk):
+    put(person, sample_walk / "gait2354", *GAIT2354)
     recognise(person)
     walk = "subject01_walk1.trc"
     assert used(person) == dict(zip(GAIT2354, ("static", "trial", f"forces:{walk}", f"loads:{walk}"), strict=True))
 
 
-def test_a_model_takes_the_place_of_a_static_trial_that_is_not_there(person, measured_folder):
-    put(person, measured_folder / "rajagopal_walk", *RAJAGOPAL[1:], "scaled.osim")
+def test_a_model_takes_the_place_of_a_static_trial_that_is_not_there(person, synthetic_lab):
+    put(person, synthetic_lab, *LAB[1:], "scaled.osim")
     recognise(person)
-    walk = "motion_capture_walk.trc"
-    assert used(person) == {walk: "trial", "grf_walk.mot": f"forces:{walk}", "grf_walk.xml": f"loads:{walk}"} | {
+    walk = "walk.trc"
+    assert used(person) == {walk: "trial", "walk_grf.mot": f"forces:{walk}", "walk_grf.xml": f"loads:{walk}"} | {
         "scaled.osim": "osim"
     }
-    write_form(person, {"mass_kg": "85"})
+    write_form(person, {"mass_kg": "72.6"})
     assert trouble(person) == ""
 
 
-def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, measured_folder):
-    put(person, measured_folder / "rajagopal_walk", *RAJAGOPAL, "scaled.osim")
+def test_a_model_that_is_chosen_puts_the_static_trial_aside(person, synthetic_lab):
+    put(person, synthetic_lab, *LAB, "scaled.osim")
     recognise(person)
-    assert used(person)["static_walk_1.trc"] == "static"
+    assert used(person)["static.trc"] == "static"
     assert "scaled.osim" not in used(person)
-    write_form(person, {USE + "scaled.osim": "osim", "mass_kg": "85"})
+    write_form(person, {USE + "scaled.osim": "osim", "mass_kg": "72.6"})
     assert used(person)["scaled.osim"] == "osim"
-    assert "static_walk_1.trc" not in used(person)
+    assert "static.trc" not in used(person)
     assert trouble(person) == ""
-    write_form(person, {USE + "scaled.osim": "", USE + "static_walk_1.trc": "static", "sex": "male"})
-    assert used(person)["static_walk_1.trc"] == "static"
+    write_form(person, {USE + "scaled.osim": "", USE + "static.trc": "static", "sex": "male"})
+    assert used(person)["static.trc"] == "static"
     assert trouble(person) == ""
 
 
-def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person, measured_folder):
-    put(person, measured_folder / "gait2354", *GAIT2354)
+def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person, sample_walk):
+    put(person, sample_walk / "gait2354", *GAIT2354)
     recognise(person)
     static, walk, forces, _ = GAIT2354
     text = person.subject.read_text(encoding="utf-8")
@@ -117,8 +117,8 @@ def test_a_trial_that_is_used_again_has_its_forces_loads_and_window_again(person
     assert forces not in used(person)
 
 
-def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, measured_folder):
-    put(person, measured_folder / "gait2354", *GAIT2354)
+def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, sample_walk):
+    put(person, sample_walk / "gait2354", *GAIT2354)
     recognise(person)
     static, walk, forces, _ = GAIT2354
     shutil.copyfile(person.folder / forces, person.folder / "other_grf.mot")
@@ -128,19 +128,20 @@ def test_forces_that_were_chosen_since_go_before_those_that_a_trial_had(person, 
     assert forces not in used(person)
 
 
-def test_forces_of_a_static_trial_are_said_to_be_that(person, measured_folder):
-    put(person, measured_folder / "subject4", "static1.trc", "static1_grf.mot")
+def test_forces_of_a_static_trial_are_said_to_be_that(person, synthetic_lab):
+    for source, name in (("static.trc", "static1.trc"), ("walk_grf.mot", "static1_grf.mot")):
+        shutil.copyfile(synthetic_lab / source, person.folder / name)
     recognise(person)
     (row,) = [row for row in file_table(person.files(), entries(person)) if row.name == "static1_grf.mot"]
     assert row.kind == "forces of a static trial, by its name: not needed, of that only the markers are used"
     assert row.use == ""
 
 
-def test_forces_of_another_person_are_not_taken(tmp_path, measured_folder):
+def test_forces_of_another_person_are_not_taken(tmp_path, sample_walk):
     library = Library(tmp_path)
     anna, ben = library.add("Anna"), library.add("Ben")
-    put(anna, measured_folder / "gait2354", *GAIT2354[:2])
-    put(ben, measured_folder / "gait2354", *GAIT2354[2:])
+    put(anna, sample_walk / "gait2354", *GAIT2354[:2])
+    put(ben, sample_walk / "gait2354", *GAIT2354[2:])
     recognise(anna)
     assert used(anna) == {GAIT2354[0]: "static", GAIT2354[1]: "trial"}
 

@@ -31,9 +31,9 @@ def person(tmp_path, c3d_lab):
     return person
 
 
-def renamed(measured_folder, person, names):
-    """The static trial of gait2354 with labels that no preset has."""
-    text = (measured_folder / "gait2354" / "subject01_static.trc").read_text()
+def renamed(sample_walk, person, names):
+    """The static trial of the sample walk with labels that no preset has."""
+    text = (sample_walk / "gait2354" / "subject01_static.trc").read_text()
     for old, new in names.items():
         text = text.replace(old, new)
     (person.folder / "static.trc").write_text(text)
@@ -82,18 +82,18 @@ def test_what_makes_no_set_is_said_and_leaves_nothing(person):
     assert entries(person) == WALK
 
 
-def test_places_are_guessed_where_no_set_fits_and_what_lacks_is_listed(person, measured_folder):
-    labels = read_trc(measured_folder / "gait2354" / "subject01_static.trc").labels
-    renamed(measured_folder, person, {label: f"Q{k:02d}" for k, label in enumerate(labels) if "Thigh" in label})
+def test_places_are_guessed_where_no_set_fits_and_what_lacks_is_listed(person, sample_walk):
+    labels = read_trc(sample_walk / "gait2354" / "subject01_static.trc").labels
+    renamed(sample_walk, person, {label: f"Q{k:02d}" for k, label in enumerate(labels) if "Thigh" in label})
     places = marker_places(person)
     assert not places.unknown or all(label.startswith("Q") for label in places.unknown)
     assert set(places.missing) == {label for label in labels if "Thigh" in label}
 
 
-def test_markers_of_a_model_are_its_own(person, measured_folder):
-    for name in ("motion_capture_walk.trc", "scaled.osim"):
-        shutil.copyfile(measured_folder / "rajagopal_walk" / name, person.folder / name)
-    write(person, {"model": {"osim": "scaled.osim"}, "trial": [{"markers": "motion_capture_walk.trc"}]})
+def test_markers_of_a_model_are_its_own(person, synthetic_lab):
+    for name in ("walk.trc", "scaled.osim"):
+        shutil.copyfile(synthetic_lab / name, person.folder / name)
+    write(person, {"model": {"osim": "scaled.osim"}, "trial": [{"markers": "walk.trc"}]})
     places = marker_places(person)
     assert places.of_model
     with pytest.raises(SettingsError, match="in its file"):
