@@ -266,7 +266,7 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch, 
     with_everything(person, c3d_lab)
     tab = Tab(browser, app).home()
     page = tab.page
-    for control in ("Choose files", "Choose a folder", "Try it with a measured walk", "Compare Keyboard"):
+    for control in ("Choose files", "Choose a folder", "Try it with a synthetic person", "Compare Keyboard"):
         press(page, control, "Shift")
     press(page, "Keyboard")
     tab.arrived()

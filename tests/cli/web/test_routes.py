@@ -12,16 +12,19 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 
 from app_server import running
+from kinertia.cli.measured_demo import write_measured_lab
+from kinertia.cli.synthetic_demo import write_synthetic_lab
 from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
+from kinertia.io import samples
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_file import read_subject
 from kinertia.report.measures_picture import measures_picture
 
 
 @pytest.fixture
-def app(tmp_path, c3d_lab):
-    with running(tmp_path / "library", c3d_lab) as served:
+def app(tmp_path):
+    with running(tmp_path / "library") as served:
         yield served
 
 
@@ -127,6 +130,34 @@ def test_estimate_takes_what_is_in_the_form(app, c3d_lab, monkeypatch):
     assert refused.status == 422
     assert "is not a number; write it like 72.6" in refused.text
     assert added == ["fit", "fit"]
+
+
+def test_people_to_try_it_with(tmp_path, sample_walk, monkeypatch):
+    added = []
+    monkeypatch.setattr(Jobs, "add", lambda self, person, kind: added.append((person.name, kind)))
+    with running(tmp_path / "library", {"measured": write_measured_lab, "synthetic": write_synthetic_lab}) as app:
+        home = app.ask("/").text
+        assert "Try it with a measured walk" in home
+        assert "Try it with a synthetic person" in home
+        for kind in ("measured", "synthetic"):
+            assert app.post(f"/example/{kind}").status == 303
+        assert app.post("/example/other").status == 404
+        people = {person.name: read_subject(person.subject) for person in app.library.people()}
+    assert added == [("Example, measured", "check"), ("Example, synthetic", "check")]
+    assert people["Example, measured"].trials[0].markers.name == "subject01_walk1.trc"
+    assert people["Example, synthetic"].subject.name == "synthetic walker"
+
+
+def test_where_there_is_no_network_the_synthetic_person_is_offered(tmp_path, monkeypatch):
+    monkeypatch.setenv(samples.VARIABLE, str(tmp_path / "nothing"))
+    monkeypatch.setattr(samples, "URL", "http://127.0.0.1:9/")
+    with running(tmp_path / "library", {"measured": write_measured_lab, "synthetic": write_synthetic_lab}) as app:
+        answer = app.post("/example/measured")
+        assert answer.status == 422
+        assert "the sample walk is not available" in answer.text
+        assert "Try it with a synthetic person" in answer.text
+        assert "Try it with a measured walk" not in answer.text
+        assert app.library.people() == []
 
 
 def test_text_that_cannot_be_read_is_shown_again(app):
