@@ -170,7 +170,7 @@ def _plug_in_gait(skeleton: Skeleton) -> list[Marker]:
             f"{side}ELB": (f"upper_arm_{own}", beside(f"{side}.Elbow")),
             f"{side}WRA": (f"forearm_{own}", beside(f"{side}.Wrist.Med")),
             f"{side}WRB": (f"forearm_{own}", beside(f"{side}.Wrist.Lat")),
-            f"{side}FIN": (f"forearm_{own}", beside(f"{side}.Wrist.Lat", y=-0.08)),
+            f"{side}FIN": (f"forearm_{own}", beside(f"{side}.Wrist.Lat", x=0.03 * sign, y=-0.08 - 0.02 * sign)),
             f"{side}ASI": ("pelvis", beside(f"{side}.ASIS")),
             f"{side}PSI": ("pelvis", beside("V.Sacral", z=0.045 * sign)),
             f"{side}THI": (f"thigh_{own}", beside(f"{side}.Knee.Lat", y=0.18, z=0.02 * sign)),

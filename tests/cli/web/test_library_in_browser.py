@@ -29,10 +29,10 @@ def ready(library, name, c3d_lab):
 
 
 @pytest.fixture
-def waiting(monkeypatch, app):
+def waiting(monkeypatch, app, c3d_lab):
     """A person whose fit does not end by itself."""
     monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", WAITING))
-    return ready(app.library, "Waiting")
+    return ready(app.library, "Waiting", c3d_lab)
 
 
 def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
@@ -58,12 +58,12 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
         one.quiet()
 
 
-def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
+def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3d_lab):
     """A tab that shows the answer to a form shows the person's page when the fit is done."""
     go = tmp_path / "go"
     code = f"import os, time\nwhile not os.path.exists({str(go)!r}): time.sleep(0.05)"
     monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", code))
-    person = ready(app.library, "Copied")
+    person = ready(app.library, "Copied", c3d_lab)
     person.results.mkdir()
     (person.results / "fit.json").write_text('{"kinertia": "x"}')
     tab = Tab(browser, app)
@@ -84,12 +84,12 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path):
     page.close()
 
 
-def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch):
+def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch, c3d_lab):
     crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
     monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", crash))
     tab = Tab(browser, app)
     for name, said in (("Crashing", "Kinertia failed"), ("Next", "")):
-        tab.page.goto(f"{app.address}people/{ready(app.library, name).name}")
+        tab.page.goto(f"{app.address}people/{ready(app.library, name, c3d_lab).name}")
         tab.estimate()
         playwright.expect(tab.page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
         messages = tab.page.locator("section[aria-labelledby=results] .message.fail")
@@ -129,7 +129,7 @@ def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run,
 
 
 def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_lab):
-    person = ready(app.library, "Person to rename")
+    person = ready(app.library, "Person to rename", c3d_lab)
     with_everything(person, c3d_lab)
     outcome = json.loads((person.results / "outcome.json").read_text())
     (person.results / "outcome.json").write_text(json.dumps({**outcome, "inputs": person.inputs}))
