@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from kinertia.motion.frames_at_once import pieces
 
@@ -150,11 +151,12 @@ def _correlation(errors: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.
     n, m = len(errors), len(other)
     power = np.sqrt(np.square(errors).mean() * np.square(other).mean()) * n * errors.shape[1]
     size = n + m - 1
-    spectrum = np.zeros(size // 2 + 1, dtype=complex)
+    padded = next_fast_len(size, real=True)
+    spectrum = np.zeros(padded // 2 + 1, dtype=complex)
     for some in pieces(errors.shape[1], _COLUMNS_AT_ONCE):
-        ours, theirs = (np.fft.rfft(each[:, some], size, axis=0) for each in (errors, other))
+        ours, theirs = (np.fft.rfft(each[:, some], padded, axis=0) for each in (errors, other))
         spectrum += (ours.conj() * theirs).sum(axis=1)
-    alike = np.roll(np.fft.irfft(spectrum, size), n - 1)
+    alike = np.roll(np.fft.irfft(spectrum, padded), n - 1)[:size]
     lags = np.arange(1 - n, m)
     overlap = np.minimum(n, m - lags) - np.maximum(0, -lags)
     return alike / power if power > 0 else np.zeros(size), overlap
