@@ -13,6 +13,7 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 from urllib.parse import urlsplit
 
 import platformdirs
@@ -58,11 +59,15 @@ def sample_walk(progress: Callable[[str, float], None] = lambda stage, share: No
     folder = samples_folder() / NAME
     missing = [name for name, expected in SHA256.items() if _sha256(folder / name) != expected]
     if missing and find_spec("pooch") is None:
-        raise _unavailable(folder, missing, "pooch, which downloads it, is not installed", f"install it ({_HOW})")
+        raise _unavailable(
+            folder, missing, _Failure("pooch, which downloads it, is not installed", f"install it ({_HOW})")
+        )
     for k, name in enumerate(missing):
         share = _Share(partial(_of_all, progress, k, len(missing)))
-        if problem := _downloaded(name, folder, share):
-            raise _unavailable(folder, missing[k:], problem, "name a proxy in HTTPS_PROXY")
+        share.tell(0.0)
+        if failure := _downloaded(name, folder, share):
+            raise _unavailable(folder, missing[k:], failure)
+        share.tell(1.0)
     return folder
 
 
@@ -79,33 +84,63 @@ def _sha256(path: Path) -> str:
         return ""
 
 
-def _downloaded(name: str, folder: Path, share: _Share) -> str:
+class _Failure(NamedTuple):
+    """Why there is no file, and what else than downloading by hand may help."""
+
+    problem: str
+    instead: str
+
+
+def _downloaded(name: str, folder: Path, share: _Share) -> _Failure | None:
     """Download a file; why not, where that fails."""
     import pooch
     import requests
 
     server = urlsplit(URL).netloc
     pooch.get_logger().setLevel("WARNING")  # it announces every file otherwise
-    one = pooch.create(folder, URL, registry={name: f"sha256:{SHA256[name]}"})
     try:
+        one = pooch.create(folder, URL, registry={name: f"sha256:{SHA256[name]}"})
         one.fetch(name, downloader=pooch.HTTPDownloader(progressbar=share, timeout=_TIMEOUT_S))
-    except requests.Timeout:
-        return f"{server} did not answer within {_TIMEOUT_S} s"
     except requests.HTTPError as error:
-        return f"{server} answered {'' if error.response is None else error.response.status_code} for {name}"
-    except requests.RequestException:
-        return f"there is no connection to {server}"
+        status = "" if error.response is None else error.response.status_code
+        return _Failure(f"{server} answered {status} for {name}", "try again later")
+    except requests.RequestException as error:
+        return _no_answer(server, error)
     except ValueError:
-        return f"what {server} sent as {name} is not the expected file (by its SHA-256)"
+        problem = f"what {server} sent as {name} is not the expected file (by its SHA-256)"
+        return _Failure(problem, "log in to your network in a browser if it asks for that, and try again")
     except OSError as error:
-        return f"{error.filename or folder} cannot be written: {error.strerror or error}"
-    return ""
+        reason = error.__cause__ if isinstance(error.__cause__, OSError) else error  # pooch adds words of its own
+        problem = f"{reason.filename or folder} cannot be written: {reason.strerror or reason}"
+        return _Failure(problem, f"name another folder in the environment variable {VARIABLE}")
+    return None
 
 
-def _unavailable(folder: Path, names: Iterable[str], problem: str, instead: str) -> KinertiaError:
+def _no_answer(server: str, error: Exception) -> _Failure:
+    """Why nothing, or not all, came from the server."""
+    import requests
+    from urllib3.exceptions import ReadTimeoutError
+
+    if isinstance(error, requests.exceptions.SSLError):
+        reason = getattr(error.args[0], "reason", error) if error.args else error
+        problem = f"no encrypted connection to {server} is possible ({reason})"
+        return _Failure(problem, "name the file of your network's certificates in REQUESTS_CA_BUNDLE")
+    if isinstance(error, requests.exceptions.ProxyError):
+        problem = f"there is no connection to {server} through the proxy that the environment names"
+        return _Failure(problem, "correct HTTPS_PROXY")
+    if isinstance(error, requests.exceptions.ChunkedEncodingError):
+        return _Failure(f"the connection to {server} broke off", "try again")
+    hangs = isinstance(error, requests.Timeout) or any(isinstance(cause, ReadTimeoutError) for cause in error.args)
+    problem = f"{server} did not answer within {_TIMEOUT_S} s" if hangs else f"there is no connection to {server}"
+    return _Failure(problem, "if your network has a proxy, name it in HTTPS_PROXY")
+
+
+def _unavailable(folder: Path, names: Iterable[str], failure: _Failure) -> KinertiaError:
+    others = [name for name in names if os.path.lexists(folder / name)]
+    wanted = ", ".join(f"{name} (the one that is there is another)" if name in others else name for name in names)
     return KinertiaError(
-        f"the sample walk is not available: {problem}; {instead}, or download {', '.join(names)} from {URL} yourself "
-        f"and put them into {folder}"
+        f"the sample walk is not available: {failure.problem}; {failure.instead}, or download {wanted} from {URL} "
+        f"yourself and put them into {folder}"
     )
 
 
@@ -115,10 +150,14 @@ class _Share:
     def __init__(self, progress: Callable[[float], None]) -> None:
         self._progress, self._done, self.total = progress, 0, 0
 
+    def tell(self, share: float) -> None:
+        """So much of the file has come, from 0 to 1."""
+        self._progress(share)
+
     def update(self, count: int) -> None:
         """So many more have come."""
         self._done += count
-        self._progress(min(self._done / self.total, 1.0) if self.total else 0.0)
+        self.tell(min(self._done / self.total, 1.0) if self.total else 0.0)
 
     def reset(self) -> None:
         """From the beginning."""
