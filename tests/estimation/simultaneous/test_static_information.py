@@ -37,7 +37,7 @@ def test_solution_of_all_unknowns(singular_first, n, alike):
 
     In these the condition number is 81 and not 9e17, the least that units can make of it within a factor of nine. Where
     the unknowns are as large in their own units, the first is a million times surer than most others, and rounding
-    what it contributes to their equations moves these by 1e-9 (and the fourth by 1e-6), however exactly one solves them.
+    what it contributes to their equations moves these by 1e-9 (the fourth by 1e-6), however exactly one solves them.
     """
     unit = 1.0 / np.sqrt(np.diag(singular_first))
     solution = (np.arange(9.0) - 4.0) * (unit if alike else 1.0)
