@@ -32,7 +32,7 @@ from measured_data import data_folder, find
 from once import once
 from quick_two_level import given_back
 from recordings import SYNTHETIC, is_here
-from synthetic_lab import write_synthetic_lab
+from synthetic_lab import WITH_MODEL, synthetic_arguments, write_synthetic_lab
 from walks import fit_arguments
 
 # no test judges time: machines are busy
@@ -138,13 +138,16 @@ def browser():
 
 
 @pytest.fixture(scope="session")
-def fit_of(measured_folder, tmp_path_factory):
-    """Results of `kinertia fit` for a measured walk, by its name in `walks.WALKS`; run once."""
+def fit_of(request, synthetic_lab, tmp_path_factory):
+    """Results of `kinertia fit` for a walk, by its name in `walks.WALKS`, or the "synthetic" one; run once."""
     done = {}
 
     def get(name):
         if name not in done:
-            arguments = fit_arguments(measured_folder, name)
+            if name == "synthetic":
+                arguments = synthetic_arguments(synthetic_lab)
+            else:
+                arguments = fit_arguments(request.getfixturevalue("measured_folder"), name)
             done[name] = once(
                 tmp_path_factory, f"fit-{name}", lambda made: fitted(made / "results" / "out", *arguments)
             )
@@ -154,14 +157,17 @@ def fit_of(measured_folder, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def fit_with_model(measured_folder, tmp_path_factory):
+def fit_with_model(request, synthetic_lab, tmp_path_factory):
     """Folder of results of `kinertia fit` with a user's model, by person and calibration; run once."""
     done: dict[tuple[str, bool], Path] = {}
 
     def get(name: str, calibrate: bool) -> Path:
         def make(folder: Path) -> Path:
             subject = folder / f"{name}.toml"
-            subject.write_text(osim_models.subject_file(measured_folder, osim_models.PEOPLE[name], calibrate))
+            own = name == "synthetic"
+            data = synthetic_lab if own else request.getfixturevalue("measured_folder")
+            person = WITH_MODEL if own else osim_models.PEOPLE[name]
+            subject.write_text(osim_models.subject_file(data, person, calibrate))
             return fitted(folder / "out", subject).folder
 
         if (name, calibrate) not in done:

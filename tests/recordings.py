@@ -43,3 +43,13 @@ WALKS = named_here(
     }
 )
 """Markers and forces of sound walks, as the fixture `recording_of` takes them."""
+FITTED = named_here(
+    {
+        "synthetic": "synthetic/walk.trc",
+        "gait2354": "gait2354/subject01_walk1.trc",
+        "rajagopal": "rajagopal_walk/motion_capture_walk.trc",
+        "pig_a": "pig_c3d/subject_a_walk.c3d",
+        "pig_b": "pig_c3d/subject_b_walk.c3d",
+    }
+)
+"""Markers of walks by the names that the fixture `fit_of` takes (`fit_with_model`: the first three)."""

@@ -34,6 +34,7 @@ from kinertia.synthetic.walk import (
     without_products,
 )
 from kinertia.trial.data import Markers, Recording
+from osim_models import Person
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _MARKER_DIAMETER_M = 0.014
@@ -55,6 +56,17 @@ _FORCE = """      <ExternalForce name="{name}">
         <point_identifier>{plate}_ground_force_p</point_identifier>
         <torque_identifier>{plate}_ground_torque_</torque_identifier>
       </ExternalForce>"""
+
+
+WITH_MODEL = Person("synthetic", MASS_KG, "scaled", {"walk": ("walk_grf", "walk_grf")})
+"""The person with the scaled model."""
+
+
+def synthetic_arguments(folder: Path) -> list[str]:
+    """Arguments of `kinertia fit` for `walk.trc` in the laboratory's folder."""
+    walked, static = folder / "walk", folder / "static.trc"
+    files = [f"{walked}.trc", "--forces", f"{walked}_grf.mot", "--loads", f"{walked}_grf.xml", "--static", str(static)]
+    return [*files, "--mass", str(MASS_KG), "--height", str(HEIGHT_M), "--sex", SEX]
 
 
 def write_synthetic_lab(folder: Path) -> Path:

@@ -10,9 +10,10 @@ from kinertia.io.marker_set_file import choose_marker_set
 from recordings import WALKS
 
 
-def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(recording_of):
+@pytest.mark.parametrize("name", [name for name in WALKS if name in ("synthetic c3d", "plug-in gait b")])
+def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(recording_of, name):
     """Played backwards, a walk obeys the same laws."""
-    walk = recording_of(*WALKS["plug-in gait b"])
+    walk = recording_of(*WALKS[name])
     plates, markers = walk.plates, walk.markers
     then = markers.time[0] + markers.time[-1] - plates.time
     turned = {
@@ -30,10 +31,11 @@ def test_loads_that_begin_under_the_toes_of_somebody_who_walks_backwards(recordi
     assert trial_doubts(backwards, marker_set, None, feet) == []
 
 
+@pytest.mark.parametrize("name", [name for name in WALKS if name in ("synthetic", "gait2354")])
 @pytest.mark.parametrize("lost", ["Toe", "Heel"])
-def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(recording_of, lost):
+def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(recording_of, lost, name):
     """Seen from the rest of the markers, loads begin or end off the foot; the plates are where they were."""
-    walk = recording_of(*WALKS["gait2354"])
+    walk = recording_of(*WALKS[name])
     marker_set = choose_marker_set(walk.markers.labels)
     kept = [label for label in walk.markers.labels if lost not in label]
     assert len(kept) < len(walk.markers.labels)
@@ -42,7 +44,7 @@ def test_feet_without_a_marker_at_one_end_do_not_tell_where_loads_belong(recordi
 
 
 def test_a_single_frame_is_no_motion(recording_of):
-    walk = recording_of("gait2354/subject01_walk1.trc")
+    walk = recording_of("synthetic/walk.trc")
     (doubt,) = trial_doubts(replace(walk, markers=walk.markers.cut(0.0, 0.0)), None, None, None)
     assert doubt.refused
     assert "a single frame shows no motion" in doubt.sentence

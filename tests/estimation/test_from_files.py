@@ -4,26 +4,38 @@ from kinertia.errors import SettingsError
 from kinertia.estimation.from_files import prepare_subject, read_inputs, read_trials
 from kinertia.io.subject_file import read_subject, with_settings
 from kinertia.settings import KnownSegment
-from osim_models import PEOPLE, subject_file
+
+SUBJECT = """
+[subject]
+mass_kg = 72.6
+[model]
+osim = "{lab}/scaled.osim"
+[[trial]]
+markers = "{lab}/walk.trc"
+forces = "{lab}/walk_grf.mot"
+[[trial]]
+markers = "{lab}/other.trc"
+forces = "{lab}/other_grf.mot"
+"""
 
 
 @pytest.fixture
-def subject(measured_folder, tmp_path):
+def subject(synthetic_lab, tmp_path):
     path = tmp_path / "subject.toml"
-    path.write_text(subject_file(measured_folder, PEOPLE["subject4"], False))
+    path.write_text(SUBJECT.format(lab=synthetic_lab.as_posix()))
     return read_subject(path)
 
 
 def test_columns_of_two_force_files_are_plates_of_their_own(subject):
-    """In subject4's walks one column holds two steps in two places: it is a foot's, not a plate's."""
-    walking1, walking2, _ = (item.recording.plates.names for item in read_trials(subject))
-    assert walking1 == ("ForcePlate1 (walking1)", "ForcePlate2 (walking1)")
-    assert not set(walking1) & set(walking2)
+    """One column may hold two steps in two places (subject4's walks): it is a foot's, not a plate's."""
+    walk, other = (item.recording.plates.names for item in read_trials(subject))
+    assert walk == ("1_ground_force (walk)", "2_ground_force (walk)")
+    assert not set(walk) & set(other)
 
 
 def test_one_trial_keeps_its_names(subject):
     (item,) = read_trials(subject.model_copy(update={"trials": subject.trials[:1]}))
-    assert item.recording.plates.names == ("ForcePlate1", "ForcePlate2")
+    assert item.recording.plates.names == ("1_ground_force", "2_ground_force")
 
 
 def test_a_static_trial_is_missing_where_one_is_needed(subject):

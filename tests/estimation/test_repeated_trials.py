@@ -13,7 +13,7 @@ from recordings import WALKS
 
 @pytest.fixture(scope="module")
 def walk(recording_of):
-    return recording_of(*WALKS["plug-in gait a"])
+    return recording_of(*WALKS["synthetic c3d"])
 
 
 def test_a_recording_that_is_listed_twice(walk):
@@ -23,8 +23,8 @@ def test_a_recording_that_is_listed_twice(walk):
 
 
 def test_two_windows_of_a_recording(walk):
-    assert repeated_trials([walk, walk], [(2.7, 3.0), (3.0, 3.4)]) == []
-    assert len(repeated_trials([walk, walk], [(2.7, 3.1), (3.0, 3.4)])) == 1
+    assert repeated_trials([walk, walk], [(1.2, 1.5), (1.5, 1.9)]) == []
+    assert len(repeated_trials([walk, walk], [(1.2, 1.6), (1.5, 1.9)])) == 1
 
 
 def other_markers(walk):
@@ -44,7 +44,7 @@ def test_forces_of_the_other_trial(walk):
     other = other_markers(walk)
     (warning,) = repeated_trials([walk, other], [None, None])
     assert f"'{walk.name}' and 'walk 2' have the same forces to the last digit, but not the same markers" in warning
-    assert repeated_trials([walk, other], [(2.7, 3.0), (3.0, 3.4)]) == []
+    assert repeated_trials([walk, other], [(1.2, 1.5), (1.5, 1.9)]) == []
 
 
 def test_pieces_of_a_recording_may_have_the_forces_of_the_whole(walk):
@@ -57,7 +57,7 @@ def test_pieces_of_a_recording_may_have_the_forces_of_the_whole(walk):
 
 
 def test_the_fit_says_so(walk, recording_of):
-    static = recording_of("pig_c3d/subject_a_static.c3d")
-    subject = Subject(name="A", sex="male", mass_kg=41.5, height_m=1.61)
+    static = recording_of("synthetic/static.c3d")
+    subject = Subject(name="A", sex="male", mass_kg=72.6, height_m=1.803)
     ready = prepare(subject, static, [TrialInput(walk), TrialInput(replace(walk, name="walk 2"))])
     assert any("have the same markers to the last digit" in warning for warning in ready.warnings)

@@ -16,9 +16,17 @@ from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_time import nearest_samples, span_s
-from recordings import WALKS
+from recordings import WALKS, named_here
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")
+SEVERAL = WALKS | named_here({"subject4": SUBJECT4})
+OF_MODELS = named_here(
+    {
+        "synthetic": ("synthetic/scaled.osim", *WALKS["synthetic"]),
+        "subject4": ("subject4/addbiomechanics_scaled.osim", *SUBJECT4),
+    }
+)
+MASS_KG = {"synthetic": 72.6, "subject4": 60.0}
 LATER_S = (5.0, 10.0, 20.0, 1234.567)
 
 
@@ -56,9 +64,9 @@ def test_as_many_knots(spacing_s):
         np.testing.assert_array_equal(shifted.first, MotionBasis(time, spacing_s).first)
 
 
-@pytest.mark.parametrize("name", [*WALKS, "subject4"])
+@pytest.mark.parametrize("name", SEVERAL)
 def test_the_same_frames_and_doubts(recording_of, name):
-    recording = recording_of(*(SUBJECT4 if name == "subject4" else WALKS[name]))
+    recording = recording_of(*SEVERAL[name])
     if name == "subject4":
         marker_set = read_marker_set(Path(__file__).parents[1] / "subject4.toml")
     else:
@@ -79,12 +87,13 @@ def test_the_same_frames_and_doubts(recording_of, name):
         assert found(later(recording, by_s)) == as_read
 
 
-def test_the_same_estimate(measured_folder, recording_of):
-    """In this walk one knot more than 39 made the forces 4.8 ms late and lumbar moments 4.5 N m larger."""
-    model = read_osim(measured_folder / "subject4" / "addbiomechanics_scaled.osim")
-    walk = recording_of(*SUBJECT4)
+@pytest.mark.parametrize("name", OF_MODELS)
+def test_the_same_estimate(file_of, recording_of, name):
+    """In subject4's walk one knot more than 39 made the forces 4.8 ms late and lumbar moments 4.5 N m larger."""
+    model_file, *files = OF_MODELS[name]
+    model, walk = read_osim(file_of(model_file)), recording_of(*files)
     first, *others = (
-        estimate_bsp_of_model(Subject(mass_kg=60.0), model, [TrialInput(one)])
+        estimate_bsp_of_model(Subject(mass_kg=MASS_KG[name]), model, [TrialInput(one)])
         for one in (walk, later(walk, 5.0), later(walk, 10.0))
     )
     loads, sd = first.trials[0].joint_loads["estimate"], first.trials[0].deviations.moments

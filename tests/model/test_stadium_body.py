@@ -1,32 +1,28 @@
 """Yeadon's body in the built-in model's segments, against the package that made the solids."""
 
-import csv
-from importlib.resources import files
-
 import numpy as np
 import pytest
 
 from kinertia.errors import PriorError
 from kinertia.model.bsp import combine
-from kinertia.model.measures import measures, sample_people
+from kinertia.model.measures import measures
 from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, stadium_bsp
+from stadium_people import stadium_people
 
 yeadon = pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
-NAMES = sample_people().names
+NAMES = tuple(stadium_people())
 CUT_M = 0.08
 
 
 def package_person(name):
-    """The package's own person, from its own 95 measurements."""
-    with files("kinertia.model").joinpath("data", "yeadon_people.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    values = {row["key"]: float(row[name]) / 100.0 for row in rows if row["key"] != "mass"}
+    """The person as the package makes one of all 95 measurements."""
+    values = stadium_people()[name].both
     assert len(values) == 95
-    return yeadon.Human(values)
+    return yeadon.Human(dict(values))
 
 
 def own_person(name):
-    return sample_people().measures_m[NAMES.index(name)]
+    return stadium_people()[name].measures_m
 
 
 def in_package_axes(bsp, kind, upright=True):
@@ -79,11 +75,11 @@ def test_pelvis_and_torso_are_the_packages_trunk_wherever_it_is_cut(name):
 
 def test_densities_are_ours_whatever_becomes_of_the_packages(monkeypatch):
     """The package rescales the densities of all its people when one was weighed."""
-    before = stadium_bsp(own_person("male3"), CUT_M)
+    before = stadium_bsp(own_person("Dan"), CUT_M)
     doubled = {name: 2.0 * value for name, value in yeadon.Human.segmental_densities["Dempster"].items()}
     monkeypatch.setitem(yeadon.Human.segmental_densities, "Dempster", doubled)
-    np.testing.assert_allclose(stadium_bsp(own_person("male3"), CUT_M).table(), before.table(), rtol=1e-12)
-    heavy = stadium_bsp(own_person("male3"), CUT_M, {**DENSITY_KG_M3, "thigh": 2.0 * DENSITY_KG_M3["thigh"]})
+    np.testing.assert_allclose(stadium_bsp(own_person("Dan"), CUT_M).table(), before.table(), rtol=1e-12)
+    heavy = stadium_bsp(own_person("Dan"), CUT_M, {**DENSITY_KG_M3, "thigh": 2.0 * DENSITY_KG_M3["thigh"]})
     changed = heavy.table() / np.where(before.table() == 0.0, 1.0, before.table())
     row = KINDS.index("thigh_r")
     np.testing.assert_allclose(changed[row, [0, 2, 4, 5, 6]], [2.0, 1.0, 2.0, 2.0, 2.0])
@@ -92,8 +88,8 @@ def test_densities_are_ours_whatever_becomes_of_the_packages(monkeypatch):
 
 def test_a_body_that_cannot_be_is_refused():
     with pytest.raises(PriorError, match="check the heights of the trunk and the pelvis markers"):
-        stadium_bsp(own_person("male3"), 0.9)
-    shuffled = own_person("male3").copy()
+        stadium_bsp(own_person("Dan"), 0.9)
+    shuffled = own_person("Dan").copy()
     shuffled[[one.name for one in measures()].index("leg_calf_length")] = 0.2
     with pytest.raises(PriorError, match=r"level after 'knee joint centre' is .* mm before it; check the lengths"):
         stadium_bsp(shuffled, CUT_M)

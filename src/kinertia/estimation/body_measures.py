@@ -30,7 +30,7 @@ from kinertia.errors import PriorError
 from kinertia.estimation.gaussian_update import updated
 from kinertia.estimation.prior import BspPrior
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.model.measures import girths_with_widths, measures, sample_people
+from kinertia.model.measures import GIRTH_OVER_WIDTH, girths_with_widths, log_size, measures, usual_build
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, expect_yeadon, stadium_bsp
 
@@ -47,14 +47,8 @@ _LUMBAR_CUT_SD_M = 0.04
 _CUTS = (("thigh_r", "pelvis", 2.0), ("foot_r", "shank_r", 1.0), ("upper_arm_r", "torso", 2.0))
 """Distal segment, the one that it is cut from, and how many of the first are."""
 _JOINT_LENGTH_SD_M = 0.01
-_ANY_CUT_M = 0.07
-"""Where the trunk is cut makes no difference to the whole body's mass."""
-_ANKLE_HEIGHT = 0.039
-"""Of stature (Drillis & Contini 1966)."""
 _SHRINKAGE = 0.5
 """Share of the five people's correlations that is believed."""
-_WIDEST_GIRTH_RATIO = (2.0, np.pi)
-"""Girth over width of any stadium; depths count as widths."""
 _KINDS_OF_PART = {
     "s": ("pelvis", "torso"),
     "a": ("upper_arm_r", "forearm_r"),
@@ -92,44 +86,16 @@ def expected_measures(mass_kg: float, height_m: float, mass_sd_kg: float = 0.0) 
     of one density do; what is left between five people is their spread. Five are few: half of a variance is the
     median of its kind's, and correlations are halved.
     """
-    shape, spread = _sample_shape()
-    by_mass = (_size(np.e, 1.0) - _size(1.0, 1.0)) * mass_sd_kg / mass_kg
-    return shape + _size(mass_kg, height_m), spread + np.outer(by_mass, by_mass)
-
-
-def _size(mass_kg: float, height_m: float) -> np.ndarray:
-    """(58,) logarithm of what each measure is in proportion to."""
-    along = np.array([one.kind == "length" for one in measures()])
-    size: np.ndarray = np.where(along, np.log(height_m), 0.5 * np.log(mass_kg / height_m))
-    return size
+    shape, spread = _shape_and_spread()
+    by_mass = (log_size(np.e, 1.0) - log_size(1.0, 1.0)) * mass_sd_kg / mass_kg
+    return shape + log_size(mass_kg, height_m), spread + np.outer(by_mass, by_mass)
 
 
 @cache
-def _sample_shape() -> tuple[np.ndarray, np.ndarray]:
-    people, names = sample_people(), [one.name for one in measures()]
-    values = people.measures_m.copy()
-    parts = [names.index(name) for name in ("trunk_acromion_length", "head_crown_length", "leg_ankle_length")]
-    height = values[:, parts].sum(axis=1) / (1.0 - _ANKLE_HEIGHT)
-    own = [_total_kg(stadium_bsp(one, _ANY_CUT_M).mass_kg) for one in values]
-    mass = np.where(np.isnan(people.mass_kg), own, people.mass_kg)
-    for girth, width in girths_with_widths():  # slips of the pen
-        ratio = values[:, girth] / values[:, width]
-        values[(ratio < 0.98 * _WIDEST_GIRTH_RATIO[0]) | (ratio > 1.02 * _WIDEST_GIRTH_RATIO[1]), width] = np.nan
-    relative = np.log(values) - [_size(m, h) for m, h in zip(mass, height, strict=True)]
-    shape = np.nanmean(relative, axis=0)
-    off = relative - shape
-    count = np.sum(~np.isnan(off), axis=0)
-    own_variance = np.nansum(np.square(off), axis=0)
-    kinds = np.array([one.kind for one in measures()])
-    pooled = np.zeros(len(kinds))
-    for kind in set(kinds):
-        which = kinds == kind
-        pooled[which] = np.median(own_variance[which] / (count[which] - 1))
-    variance = (own_variance + 4.0 * pooled) / (count + 3.0) * (1.0 + 1.0 / count)
-    scaled = np.nan_to_num(off) / np.sqrt(own_variance)
-    correlation = _SHRINKAGE * scaled.T @ scaled + (1.0 - _SHRINKAGE) * np.eye(len(kinds))
-    sd = np.sqrt(variance)
-    return shape, correlation * np.outer(sd, sd)
+def _shape_and_spread() -> tuple[np.ndarray, np.ndarray]:
+    usual = usual_build()
+    correlation = _SHRINKAGE * usual.common @ usual.common.T + (1.0 - _SHRINKAGE) * np.eye(len(usual.common))
+    return usual.log_shape, correlation * np.outer(usual.log_sd, usual.log_sd)
 
 
 def _total_kg(mass_kg: np.ndarray) -> float:
@@ -196,7 +162,7 @@ def _doubts(
         one, other = (measures()[place].name for place in (girth, width))
         if one in stated and other in stated:
             ratio = stated[one][0] / stated[other][0]
-            low, high = _WIDEST_GIRTH_RATIO
+            low, high = GIRTH_OVER_WIDTH
             if not 0.95 * low < ratio < 1.05 * high:
                 doubts.append(f"{one} is {ratio:.2f} times {other}; that of any cross-section is 2 to 3.14 times")
     return tuple(doubts)

@@ -1,4 +1,4 @@
-"""The measurements of a person that Yeadon's body is built from: what they are called, and five people's.
+"""The measurements of a person that Yeadon's body is built from: what they are called, and how large they usually are.
 
 Yeadon (1990, J Biomech 23:67) builds the body from 95 of them, 58 where the two sides are taken as alike: 21 of trunk
 and head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is where one measures; the picture that
@@ -16,7 +16,8 @@ import numpy as np
 
 from kinertia.model.bsp import FloatArray
 
-_PEOPLE = "yeadon_people.csv"
+GIRTH_OVER_WIDTH = (2.0, np.pi)
+"""Least and most of any stadium; depths count as widths."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +51,20 @@ class Measure:
 
 
 @dataclass(frozen=True, eq=False)
-class SamplePeople:
-    """The five people that come with the package `yeadon` (four men, a woman).
+class UsualBuild:
+    """What measures are of people of one stature and mass, and how they vary; all in the order of `measures`.
 
     Attributes:
-        names: of the people.
-        measures_m: (5, 58) in the order of `measures`, the mean of both sides.
-        mass_kg: weighed, NaN of those who were not.
+        median_m: (n,) of the people behind the other figures.
+        log_shape: (n,) mean of the logarithms of measures (m), less `log_size`.
+        log_sd: (n,) deviation between people of one size, and of the mean.
+        common: (n, k) what varies together, in principal components; the rows' squares sum to one.
     """
 
-    names: tuple[str, ...]
-    measures_m: FloatArray
-    mass_kg: FloatArray
+    median_m: FloatArray
+    log_shape: FloatArray
+    log_sd: FloatArray
+    common: FloatArray
 
 
 @cache
@@ -82,14 +85,24 @@ def girths_with_widths() -> tuple[tuple[int, int], ...]:
     return tuple((places[girth], places[width]) for girth, width in pairs if width in places)
 
 
+def log_size(mass_kg: float, height_m: float) -> FloatArray:
+    """(58,) logarithm of what each measure is in proportion to: the stature, or the root of mass over stature."""
+    along = np.array([one.kind == "length" for one in measures()])
+    size: FloatArray = np.where(along, np.log(height_m), 0.5 * np.log(mass_kg / height_m))
+    return size
+
+
 @cache
-def sample_people() -> SamplePeople:
-    """Their measurements."""
-    rows = {row.pop("key"): row for row in _rows(_PEOPLE)}
-    names = tuple(rows["mass"])
-    both = [[np.mean([float(rows[key][name]) for key in one.keys]) for one in measures()] for name in names]
-    mass = np.array([float(rows["mass"][name] or "nan") for name in names])
-    return SamplePeople(names, np.array(both) / 100.0, mass)
+def usual_build() -> UsualBuild:
+    """Fitted to the five people that come with the package `yeadon` (four men, a woman)."""
+    rows = {row["name"]: row for row in _rows("usual_build.csv")}
+    columns = {
+        column: np.array([float(rows[one.name][column]) for one in measures()])
+        for column in next(iter(rows.values()))
+        if column != "name"
+    }
+    common = [values for column, values in columns.items() if column.startswith("common")]
+    return UsualBuild(columns["median_cm"] / 100.0, columns["log_shape"], columns["log_sd"], np.transpose(common))
 
 
 def _rows(name: str) -> list[dict[str, str]]:

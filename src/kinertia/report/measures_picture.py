@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from kinertia.model.measures import girths_with_widths, measures, sample_people
+from kinertia.model.measures import girths_with_widths, measures, usual_build
 
 LEVELS = {
     "T8": "top of the head",
@@ -95,7 +95,7 @@ def _spread(names: list[str], ends: dict[str, tuple[float, float, float]]) -> di
 
 def _person() -> tuple[list[list[tuple[float, float]]], dict[str, tuple[float, float, float]]]:
     """Outlines in cm, and by level the middle of its line (x, y) and half its length."""
-    cm = dict(zip((one.key for one in measures()), 100.0 * np.median(sample_people().measures_m, axis=0), strict=True))
+    cm = dict(zip((one.key for one in measures()), 100.0 * usual_build().median_m, strict=True))
     wide = {measures()[girth].key: measures()[width].key for girth, width in girths_with_widths()}
 
     def half(key: str) -> float:

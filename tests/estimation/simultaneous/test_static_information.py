@@ -31,10 +31,21 @@ def test_first_unknowns_alone_are_those_of_all_together(singular_first):
 
 
 @pytest.mark.parametrize("n", [3, 6])
-def test_solution_of_all_unknowns(singular_first, n):
-    solution = np.arange(9.0) - 4.0
+@pytest.mark.parametrize("alike", [False, True], ids=["numbers alike", "as sure alike"])
+def test_solution_of_all_unknowns(singular_first, n, alike):
+    """No worse than rounding the right-hand side makes it, each unknown in units of its deviation.
+
+    In these the condition number is 81 and not 9e17, the least that units can make of it within a factor of nine. Where
+    the unknowns are as large in their own units, the first is a million times surer than most others, and rounding
+    what it contributes to their equations moves these by 1e-9 (the fourth by 1e-6), however exactly one solves them.
+    """
+    unit = 1.0 / np.sqrt(np.diag(singular_first))
+    solution = (np.arange(9.0) - 4.0) * (unit if alike else 1.0)
     found = StaticInformation.of(singular_first, n).solution(singular_first @ solution)
-    np.testing.assert_allclose(found, solution, rtol=1e-6, atol=1e-9)
+    condition = np.linalg.cond(unit[:, None] * singular_first * unit)
+    assert condition < 100.0
+    rounding = np.finfo(float).eps * condition * np.linalg.norm(solution / unit)
+    assert np.abs((found - solution) / unit).max() < rounding
 
 
 def test_singular_information_has_a_covariance():
