@@ -1,9 +1,10 @@
 """A synthetic laboratory's files, which stand in for measured ones in tests where these are not there.
 
 One person, symmetric, with the markers of the Cleveland Clinic: `static.trc`, `walk.trc` with `walk_grf.mot` and the
-ExternalLoads file `walk_grf.xml`, a second walk `other.trc` with `other_grf.mot`, a scaled model `scaled.osim`. And in
-C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d` and `walk.c3d`. Trials with all
-ground contact measured (`synthetic_motions`), as `.trc` and `_grf.mot`: `long` (a walk), `run` and `squats`.
+ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`. Other trials, as `.trc` and `_grf.mot`: `other` (a
+faster walk), `alike` (one that is nearly as fast), and with all ground contact measured (`synthetic_motions`) `long` (a
+walk), `run` and `squats`. And in C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
+and `walk.c3d`.
 """
 
 from __future__ import annotations
@@ -61,12 +62,13 @@ _FORCE = """      <ExternalForce name="{name}">
 
 def write_synthetic_lab(folder: Path) -> Path:
     """Write all files into the folder; returns it."""
-    truth, first, second, third, fourth, fifth, sixth = np.random.default_rng(100).spawn(7)
+    truth, first, second, third, fourth, fifth, sixth, seventh = np.random.default_rng(100).spawn(8)
     person = unlike_literature(symmetric_person(), truth)
     recorded = _recorded(person, first)
     write_trc(folder / "static.trc", recorded.static.markers)
     _write_trial(folder, "walk", recorded.walk)
     _write_trial(folder, "other", _recorded(person, second, Manner(pace=1.1)).walk)
+    _write_trial(folder, "alike", _recorded(person, seventh, Manner(pace=1.02)).walk)
     feet = _plate_feet(recorded)
     forces = [_FORCE.format(name=foot, body=f"foot_{foot}", plate=k) for k, foot in enumerate(feet, start=1)]
     (folder / "walk_grf.xml").write_text(_LOADS.format(forces="\n".join(forces), file="walk_grf.mot"), encoding="utf-8")
