@@ -15,20 +15,25 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.pose_fit import Stop, fit_poses
 from kinertia.synthetic.motions import squat
-from kinertia.synthetic.noise import camera_noise, plate_noise
+from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import Markers, PlateLoads, Recording
+from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads, Recording
 
 CAMERA_SD_M, FORCE_SD_N, MOMENT_SD_NM = 0.0005, 1.0, 0.2
 LONG_WALK_S, LONG_WALK_START, LOAD_RATE_HZ, SAMPLES_PER_FRAME = 3.7, 0.75, 1000.0, 10
 NAMES = ("1_ground_force", "2_ground_force")
 
 
-def measured(markers: Markers, plates: PlateLoads, rng: np.random.Generator) -> Recording:
-    """By careful cameras and plates."""
-    noisy = plate_noise(plates, FORCE_SD_N, 0.0, MOMENT_SD_NM, rng)
-    return Recording("made", camera_noise(markers, CAMERA_SD_M, rng), noisy)
+def measured(name: str, markers: Markers, plates: PlateLoads, rng: np.random.Generator) -> Recording:
+    """By careful cameras and plates, whose errors act where the load does: these plates are as long as the way."""
+    error = rng.normal(0.0, FORCE_SD_N, plates.force.shape)
+    twist = rng.normal(0.0, MOMENT_SD_NM, plates.force.shape)
+    force = plates.force + error
+    moment = plates.moment + np.cross(centre_of_pressure(plates.wrench), error) + twist
+    loaded = np.minimum(plates.force[..., 1:2], force[..., 1:2]) >= LOAD_THRESHOLD_N
+    noisy = replace(plates, force=np.where(loaded, force, 0.0), moment=np.where(loaded, moment, 0.0))
+    return Recording(name, camera_noise(markers, CAMERA_SD_M, rng), noisy)
 
 
 def _plates(time: np.ndarray, loads: np.ndarray) -> PlateLoads:
@@ -39,7 +44,7 @@ def _plates(time: np.ndarray, loads: np.ndarray) -> PlateLoads:
 def squats(person: SyntheticSubject, rng: np.random.Generator) -> Recording:
     """Two squats, a foot on each plate; loads at the rate of the markers."""
     trial = squat(person)
-    return measured(trial.markers, _plates(trial.time, _under_each_foot(trial)), rng)
+    return measured("squats", trial.markers, _plates(trial.time, _under_each_foot(trial)), rng)
 
 
 def _under_each_foot(trial: SyntheticTrial) -> np.ndarray:
@@ -71,12 +76,12 @@ def long_walk(person: SyntheticSubject, with_feet: SyntheticSubject, rng: np.ran
     trial = replace(trial, skeleton=person.moving_skeleton)
     seen = slice(0, len(trial.time), SAMPLES_PER_FRAME)
     markers = Markers(trial.time[seen], trial.markers.labels, trial.markers.positions[seen])
-    return measured(markers, _plates(trial.time, trial.foot_loads), rng)
+    return measured("long", markers, _plates(trial.time, trial.foot_loads), rng)
 
 
 def run(person: SyntheticSubject, rng: np.random.Generator) -> Recording:
     """Seven strides on a treadmill with a belt for each foot."""
-    return measured(*_Run(person).trial(), rng)
+    return measured("run", *_Run(person).trial(), rng)
 
 
 class _Run:
