@@ -53,3 +53,23 @@ FITTED = named_here(
     }
 )
 """Markers of walks by the names that the fixture `fit_of` takes (`fit_with_model`: the first three)."""
+RUNS = named_here(
+    {
+        "synthetic": ("synthetic/run.trc", "synthetic/run_grf.mot"),
+        "rajagopal": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
+        "hamner": ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
+    }
+)
+LONG_WALKS = named_here(
+    {
+        "synthetic": ("synthetic/long.trc", "synthetic/long_grf.mot"),
+        "rajagopal": ("rajagopal_walk/motion_capture_walk.trc", "rajagopal_walk/grf_walk.mot"),
+    }
+)
+"""More than a stride of them is measured."""
+SQUATS = named_here(
+    {
+        "synthetic": ("synthetic/squats.trc", "synthetic/squats_grf.mot"),
+        "subject4": ("subject4/squats1.trc", "subject4/squats1_grf.mot"),
+    }
+)

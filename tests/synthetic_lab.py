@@ -1,8 +1,10 @@
 """A synthetic laboratory's files, which stand in for measured ones in tests where these are not there.
 
 One person, symmetric, with the markers of the Cleveland Clinic: `static.trc`, `walk.trc` with `walk_grf.mot` and the
-ExternalLoads file `walk_grf.xml`, a second walk `other.trc` with `other_grf.mot`, a scaled model `scaled.osim`. And in
-C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d` and `walk.c3d`.
+ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`. Other trials, as `.trc` and `_grf.mot`: `other` (a
+faster walk), `alike` (one that is nearly as fast), and with all ground contact measured (`synthetic_motions`) `long` (a
+walk), `run` and `squats`. And in C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
+and `walk.c3d`.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ from kinertia.synthetic.walk import (
 )
 from kinertia.trial.data import Markers, Recording
 from osim_models import Person
+from synthetic_motions import long_walk, run, squats
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _MARKER_DIAMETER_M = 0.014
@@ -71,12 +74,13 @@ def synthetic_arguments(folder: Path) -> list[str]:
 
 def write_synthetic_lab(folder: Path) -> Path:
     """Write all files into the folder; returns it."""
-    truth, first, second, third = np.random.default_rng(100).spawn(4)
+    truth, first, second, third, fourth, fifth, sixth, seventh = np.random.default_rng(100).spawn(8)
     person = unlike_literature(symmetric_person(), truth)
     recorded = _recorded(person, first)
     write_trc(folder / "static.trc", recorded.static.markers)
-    _write_walk(folder, "walk", recorded)
-    _write_walk(folder, "other", _recorded(person, second, Manner(pace=1.1)))
+    _write_trial(folder, "walk", recorded.walk)
+    _write_trial(folder, "other", _recorded(person, second, Manner(pace=1.1)).walk)
+    _write_trial(folder, "alike", _recorded(person, seventh, Manner(pace=1.02)).walk)
     feet = _plate_feet(recorded)
     names = {"r": "right", "l": "left"}
     forces = [_FORCE.format(name=names[foot], body=f"foot_{foot}", plate=k) for k, foot in enumerate(feet, start=1)]
@@ -85,24 +89,29 @@ def write_synthetic_lab(folder: Path) -> Path:
     with_widths = _recorded(with_plug_in_gait(person), third)
     for name in ("static", "walk"):
         write_c3d(folder / f"{name}.c3d", getattr(with_widths, name))
+    _write_trial(folder, "long", long_walk(person, _with_feet(person), fourth))
+    _write_trial(folder, "run", run(person, fifth))
+    _write_trial(folder, "squats", squats(person, sixth))
     return folder
 
 
+def _with_feet(person: SyntheticSubject) -> SyntheticSubject:
+    """The walk shares loads out by markers of the feet."""
+    return replace(person, skeleton=symmetric_person().skeleton)
+
+
 def _recorded(person: SyntheticSubject, rng: np.random.Generator, manner: Manner | None = None) -> LabRecordings:
-    with_feet = replace(
-        person, skeleton=symmetric_person().skeleton
-    )  # the walk shares loads out by markers of the feet
-    trial = walk(with_feet, DURATION_S, PLATE_RATE_HZ, START, manner=manner or Manner())
+    trial = walk(_with_feet(person), DURATION_S, PLATE_RATE_HZ, START, manner=manner or Manner())
     trial = replace(trial, skeleton=person.moving_skeleton)
     recorded = record(person, trial, LabNoise(), rng, SAMPLES_PER_FRAME)
     widths = person.static.measurements
     return LabRecordings(*(replace(one, measurements=widths) for one in (recorded.static, recorded.walk)))
 
 
-def _write_walk(folder: Path, name: str, recorded: LabRecordings) -> None:
-    assert recorded.walk.plates is not None
-    write_trc(folder / f"{name}.trc", recorded.walk.markers)
-    write_sto(folder / f"{name}_grf.mot", force_table(recorded.walk.plates), False, f"{name}_grf")
+def _write_trial(folder: Path, name: str, recorded: Recording) -> None:
+    assert recorded.plates is not None
+    write_trc(folder / f"{name}.trc", recorded.markers)
+    write_sto(folder / f"{name}_grf.mot", force_table(recorded.plates), False, f"{name}_grf")
 
 
 def _plate_feet(recorded: LabRecordings) -> list[str]:

@@ -21,8 +21,19 @@ from kinertia.motion.pose_fit import _STEP_TOLERANCE, normal_equations
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim
 from random_chain import motion_within, random_chain
+from recordings import named_here
 
-JUMPER = "laiarnold5_jump/LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
+JUMPER = "field/laiarnold5_jump/LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
+FAST = {
+    "run": ("synthetic/run.trc", "synthetic/scaled.osim"),
+    "another run": ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_registered.osim"),
+    "jump": ("field/laiarnold5_jump/DJ1.trc", JUMPER),
+}
+PLUG_IN_GAIT = {
+    "synthetic": ("synthetic/static.c3d", "synthetic/walk.c3d"),
+    "a": ("pig_c3d/subject_a_static.c3d", "pig_c3d/subject_a_walk.c3d"),
+    "b": ("pig_c3d/subject_b_static.c3d", "pig_c3d/subject_b_walk.c3d"),
+}
 
 
 @pytest.fixture(scope="module")
@@ -106,17 +117,14 @@ def test_an_arm_that_swings_through_more_than_half_a_turn_stays_on_its_branch(sk
     assert np.abs(solved - q)[:, columns].max() < 0.15
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["hamner_run/subject02_running.trc hamner_run/subject02_registered.osim", "laiarnold5_jump/DJ1.trc " + JUMPER],
-)
+@pytest.mark.parametrize("name", named_here(FAST))
 def test_no_coordinate_of_a_run_or_a_jump_jumps(file_of, name):
     """Not by more than half a turn in 0.1 s, as a leg does in a sprint at most; an arm may turn round overhead."""
-    markers, model = (file_of(f"field/{file}") for file in name.split())
+    markers, model = map(file_of, FAST[name])
     skeleton, walk = read_osim(model).skeleton, read_recording(markers).markers
     ik = solve_ik(skeleton, walk.cut(*walk.time[[0, min(300, len(walk.time) - 1)]]))
     fastest = np.nanmax(np.abs(np.diff(ik.q[:, skeleton.rotational], axis=0))) * walk.rate_hz
-    assert fastest < 10 * np.pi * (2.0 if "jump" in name else 1.0)
+    assert fastest < 10 * np.pi * (2.0 if name == "jump" else 1.0)
     elbows = ik.q[:, [skeleton.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
     assert np.nanmin(elbows) >= 0.0
     assert np.nanmax(elbows) <= np.radians(150.01)
@@ -254,10 +262,10 @@ def test_opensim_finds_the_same_coordinates(model):
     np.testing.assert_allclose(ours.q, theirs, atol=2e-4)
 
 
-@pytest.mark.parametrize("person", ["a", "b"])
+@pytest.mark.parametrize("person", named_here(PLUG_IN_GAIT))
 def test_a_few_frames_are_solved_as_in_the_whole_trial(recording_of, person):
     """Frames a second apart are no start for one another: a foot would end upside down."""
-    static, walk = (recording_of(f"pig_c3d/subject_{person}_{kind}.c3d") for kind in ("static", "walk"))
+    static, walk = map(recording_of, PLUG_IN_GAIT[person])
     skeleton = build_gait27(static, choose_marker_set(static.markers.labels), 1.6, "female").skeleton
     every = round(walk.markers.rate_hz / 10)
     few = solve_ik(skeleton, sampled(walk.markers)).q

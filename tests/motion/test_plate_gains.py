@@ -7,16 +7,17 @@ import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.motion.plate_gains import gain_doubts
+from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.plate_assignment import build_trial
-from recordings import WALKS
+from recordings import LONG_WALKS, WALKS
 
-SOUND = ("gait2354", "rajagopal", "plug-in gait b")
+LONG = ("synthetic", "synthetic c3d", "gait2354", "rajagopal", "plug-in gait b")
+SOUND = {name: WALKS[name] for name in LONG if name in WALKS} | {"synthetic, long": LONG_WALKS["synthetic"]}
 
 
 @pytest.fixture(params=SOUND)
 def walk(request, recording_of):
-    """A measured walk."""
-    return recording_of(*WALKS[request.param])
+    return recording_of(*SOUND[request.param])
 
 
 def told(walk):
@@ -49,6 +50,8 @@ def test_a_crutch_beside_one_foot_is_named_beside_the_gain(walk, foot):
     support = np.zeros_like(plates.force)
     support[:, foot] = 0.1 * float(plates.force[..., 1].max()) * loaded * np.array([0.0, 1.0, 0.0])
     support[:, foot] = np.minimum(support[:, foot], np.maximum(plates.force[:, foot], 0.0))
-    said = told(replace(walk, plates=replace(plates, force=plates.force - support)))
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    moment = plates.moment - np.cross(point, support)
+    said = told(replace(walk, plates=replace(plates, force=plates.force - support, moment=moment)))
     assert len(said) == 1
     assert f"on no plate over {plates.names[foot]} (a handrail, a crutch)" in said[0]

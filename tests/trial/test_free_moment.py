@@ -1,4 +1,4 @@
-"""Mean vertical moments over whole strides: synthetic gait where they are known, and the measured walks."""
+"""Mean vertical moments over whole strides: synthetic gait where they are known, and whole trials."""
 
 from dataclasses import replace
 
@@ -8,13 +8,18 @@ from scipy.spatial.transform import Rotation
 
 from gait_loads import MASS_KG, gait_loads
 from kinertia.checks.recording import check_recording
+from kinertia.estimation.estimate import estimate_bsp
+from kinertia.estimation.prepare import TrialInput
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_markers import markers_of_model
-from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.settings import Subject
+from kinertia.synthetic.walk import HEIGHT_M, walk, walking_subject
+from kinertia.synthetic.walk import MASS_KG as WALKER_KG
 from kinertia.trial.data import FootLoads, PlateLoads, Recording
 from kinertia.trial.free_moment import TURNING_LEVER_M, mean_turning
+from recordings import LONG_WALKS, here
 
 SPEED_M_S, STRIDE_S = 1.2, 1.0
 
@@ -159,7 +164,12 @@ def test_the_check_goes_by_the_pelvis_markers_that_there_are(walked):
     assert verdicts(walked, MarkerSet("a model", {}, none, {})) == []
 
 
-MEASURED = {
+TRIALS = {
+    "synthetic/long.trc": ("synthetic/long_grf.mot", "pass"),
+    "synthetic/run.trc": ("synthetic/run_grf.mot", "pass"),
+    "synthetic/walk.trc": ("synthetic/walk_grf.mot", None),
+    "synthetic/walk.c3d": (None, None),
+    "synthetic/squats.trc": ("synthetic/squats_grf.mot", None),
     "gait2354/subject01_walk1.trc": ("gait2354/subject01_walk1_grf.mot", "caution"),
     "rajagopal_walk/motion_capture_walk.trc": ("rajagopal_walk/grf_walk.mot", "pass"),
     "pig_c3d/subject_a_walk.c3d": (None, None),
@@ -170,10 +180,10 @@ MEASURED = {
 }
 
 
-@pytest.mark.parametrize("name", MEASURED)
-def test_measured_trials(file_of, recording_of, name):
-    """Of the measured walks only two hold a whole stride."""
-    forces, level = MEASURED[name]
+@pytest.mark.parametrize("name", here(TRIALS))
+def test_whole_trials(file_of, recording_of, name):
+    """Many do not hold a whole stride."""
+    forces, level = TRIALS[name]
     recording = recording_of(name, forces)
     own = None
     if "subject4" in name:
@@ -181,10 +191,29 @@ def test_measured_trials(file_of, recording_of, name):
     assert [v.level for v in verdicts(recording, own)] == ([] if level is None else [level])
 
 
+MEASURED = {"gait2354": "gait2354/subject01_walk1.trc", "rajagopal": "rajagopal_walk/motion_capture_walk.trc"}
+
+
+def test_a_fit_tells_what_the_check_does(recording_of):
+    walk = recording_of(*LONG_WALKS["synthetic"])
+    person = Subject(sex="male", mass_kg=WALKER_KG, height_m=HEIGHT_M)
+
+    def told(recording):
+        fit = estimate_bsp(person, recording_of("synthetic/static.trc"), [TrialInput(recording, (0.4, 2.0))])
+        return [one for one in fit.warnings if "it should be near zero" in one]
+
+    assert told(walk) == []
+    (warning,) = told(crosstalk(walk, (0.0, 5.0)))
+    assert warning.startswith("long: the mean vertical moment over whole strides")
+    assert "the free moments under the feet have the same sign (right +0.2, left +2.4 N m" in warning
+
+
 @pytest.mark.parametrize(
     ("name", "warned"), [("gait2354", True), pytest.param("rajagopal", False, marks=pytest.mark.slow)]
 )
-def test_a_fit_warns(fit_of, name, warned):
+def test_fits_of_measured_walks(request, file_of, name, warned):
+    file_of(MEASURED[name])
+    fit_of = request.getfixturevalue("fit_of")
     warnings = [w for w in fit_of(name).summary["warnings"] if "it should be near zero" in w]
     assert len(warnings) == int(warned)
     if warned:

@@ -7,12 +7,7 @@ import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.load_places import load_places_trouble
-from recordings import WALKS
-
-RUNS = {
-    "rajagopal": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
-    "hamner": ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
-}
+from recordings import LONG_WALKS, RUNS, WALKS
 
 
 def said_of(recording, rate=1.0, late_s=0.0):
@@ -87,9 +82,10 @@ def test_two_contacts_do_not_tell_a_rate_from_a_clock(walk):
     assert percent == pytest.approx(5.0, abs=2.5)
 
 
-def test_three_contacts_exclude_a_rate_that_is_far_off(recording_of):
+@pytest.mark.parametrize("name", LONG_WALKS)
+def test_three_contacts_exclude_a_rate_that_is_far_off(recording_of, name):
     """To be 100 ms late in the middle of 2.4 s, forces would have to be 10 % slow."""
-    trouble = said_of(recording_of(*WALKS["rajagopal"]), late_s=0.1)
+    trouble = said_of(recording_of(*LONG_WALKS[name]), late_s=0.1)
     assert trouble.startswith("the forces are ")
     assert "rate" not in trouble
 

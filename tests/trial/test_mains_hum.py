@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 from kinertia.trial.mains_hum import hum_doubts, hum_trouble
-from recordings import WALKS
+from recordings import LONG_WALKS, RUNS, SQUATS, WALKS, named_here
 
 OTHERS = {
-    "run": ("field/rajagopal_run/motion_capture_run.trc", "field/rajagopal_run/grf_run.mot"),
-    "drop jump": ("field/laiarnold5_jump/DJ1.trc", "field/laiarnold5_jump/DJ1_forces.mot"),
-    "100 samples a second": ("subject4/walking1.trc", "subject4/walking1_grf.mot"),
-    "BTS": ("c3d_variety/bts.c3d", None),
-    "AMTI": ("c3d_variety/ist.c3d", None),
+    **{f"long walk, {name}": files for name, files in LONG_WALKS.items()},
+    **{f"run, {name}": files for name, files in RUNS.items()},
+    **{f"squats at 100 Hz, {name}": files for name, files in SQUATS.items()},
+    **named_here(
+        {
+            "drop jump": ("field/laiarnold5_jump/DJ1.trc", "field/laiarnold5_jump/DJ1_forces.mot"),
+            "100 samples a second": ("subject4/walking1.trc", "subject4/walking1_grf.mot"),
+            "BTS": ("c3d_variety/bts.c3d", None),
+            "AMTI": ("c3d_variety/ist.c3d", None),
+        }
+    ),
 }
 
 

@@ -6,16 +6,21 @@ import numpy as np
 import pytest
 
 from kinertia.trial.marker_resolution import made_up_frames_trouble, noisy_doubts, rounded_trouble
-from recordings import WALKS
+from recordings import RUNS, WALKS, named_here
 
 OTHERS = {
-    "run": ("field/rajagopal_run/motion_capture_run.trc", None),
-    "run at 60 Hz": ("field/hamner_run/subject02_running.trc", None),
-    "jump": ("field/laiarnold5_jump/DJ1.trc", None),
-    "squats": ("subject4/squats1.trc", None),
-    "OpenCap": ("subject4/walking1.trc", None),
-    "standing": ("gait2354/subject01_static.trc", None),
-    "coordinates of 16 bits": ("c3d_variety/subject_prefixed_labels.c3d", None),
+    **{f"run, {name}": files for name, files in RUNS.items()},
+    **named_here(
+        {
+            "synthetic squats": ("synthetic/squats.trc", None),
+            "synthetic standing": ("synthetic/static.trc", None),
+            "jump": ("field/laiarnold5_jump/DJ1.trc", None),
+            "squats": ("subject4/squats1.trc", None),
+            "OpenCap": ("subject4/walking1.trc", None),
+            "standing": ("gait2354/subject01_static.trc", None),
+            "coordinates of 16 bits": ("c3d_variety/subject_prefixed_labels.c3d", None),
+        }
+    ),
 }
 
 

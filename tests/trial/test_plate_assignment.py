@@ -8,6 +8,7 @@ from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
 from kinertia.trial.sampled_time import runs
+from recordings import is_here
 from walk_on_plates import ALL_STEPS, FEET, walk
 
 
@@ -286,10 +287,16 @@ def clinic(side):
 
 PLUG_IN_GAIT = {"r": ["RHEE", "RTOE", "RANK"], "l": ["LHEE", "LTOE", "LANK"]}
 
-REAL = {
+CLINIC = {"r": clinic("R"), "l": clinic("L")}
+WHOLE = {
+    "synthetic": (("synthetic/walk.trc", "synthetic/walk_grf.mot", "synthetic/walk_grf.xml"), CLINIC, (1.09, 2.16)),
+    "synthetic c3d": (("synthetic/walk.c3d",), PLUG_IN_GAIT, (1.09, 2.16)),
+    "synthetic long": (("synthetic/long.trc", "synthetic/long_grf.mot"), CLINIC, (0.0, 3.7)),
+    "synthetic run": (("synthetic/run.trc", "synthetic/run_grf.mot"), CLINIC, (0.0, 4.93)),
+    "synthetic squats": (("synthetic/squats.trc", "synthetic/squats_grf.mot"), CLINIC, (0.0, 5.0)),
     "gait2354": (
         ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot", "gait2354/subject01_walk1_grf.xml"),
-        {"r": clinic("R"), "l": clinic("L")},
+        CLINIC,
         (0.0, 2.5),
     ),
     "rajagopal": (
@@ -308,6 +315,9 @@ REAL = {
         for name, window in {"walking1": (0.12, 1.3), "walking2": (0.12, 1.31), "squats1": (0.0, 13.45)}.items()
     },
 }  # fmt: skip
+"""Files, markers of the feet, and when all ground contact is measured: of the package's walk, which knows when feet
+land and leave (`data/walk.csv`), between steps beside the plates; of the run up to its last flight."""
+REAL = {name: one for name, one in WHOLE.items() if is_here(one[0])}
 
 
 @pytest.fixture(scope="module")
@@ -320,7 +330,7 @@ def real(recording_of):
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_measured_window_of_real_trials(real, name):
+def test_window_of_whole_trials(real, name):
     recording, feet, window = real(name)
     trial = build_trial(recording, feet)
     assert len(trial.windows()) == 1
@@ -329,10 +339,16 @@ def test_measured_window_of_real_trials(real, name):
     assert len(wrong) == (1 if name in ("walking1", "walking2", "squats1") else 0)
 
 
-MASSES = {"gait2354": (0.62, 1.85, 72.6), "rajagopal": (0.6, 1.75, 85.0), "walking1": (0.13, 1.08, 60.0)}
+MASSES = {
+    "synthetic long": (0.5, 1.7325, 72.6),
+    "gait2354": (0.62, 1.85, 72.6),
+    "rajagopal": (0.6, 1.75, 85.0),
+    "walking1": (0.13, 1.08, 60.0),
+}
+WALKS = ("synthetic c3d", "synthetic long", "gait2354", "rajagopal", "pig a", "pig b", "walking1", "walking2")
 
 
-@pytest.mark.parametrize("name", MASSES)
+@pytest.mark.parametrize("name", [name for name in MASSES if name in REAL])
 def test_measured_stride_carries_the_body(real, name):
     recording, feet, _ = real(name)
     start, end, mass_kg = MASSES[name]
@@ -342,7 +358,7 @@ def test_measured_stride_carries_the_body(real, name):
     assert mean == pytest.approx(mass_kg, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["gait2354", "rajagopal", "pig a", "pig b", "walking1", "walking2"])
+@pytest.mark.parametrize("name", [name for name in WALKS if name in REAL])
 def test_markers_find_contacts_whose_force_is_hidden(real, name):
     """Take the load away from one contact at a time and find it again from what the others taught."""
     recording, feet, _ = real(name)

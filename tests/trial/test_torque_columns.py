@@ -11,9 +11,16 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_table, write_table
 from kinertia.trial.exchanged_torques import exchanged_torques_doubts
 from kinertia.trial.torque_columns import torque_columns_doubts
-from recordings import WALKS
+from recordings import WALKS, here
 
-GROUPS = {
+MADE = (
+    ("1_ground_force_v", "1_ground_force_p", "1_ground_torque_"),
+    ("2_ground_force_v", "2_ground_force_p", "2_ground_torque_"),
+)
+COLUMNS = {
+    "synthetic/walk_grf.mot": MADE,
+    "synthetic/long_grf.mot": MADE,
+    "synthetic/run_grf.mot": MADE,
     "gait2354/subject01_walk1_grf.mot": (
         ("ground_force_v", "ground_force_p", "ground_torque_"),
         ("1_ground_force_v", "1_ground_force_p", "1_ground_torque_"),
@@ -27,29 +34,36 @@ GROUPS = {
         ("ground_force_2_v", "ground_force_2_p", "ground_force_2_m"),
     ),
 }
-SOUND = [
-    *GROUPS,
-    "subject4/walking2_grf.mot",
-    "subject4/squats1_grf.mot",
-    "subject4/static1_grf.mot",
-    "field/rajagopal_run/grf_run.mot",
-    "field/laiarnold5_jump/DJ1_forces.mot",
-    "field/laiarnold6_walk/walking1_forces.mot",
-    "field/hamner_treadmill_run/run200_grf.mot",
-    "field/hamner_run/subject02_running_grf.mot",
-]
+GROUPS = here(COLUMNS)
+SOUND = here(
+    [
+        *COLUMNS,
+        "synthetic/other_grf.mot",
+        "synthetic/squats_grf.mot",
+        "subject4/walking2_grf.mot",
+        "subject4/squats1_grf.mot",
+        "subject4/static1_grf.mot",
+        "field/rajagopal_run/grf_run.mot",
+        "field/laiarnold5_jump/DJ1_forces.mot",
+        "field/laiarnold6_walk/walking1_forces.mot",
+        "field/hamner_treadmill_run/run200_grf.mot",
+        "field/hamner_run/subject02_running_grf.mot",
+    ]
+)
+WITHOUT_COLUMNS = [name for name in ("synthetic c3d", "plug-in gait a", "plug-in gait b") if name in WALKS]
+SAID_OF = [name for name in ("synthetic", "gait2354") if name in WALKS]
 
 
 @pytest.fixture
 def changed(file_of, tmp_path):
-    """Loads of a measured force file whose forces, points and torques, (k, 3) of each plate, a function replaced."""
+    """Loads of a force file whose forces, points and torques, (k, 3) of each plate, a function replaced."""
 
     def change(name, how):
         table, path = read_table(file_of(name)), tmp_path / "grf.mot"
         values = table.values.copy()
         places = [
             [[table.labels.index(identifier + axis) for axis in "xyz"] for identifier in group]
-            for group in GROUPS[name]
+            for group in COLUMNS[name]
         ]
         was = [[table.values[:, one] for one in group] for group in places]
         for group, became in zip(places, how(was), strict=True):
@@ -68,7 +82,7 @@ def test_sound_files(file_of, name):
     assert exchanged_torques_doubts(plates) == []
 
 
-@pytest.mark.parametrize("name", ["plug-in gait a", "plug-in gait b"])
+@pytest.mark.parametrize("name", WITHOUT_COLUMNS)
 def test_plates_of_a_c3d_file_have_no_torque_columns(recording_of, name):
     assert torque_columns_doubts(recording_of(*WALKS[name]).plates) == []
 
@@ -148,9 +162,10 @@ def test_forces_at_a_point_that_stays_with_all_their_moments(changed, file_of, n
     assert torque_columns_doubts(moved) == []
 
 
-def test_said_of_a_trial(changed, recording_of):
+@pytest.mark.parametrize("name", SAID_OF)
+def test_said_of_a_trial(changed, recording_of, name):
     """By `check` and by every fit: both ask for these."""
-    recording = recording_of(*WALKS["gait2354"])
+    recording = recording_of(*WALKS[name])
     marker_set = choose_marker_set(recording.markers.labels)
     feet = {
         side: [one for one in own if one in recording.markers.labels] for side, own in marker_set.foot_labels().items()
@@ -158,7 +173,7 @@ def test_said_of_a_trial(changed, recording_of):
 
     def said(arm):
         plates = changed(
-            "gait2354/subject01_walk1_grf.mot",
+            WALKS[name][1],
             lambda groups: [(f, p, torque + np.cross([arm, 0.0, 0.0], f)) for f, p, torque in groups],
         )
         return trial_doubts(replace(recording, plates=plates), marker_set, None, feet)

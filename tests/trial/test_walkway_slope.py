@@ -8,23 +8,34 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.walkway_slope import walkway_slope_doubts
+from recordings import here
 
 OPENCAP = {"r": ("r_calc", "r_5meta", "r_toe"), "l": ("L_calc", "L_5meta", "L_toe")}
+LEVEL = here(
+    [
+        "synthetic/walk.trc",
+        "synthetic/long.trc",
+        "synthetic/walk.c3d",
+        "rajagopal_walk/motion_capture_walk.trc",
+        "pig_c3d/subject_a_walk.c3d",
+        "pig_c3d/subject_b_walk.c3d",
+    ]
+)
 WALKS = [
-    "rajagopal_walk/motion_capture_walk.trc",
-    "pig_c3d/subject_a_walk.c3d",
-    "pig_c3d/subject_b_walk.c3d",
-    "subject4/walking1.trc",
-    "subject4/walking2.trc",
-    "field/laiarnold6_walk/walking1.trc",
+    *LEVEL,
+    *here(["subject4/walking1.trc", "subject4/walking2.trc", "field/laiarnold6_walk/walking1.trc"]),
 ]
-OTHERS = [
-    "gait2354/subject01_walk1.trc",
-    "subject4/squats1.trc",
-    "field/laiarnold5_jump/DJ1.trc",
-    "field/rajagopal_run/motion_capture_run.trc",
-    "field/hamner_run/subject02_running.trc",
-]
+OTHERS = here(
+    [
+        "synthetic/squats.trc",
+        "synthetic/run.trc",
+        "gait2354/subject01_walk1.trc",
+        "subject4/squats1.trc",
+        "field/laiarnold5_jump/DJ1.trc",
+        "field/rajagopal_run/motion_capture_run.trc",
+        "field/hamner_run/subject02_running.trc",
+    ]
+)
 
 
 def read(recording_of, name):
@@ -51,7 +62,7 @@ def test_tilted_cameras(name, degrees, recording_of):
     assert said == pytest.approx(abs(degrees), abs=0.3)
 
 
-@pytest.mark.parametrize("name", WALKS[:3])
+@pytest.mark.parametrize("name", LEVEL)
 def test_a_level_floor_that_is_turned(name, recording_of):
     markers, feet = read(recording_of, name)
     turn = Rotation.from_euler("y", 40, degrees=True).as_matrix()

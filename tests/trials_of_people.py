@@ -1,0 +1,73 @@
+"""Two alike walks and squats of one person, with forces that are late or another trial's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from kinertia.io.osim.reader import read_osim
+from kinertia.model.marker_set import MarkerSet
+from kinertia.model.model_markers import markers_of_model
+from kinertia.trial.data import Recording, Trial
+from kinertia.trial.plate_assignment import build_trial
+from recordings import is_here
+
+
+class Person(NamedTuple):
+    """Names of files (`recordings`) and of trials: two walks, then squats."""
+
+    folder: str
+    model: str
+    trials: tuple[str, str, str]
+    mass_kg: float
+
+    def files(self, name: str, forces: str | None = None) -> tuple[str, str]:
+        """Markers of the trial of this name, and forces of this one or another."""
+        return f"{self.folder}/{name}.trc", f"{self.folder}/{forces or name}_grf.mot"
+
+
+_KNOWN = {
+    "synthetic": Person("synthetic", "synthetic/scaled.osim", ("walk", "alike", "squats"), 72.6),
+    "subject4": Person("subject4", "subject4/addbiomechanics_scaled.osim", ("walking1", "walking2", "squats1"), 60.0),
+}
+PEOPLE = {name: person for name, person in _KNOWN.items() if is_here(person.model)}
+
+
+class Trials:
+    """Trials of one person.
+
+    Args:
+        person: who.
+        file_of, recording_of: the fixtures.
+    """
+
+    def __init__(self, person: Person, file_of: Callable[[str], Path], recording_of: Callable[..., Recording]) -> None:
+        self.person, self.read = person, recording_of
+        self.marker_set: MarkerSet = markers_of_model(read_osim(file_of(person.model)))
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        return self.person.trials
+
+    @property
+    def segments(self) -> Mapping[str, Sequence[str]]:
+        """Labels of the markers on each."""
+        return self.marker_set.segments
+
+    def trial(self, name: str, forces: str | None = None, late_s: float = 0.0) -> Trial:
+        """The trial of this name.
+
+        Args:
+            name: of the trial.
+            forces: the trial whose forces it has; its own if None.
+            late_s: by how much they are late.
+        """
+        recording = self.read(*self.person.files(name, forces))
+        feet = {
+            side: [one for one in own if one in recording.markers.labels]
+            for side, own in self.marker_set.foot_labels().items()
+        }
+        plates = replace(recording.plates, time=recording.plates.time + late_s)
+        return build_trial(replace(recording, plates=plates, name=name), feet)
