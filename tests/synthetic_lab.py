@@ -3,8 +3,9 @@
 One person, symmetric, with the markers of the Cleveland Clinic: `static.trc`, `walk.trc` with `walk_grf.mot` and the
 ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`. Other trials, as `.trc` and `_grf.mot`: `other` (a
 faster walk), `alike` (one that is nearly as fast), and with all ground contact measured (`synthetic_motions`) `long` (a
-walk), `run` and `squats`. And in C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
-and `walk.c3d`.
+walk), `run` and `squats`. In C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
+and `walk.c3d`. And without forces, with clusters of markers (`synthetic_clusters`): `clusters_static.trc` and
+`clusters_walk.trc`.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from kinertia.synthetic.walk import (
 )
 from kinertia.trial.data import Markers, Recording
 from osim_models import Person
+from synthetic_clusters import STATIC_ONLY, with_clusters
 from synthetic_motions import long_walk, run, squats
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
@@ -92,7 +94,15 @@ def write_synthetic_lab(folder: Path) -> Path:
     _write_trial(folder, "long", long_walk(person, _with_feet(person), fourth))
     _write_trial(folder, "run", run(person, fifth))
     _write_trial(folder, "squats", squats(person, sixth))
+    _write_clusters(folder, person)
     return folder
+
+
+def _write_clusters(folder: Path, person: SyntheticSubject) -> None:
+    recorded = _recorded(with_clusters(person), np.random.default_rng(101))
+    write_trc(folder / "clusters_static.trc", recorded.static.markers)
+    walked = recorded.walk.markers
+    write_trc(folder / "clusters_walk.trc", walked.select([one for one in walked.labels if one not in STATIC_ONLY]))
 
 
 def _with_feet(person: SyntheticSubject) -> SyntheticSubject:

@@ -9,9 +9,13 @@ from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
 from kinertia.model.model_on_person import model_on_person_doubts, model_on_person_trouble, moved_doubts
 from kinertia.trial.data import Markers
+from recordings import here
 
 LAI_ARNOLD = "LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
-SOUND = [
+KNOWN = [
+    ("synthetic/scaled.osim", "synthetic/walk.trc"),
+    ("synthetic/scaled.osim", "synthetic/run.trc"),
+    ("synthetic/scaled.osim", "synthetic/squats.trc"),
     ("gait2354/subject01_scaled.osim", "gait2354/subject01_walk1.trc"),
     ("rajagopal_walk/scaled.osim", "rajagopal_walk/motion_capture_walk.trc"),
     ("subject4/addbiomechanics_scaled.osim", "subject4/walking1.trc"),
@@ -21,13 +25,14 @@ SOUND = [
     (f"field/laiarnold5_jump/{LAI_ARNOLD}", "field/laiarnold5_jump/DJ1.trc"),
     (f"field/laiarnold6_walk/{LAI_ARNOLD}", "field/laiarnold6_walk/walking1.trc"),
 ]
+SOUND = here(KNOWN)
 
 
 @pytest.fixture(params=SOUND, ids=[walk for _, walk in SOUND])
-def person(request, measured_folder, recording_of):
+def person(request, file_of, recording_of):
     """Places of a model's markers, a trial's, and which are on which segment."""
     model, trial = request.param
-    marker_set = markers_of_model(read_osim(measured_folder / model))
+    marker_set = markers_of_model(read_osim(file_of(model)))
     markers = recording_of(trial).without_empty_markers().markers
     return marker_set.in_model, markers.select([x for x in marker_set.labels if x in markers.labels]), marker_set
 
@@ -109,8 +114,8 @@ def test_markers_that_were_never_placed(person):
     assert any("not moved to where" in one or "not placed" in one for one in told)
 
 
-def test_markers_that_calibration_moved_far(measured_folder):
-    before = read_osim(measured_folder / "gait2354/subject01_scaled.osim").skeleton
+def test_markers_that_calibration_moved_far(file_of):
+    before = read_osim(file_of("synthetic/scaled.osim")).skeleton
     trial = Markers(np.zeros(1), before.labels, np.zeros((1, len(before.labels), 3)))
     moved = {"R.Heel": 0.08, "R.Toe.Tip": 0.03, "Top.Head": 0.2}
     after = before.with_markers(
@@ -120,7 +125,7 @@ def test_markers_that_calibration_moved_far(measured_folder):
         ]
     )
     (doubt,) = moved_doubts(before, after, [trial])
-    assert "R.Heel (calcn_r, 80 mm)" in doubt
+    assert "R.Heel (foot_r, 80 mm)" in doubt
     assert "Toe" not in doubt
     assert "Head" not in doubt
     assert moved_doubts(before, before, [trial]) == []

@@ -50,6 +50,6 @@ def test_a_marker_at_the_end_of_a_barbell():
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_models_in_use(measured_folder, name):
-    model = read_osim(measured_folder / name)
+def test_models_in_use(file_of, name):
+    model = read_osim(file_of(name))
     assert size_trouble(model.skeleton, model.bsp) == ""

@@ -8,13 +8,28 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.same_body import body_trouble, session_doubts
 from kinertia.trial.data import Markers
+from recordings import here
 
-PEOPLE = [
-    ("gait2354/subject01_static.trc", "gait2354/subject01_walk1.trc"),
-    ("rajagopal_walk/static_walk_1.trc", "rajagopal_walk/motion_capture_walk.trc"),
-    ("pig_c3d/subject_a_static.c3d", "pig_c3d/subject_a_walk.c3d"),
-    ("pig_c3d/subject_b_static.c3d", "pig_c3d/subject_b_walk.c3d"),
-]
+CLINIC = here(
+    [
+        ("synthetic/static.trc", "synthetic/walk.trc"),
+        ("gait2354/subject01_static.trc", "gait2354/subject01_walk1.trc"),
+    ]
+)
+JOINTS_AND_BACK = here(
+    [
+        ("synthetic/static.c3d", "synthetic/walk.c3d"),
+        ("synthetic/clusters_static.trc", "synthetic/clusters_walk.trc"),
+        ("rajagopal_walk/static_walk_1.trc", "rajagopal_walk/motion_capture_walk.trc"),
+        ("pig_c3d/subject_a_static.c3d", "pig_c3d/subject_a_walk.c3d"),
+        ("pig_c3d/subject_b_static.c3d", "pig_c3d/subject_b_walk.c3d"),
+    ]
+)
+"""With markers at knees and ankles in the walk, and two at the back of the pelvis."""
+PEOPLE = [*CLINIC, *JOINTS_AND_BACK]
+with_joints_and_back = pytest.mark.parametrize(
+    "person", JOINTS_AND_BACK, indirect=True, ids=[static for static, _ in JOINTS_AND_BACK]
+)
 
 
 @pytest.fixture(params=PEOPLE, ids=[static for static, _ in PEOPLE])
@@ -58,22 +73,20 @@ def test_one_marker_that_was_moved(person):
     assert "elsewhere" in doubt
 
 
+@with_joints_and_back
 def test_labels_that_were_exchanged(person):
     static, walk, marker_set = person
     knee, ankle = (marker_set.landmarks[f"{name}_lateral_l"][0] for name in ("knee", "ankle"))
-    if knee not in walk.labels or ankle not in walk.labels:
-        pytest.skip("the walk has no such markers")
     other = {knee: ankle, ankle: knee}
     labels = tuple(other.get(label, label) for label in walk.labels)
     trouble = body_trouble(static, Markers(walk.time, labels, walk.positions), marker_set)
     assert f"{knee} and {ankle} look swapped" in trouble or f"{ankle} and {knee} look swapped" in trouble
 
 
+@with_joints_and_back
 def test_front_and_back_of_the_pelvis_exchanged_in_one_trial(person):
     """Two pairs at once: either alone is no cure."""
     static, walk, marker_set = person
-    if not all(f"psis_{side}" in marker_set.landmarks for side in "rl"):
-        pytest.skip("one marker at the back of the pelvis")
     other = {}
     for side in "rl":
         (front,), (back,) = (marker_set.landmarks[f"{name}_{side}"] for name in ("asis", "psis"))

@@ -8,13 +8,18 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.trial.data import Markers
+from recordings import is_here
 
-PEOPLE = {
+STATURES_M = {
+    "synthetic/static.trc": 1.803,
+    "synthetic/static.c3d": 1.803,
+    "synthetic/clusters_static.trc": 1.803,
     "gait2354/subject01_static.trc": 1.803,
     "rajagopal_walk/static_walk_1.trc": 1.83,
     "pig_c3d/subject_a_static.c3d": 1.61,
     "pig_c3d/subject_b_static.c3d": 1.505,
 }
+PEOPLE = {name: height_m for name, height_m in STATURES_M.items() if is_here(name)}
 
 
 @pytest.fixture(params=PEOPLE.items(), ids=list(PEOPLE))

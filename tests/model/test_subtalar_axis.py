@@ -50,5 +50,5 @@ def test_an_axis_that_was_lost(heading, axis, degrees):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_models_in_use(measured_folder, name):
-    assert subtalar_axis_doubts(read_osim(measured_folder / name).skeleton) == []
+def test_models_in_use(file_of, name):
+    assert subtalar_axis_doubts(read_osim(file_of(name)).skeleton) == []
