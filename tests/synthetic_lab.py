@@ -1,11 +1,17 @@
 """A synthetic laboratory's files, which stand in for measured ones in tests where these are not there.
 
 One person, symmetric, with the markers of the Cleveland Clinic: `static.trc`, `walk.trc` with `walk_grf.mot` and the
+<<<<<<< HEAD
 ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`. Other trials, as `.trc` and `_grf.mot`: `other` (a
 faster walk), `alike` (one that is nearly as fast), and with all ground contact measured (`synthetic_motions`) `long` (a
 walk), `run` and `squats`. In C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
 and `walk.c3d`. And without forces, with clusters of markers (`synthetic_clusters`): `clusters_static.trc` and
 `clusters_walk.trc`.
+=======
+ExternalLoads file `walk_grf.xml`, a second walk `other.trc` with `other_grf.mot`, a scaled model `scaled.osim`, and
+the same as users have theirs, `users.osim` (`users_model`). And in
+C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d` and `walk.c3d`.
+>>>>>>> t-est
 """
 
 from __future__ import annotations
@@ -38,8 +44,12 @@ from kinertia.synthetic.walk import (
 )
 from kinertia.trial.data import Markers, Recording
 from osim_models import Person
+<<<<<<< HEAD
 from synthetic_clusters import STATIC_ONLY, with_clusters
 from synthetic_motions import long_walk, run, squats
+=======
+from users_model import users_model
+>>>>>>> t-est
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _MARKER_DIAMETER_M = 0.014
@@ -63,8 +73,8 @@ _FORCE = """      <ExternalForce name="{name}">
       </ExternalForce>"""
 
 
-WITH_MODEL = Person("synthetic", MASS_KG, "scaled", {"walk": ("walk_grf", "walk_grf")})
-"""The person with the scaled model."""
+WITH_MODEL = Person("synthetic", MASS_KG, "users", {"walk": ("walk_grf", "walk_grf")})
+"""The person with the user's model."""
 
 
 def synthetic_arguments(folder: Path) -> list[str]:
@@ -88,6 +98,7 @@ def write_synthetic_lab(folder: Path) -> Path:
     forces = [_FORCE.format(name=names[foot], body=f"foot_{foot}", plate=k) for k, foot in enumerate(feet, start=1)]
     (folder / "walk_grf.xml").write_text(_LOADS.format(forces="\n".join(forces), file="walk_grf.mot"), encoding="utf-8")
     export_osim(folder / "scaled.osim", person.skeleton, person.literature)
+    export_osim(folder / "users.osim", *users_model(person.skeleton, person.literature))
     with_widths = _recorded(with_plug_in_gait(person), third)
     for name in ("static", "walk"):
         write_c3d(folder / f"{name}.c3d", getattr(with_widths, name))

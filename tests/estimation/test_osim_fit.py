@@ -1,7 +1,8 @@
-"""`kinertia fit --model`: the files it leaves, opened by OpenSim, and what it finds on three users' models."""
+"""`kinertia fit --model`: the files it leaves, opened by OpenSim, and what it finds on four users' models."""
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,22 @@ import pytest
 
 import osim_models
 from command_line import fitted, run
+from kinertia.io.osim.exporter import export_osim
+from kinertia.io.osim.reader import read_osim
 from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
+from recordings import FITTED
 
 CASES = [
-    ("gait2354", False),
-    pytest.param("gait2354", True, marks=pytest.mark.slow),
-    pytest.param("rajagopal", True, marks=pytest.mark.slow),
+    case if case[0] == "synthetic" or case == ("gait2354", False) else pytest.param(*case, marks=pytest.mark.slow)
+    for case in [
+        ("synthetic", False),
+        ("synthetic", True),
+        ("gait2354", False),
+        ("gait2354", True),
+        ("rajagopal", True),
+    ]
+    if case[0] in FITTED
 ]
 
 
@@ -43,12 +53,11 @@ def opensim_markers(opensim, model: Path, motion: Path, labels) -> tuple[np.ndar
 
 
 @pytest.mark.parametrize(("name", "calibrate"), CASES)
-def test_opensim_sees_the_markers_where_the_fit_says(opensim, measured_folder, fit_with_model, name, calibrate):
+def test_opensim_sees_the_markers_where_the_fit_says(opensim, file_of, fit_with_model, name, calibrate):
     """Model and motion as written: all coordinates, locked and coupled ones too, and calibrated markers and joints."""
     folder = fit_with_model(name, calibrate)
     trial = json.loads((folder / "fit.json").read_text())["trials"][0]
-    (markers_file,) = osim_models.PEOPLE[name].trials
-    measured = read_trc(measured_folder / f"{markers_file}.trc")
+    measured = read_trc(file_of(FITTED[name]))
     labels = list(used_labels(folder))
     time, modelled = opensim_markers(opensim, folder / "model.osim", folder / "kinematics.mot", labels)
     frames = np.searchsorted(measured.time, time - 1e-6)
@@ -98,7 +107,7 @@ def assert_targets(folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["gait2354", "rajagopal"])
+@pytest.mark.parametrize("name", [name for name in ("synthetic", "gait2354", "rajagopal") if name in FITTED])
 def test_residuals_markers_and_parameters(fit_with_model, name):
     assert_targets(fit_with_model(name, True))
 
@@ -146,36 +155,38 @@ def test_the_built_in_model_is_written_as_a_model_too(opensim, fit_of):
     assert set(motion.columns) == names
 
 
-def options(data: Path, **more: object) -> list[object]:
-    walk = data / "gait2354" / "subject01_walk1"
-    given = {"--forces": f"{walk}_grf.mot", "--loads": f"{walk}_grf.xml", "--mass": 72.6}
-    given["--model"] = data / "gait2354" / "subject01_scaled.osim"
+def options(lab: Path, **more: object) -> list[object]:
+    given = {"--forces": lab / "walk_grf.mot", "--loads": lab / "walk_grf.xml", "--mass": 72.6}
+    given["--model"] = lab / "users.osim"
     given |= {f"--{name}": value for name, value in more.items()}
-    return [f"{walk}.trc", *(word for pair in given.items() for word in pair)]
+    return [lab / "walk.trc", *(word for pair in given.items() for word in pair)]
 
 
 BAD = {
     "no model": ({"model": "nowhere.osim"}, "no such file"),
-    "a model that is none": ({"model": "gait2354/subject01_walk1_grf.xml"}, "no Model in it"),
-    "a model without markers": ({"model": "gait2354/gait2354_simbody.osim"}, "no markers in it"),
+    "a model that is none": ({"model": "walk_grf.xml"}, "no Model in it"),
+    "a model without markers": ({"model": "bare.osim"}, "no markers in it"),
     "the study's method": ({"method": "two-level"}, "works on the built-in model only"),
-    "a static trial as well": ({"static": "gait2354/subject01_static.trc"}, "both osim and static"),
+    "a static trial as well": ({"static": "static.trc"}, "both osim and static"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line(measured_folder, tmp_path, case):
+def test_bad_input_is_one_line(synthetic_lab, tmp_path, case):
     given, message = BAD[case]
-    files = {key: measured_folder / value if "." in value else value for key, value in given.items()}
-    outcome = run("fit", *options(measured_folder, **files), "-o", tmp_path / "out")
+    model = read_osim(synthetic_lab / "users.osim")
+    export_osim(tmp_path / "bare.osim", replace(model.skeleton, markers=()), model.bsp)
+    folders = {"bare.osim": tmp_path}
+    files = {key: folders.get(value, synthetic_lab) / value if "." in value else value for key, value in given.items()}
+    outcome = run("fit", *options(synthetic_lab, **files), "-o", tmp_path / "out")
     assert outcome.status == 2
     assert message in " ".join(outcome.err.split())
     assert not (tmp_path / "out").exists()
 
 
-def test_calibrate_goes_with_a_model(measured_folder, tmp_path):
-    static = measured_folder / "gait2354" / "subject01_static.trc"
-    words = [*options(measured_folder)[:1], "--static", static, "--sex", "male", "--height", 1.8, "--mass", 72.6]
+def test_calibrate_goes_with_a_model(synthetic_lab, tmp_path):
+    static = synthetic_lab / "static.trc"
+    words = [*options(synthetic_lab)[:1], "--static", static, "--sex", "male", "--height", 1.8, "--mass", 72.6]
     outcome = run("fit", *words, "--calibrate", "-o", tmp_path / "out")
     assert outcome.status == 2
     assert "calibrate goes with osim" in " ".join(outcome.err.split())
