@@ -1,17 +1,14 @@
 """A synthetic laboratory's files, which stand in for measured ones in tests where these are not there.
 
 One person, symmetric, with the markers of the Cleveland Clinic: `static.trc`, `walk.trc` with `walk_grf.mot` and the
-<<<<<<< HEAD
 ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`. Other trials, as `.trc` and `_grf.mot`: `other` (a
 faster walk), `alike` (one that is nearly as fast), and with all ground contact measured (`synthetic_motions`) `long` (a
 walk), `run` and `squats`. In C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
 and `walk.c3d`. And without forces, with clusters of markers (`synthetic_clusters`): `clusters_static.trc` and
 `clusters_walk.trc`.
-=======
 ExternalLoads file `walk_grf.xml`, a second walk `other.trc` with `other_grf.mot`, a scaled model `scaled.osim`, and
 the same as users have theirs, `users.osim` (`users_model`). And in
 C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d` and `walk.c3d`.
->>>>>>> t-est
 """
 
 from __future__ import annotations
@@ -44,12 +41,9 @@ from kinertia.synthetic.walk import (
 )
 from kinertia.trial.data import Markers, Recording
 from osim_models import Person
-<<<<<<< HEAD
 from synthetic_clusters import STATIC_ONLY, with_clusters
 from synthetic_motions import long_walk, run, squats
-=======
 from users_model import users_model
->>>>>>> t-est
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _MARKER_DIAMETER_M = 0.014
