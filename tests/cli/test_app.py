@@ -145,14 +145,14 @@ def test_init_then_fill_in_then_fit(person):
     assert "[subject] lacks 'sex'" in refusal.err
     text = path.read_text()
     assert text.count("# sex = ") == 1
-    text = re.sub(r'# sex = "\w+"', 'sex = "male"', text).replace("[[trial]]", "[[trial]]\nwindow_s = [2.8, 3.05]")
+    text = re.sub(r'# sex = "\w+"', 'sex = "male"', text).replace("[[trial]]", "[[trial]]\nwindow_s = [1.2, 1.45]")
     path.write_text(text)
     fit = fitted(person / "out", path)
     assert fit.summary["subject"]["name"] == "anna [b]"
-    assert fit.summary["subject"]["mass_kg"] == pytest.approx(41.5, abs=0.1)
-    assert fit.trial["window_s"] == pytest.approx([2.8, 3.05])
-    assert "anna [b]: 41.5 kg" in fit.outcome.out
-    assert "walk: 2.800 to 3.050 s used" in " ".join(fit.outcome.out.split())
+    assert fit.summary["subject"]["mass_kg"] == pytest.approx(72.6, abs=0.1)
+    assert fit.trial["window_s"] == pytest.approx([1.2, 1.45])
+    assert "anna [b]: 72.6 kg" in fit.outcome.out
+    assert "walk: 1.200 to 1.450 s used" in " ".join(fit.outcome.out.split())
 
 
 @pytest.fixture

@@ -53,8 +53,12 @@ def test_the_static_trial_of_a_person_of_another_size(person, size):
     assert "another person" in trouble
 
 
+@pytest.mark.parametrize(
+    "person", [one for one in PEOPLE if one[0] != "synthetic/static.c3d"], indirect=True, ids=lambda one: one[0]
+)
 @pytest.mark.parametrize("seed", range(3))
 def test_markers_put_on_anew(person, seed):
+    """By 12 mm, which the two or three markers of a segment in Plug-in Gait show for most people, not for all."""
     static, walk, marker_set = person
     offsets = np.random.default_rng(seed).normal(0.0, 0.012, (len(static.labels), 3))
     (doubt,) = session_doubts(Markers(static.time, static.labels, static.positions + offsets), walk, marker_set)

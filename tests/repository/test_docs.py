@@ -44,7 +44,10 @@ def workshop(tmp_path, monkeypatch, request):
 
 
 @pytest.mark.parametrize(("group", "folder"), _examples())
-def test_examples_run(group, folder, workshop):
+def test_examples_run(group, folder, workshop, request):
+    if any("demo --measured" in block.text for block in group):
+        request.getfixturevalue("file_of")("gait2354/subject01_walk1.trc")
+        request.getfixturevalue("sample_walk")
     workshop(folder)
     namespace = {}
     for block in group:
