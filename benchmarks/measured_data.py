@@ -7,6 +7,7 @@ beside the repository, and the cache of `kinertia demo --measured`, which holds 
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 from kinertia.io.samples import VARIABLE, samples_folder
@@ -14,11 +15,12 @@ from kinertia.io.samples import VARIABLE, samples_folder
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
-def places() -> list[Path]:
-    """The folders that exist, best first."""
+@cache
+def places() -> tuple[Path, ...]:
+    """The folders that exist, best first; looked for once, since tests change the environment."""
     stated = os.environ.get(VARIABLE)
     folders = [*([Path(stated)] if stated else []), BESIDE, samples_folder()]
-    return [folder for folder in folders if folder.is_dir()]
+    return tuple(folder for folder in folders if folder.is_dir())
 
 
 def find(name: str) -> Path | None:
