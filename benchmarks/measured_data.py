@@ -12,6 +12,8 @@ from pathlib import Path
 
 from kinertia.io.samples import VARIABLE, samples_folder
 
+FOLDERS = ("gait2354", "pig_c3d", "rajagopal_walk", "subject4")
+"""Of the people that most benchmarks need."""
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -29,11 +31,12 @@ def find(name: str) -> Path | None:
 
 
 def data_folder() -> Path:
-    """The first of the places.
+    """The first place that holds all of FOLDERS.
 
     Raises:
         FileNotFoundError: there is none.
     """
     for folder in places():
-        return folder
-    raise FileNotFoundError(f"no measured recordings: {VARIABLE} is not set, and there is no {BESIDE}")
+        if all((folder / name).is_dir() for name in FOLDERS):
+            return folder
+    raise FileNotFoundError(f"no measured recordings: {VARIABLE} names none, and there are none in {BESIDE}")
