@@ -9,7 +9,7 @@ from kinertia.trial.mains_hum import hum_doubts, hum_trouble
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS, named_here
 
 OTHERS = {
-    **{f"long walk, {name}": files for name, files in LONG_WALKS.items()},
+    "long walk, synthetic": LONG_WALKS["synthetic"],
     **{f"run, {name}": files for name, files in RUNS.items()},
     **{f"squats at 100 Hz, {name}": files for name, files in SQUATS.items()},
     **named_here(

@@ -10,7 +10,7 @@ from kinertia.trial.torque_point import torque_point_doubts
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS, named_here
 
 OTHERS = {
-    **{f"long walk, {name}": files for name, files in LONG_WALKS.items()},
+    "long walk, synthetic": LONG_WALKS["synthetic"],
     **{f"run, {name}": files for name, files in RUNS.items()},
     **{f"squats, {name}": files for name, files in SQUATS.items()},
     **named_here(
