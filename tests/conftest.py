@@ -31,7 +31,7 @@ from kinertia.trial.data import Recording
 from measured_data import data_folder, find
 from once import once
 from quick_two_level import given_back
-from recordings import SYNTHETIC, is_here
+from recordings import SYNTHETIC
 from synthetic_lab import WITH_MODEL, synthetic_arguments, write_synthetic_lab
 from walks import fit_arguments
 
@@ -43,11 +43,10 @@ settings.load_profile("kinertia")
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 threadpool_limits(1, user_api="blas")
 
-MEASURED = "gait2354/subject01_walk1.trc"
 NEEDS_MEASURED = "need measured recordings"
-NOT_HERE = (
-    f"measured recordings: none in the folder that {samples.VARIABLE} names, in shared/data beside the repository "
-    "or in the cache of kinertia demo --measured; tests ran on synthetic ones"
+LOOKED_FOR = (
+    f"measured recordings are looked for in the folder that {samples.VARIABLE} names, in shared/data beside the "
+    "repository and in the cache of kinertia demo --measured; other tests ran on synthetic ones"
 )
 SUBJECT = """# A synthetic person, with the markers of Plug-in Gait.
 [subject]
@@ -82,10 +81,10 @@ def pytest_terminal_summary(terminalreporter):
         report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])
     )
     told = [f"{count} {reason}" for reason, count in reasons.most_common()]
+    if NEEDS_MEASURED in reasons:
+        told.append(LOOKED_FOR)
     if told:
         terminalreporter.write_line(f"{reasons.total()} skipped: {'; '.join(told)}")
-    if not is_here(MEASURED):
-        terminalreporter.write_line(NOT_HERE)
 
 
 @pytest.fixture(scope="session")
