@@ -35,8 +35,6 @@ from kinertia.io.subject_file import SubjectFile
 from kinertia.studies.cohort_resources import LOG
 
 NAMES = ("Anna", "Ben")
-DISKS_KB = (200, 4000, 5600)
-"""Too small for anybody, for everybody, and for the tables."""
 
 
 @contextmanager
@@ -108,6 +106,14 @@ def may_mount() -> bool:
     return os.getpid() > 0 and subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode == 0
 
 
+def disks_kb(calm: dict[str, bytes]) -> tuple[int, int, int]:
+    """Sizes of disks that are too small for anybody, for everybody, and for the tables."""
+    sizes_kb = {name: -(-len(content) // 1024) for name, content in calm.items()}
+    person = sum(size for name, size in sizes_kb.items() if name.startswith(f"people/{NAMES[0]}/"))
+    tables = sum(size for name, size in sizes_kb.items() if not name.startswith("people/"))
+    return 200, person + tables + 400, 2 * person + 400
+
+
 def with_full_disk(study: Path, out: Path, calm: dict[str, bytes], size_kb: int) -> tuple[int, str]:
     """Status and words of a run on a disk of this size; people on it are whole, and with more space all is finished."""
     disk, words = str(out.parent), study.with_suffix(".txt")
@@ -151,7 +157,7 @@ def main() -> None:
         assert ended(forked(lambda: cohort(study, out))) in (0, 1)
         last = files(out)
         assert last == calm, [name for name in last.keys() | calm.keys() if last.get(name) != calm.get(name)]
-        said = [with_full_disk(study, out, calm, size_kb) for size_kb in DISKS_KB] if may_mount() else []
+        said = [with_full_disk(study, out, calm, size_kb) for size_kb in disks_kb(calm)] if may_mount() else []
     print(json.dumps([early, with_people, *said]))
 
 
