@@ -13,6 +13,7 @@ from command_line import run
 from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
 from kinertia.cli.app import application
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.samples import NAME, SHA256
 from kinertia.io.subject_file import read_subject
 
 
@@ -77,12 +78,13 @@ def test_numbers_on_pages_can_be_renewed():
         renewed("b 1", "a 1")
 
 
-def test_subject_file_examples_are_valid(workshop):
-    folder = workshop("gait2354")
+def test_subject_file_examples_are_valid(sample_walk, tmp_path):
     known = {}
+    for name in SHA256:
+        (tmp_path / name).symlink_to(sample_walk / NAME / name)
     for block in blocks((ROOT / "docs" / "subject-file.md").read_text(encoding="utf-8")):
         assert block.language == "toml"
-        path = folder / f"example{len(known)}.toml"
+        path = tmp_path / f"example{len(known)}.toml"
         path.write_text(block.text)
         known[path] = read_subject(path) if "[subject]" in block.text else read_marker_set(path)
     assert len(known) == 2
@@ -133,7 +135,7 @@ def _column(page, heading):
 
 
 def test_results_page_names_every_file_and_column(fit_of):
-    fitted = fit_of("gait2354")
+    fitted = fit_of("synthetic")
     written = {path.name for path in fitted.folder.glob("[!.]*")}
     assert set(_column("results.md", "<!-- files of kinertia fit -->")) == written
     assert _column("results.md", "## bsp.csv") == list(pd.read_csv(fitted.folder / "bsp.csv", nrows=1).columns)

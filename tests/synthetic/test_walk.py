@@ -17,6 +17,22 @@ from kinertia.synthetic.walk import (
     walk,
     walking_subject,
 )
+from recordings import is_here
+
+CONSISTENT = {
+    "synthetic": (("synthetic/static.trc", "synthetic/walk.trc", "synthetic/walk_grf.mot"), 72.6, 1.803, (1.09, 2.16)),
+    "rajagopal": (
+        (
+            "rajagopal_walk/static_walk_1.trc",
+            "rajagopal_walk/motion_capture_walk.trc",
+            "rajagopal_walk/grf_walk.mot",
+        ),
+        85.0,
+        1.83,
+        (0.6, 1.84),
+    ),
+}
+"""Static trial, markers and forces, mass (kg), height (m), and between which times all ground contact is measured (s)."""
 
 
 @pytest.fixture(scope="module")
@@ -173,17 +189,19 @@ def test_loads_that_cannot_be_balanced_are_refused(trial):
         consistent_trial(trial.skeleton, trial.bsp, trial.time, trial.motion, upside_down)
 
 
-def test_a_measured_walk_becomes_consistent(measured_folder, tmp_path):
-    folder = measured_folder / "rajagopal_walk"
+@pytest.mark.parametrize("name", [name for name, (files, *_) in CONSISTENT.items() if is_here(files)])
+def test_a_recorded_walk_becomes_consistent(file_of, tmp_path, name):
+    files, mass_kg, height_m, window_s = CONSISTENT[name]
+    static, markers, forces = (file_of(one) for one in files)
     file = tmp_path / "subject.toml"
     file.write_text(
-        f'[subject]\nsex = "male"\nmass_kg = 85.0\nheight_m = 1.83\n'
-        f'[model]\nstatic = "{folder}/static_walk_1.trc"\n'
-        f'[[trial]]\nmarkers = "{folder}/motion_capture_walk.trc"\nforces = "{folder}/grf_walk.mot"\n'
+        f'[subject]\nsex = "male"\nmass_kg = {mass_kg}\nheight_m = {height_m}\n'
+        f'[model]\nstatic = "{static.as_posix()}"\n'
+        f'[[trial]]\nmarkers = "{markers.as_posix()}"\nforces = "{forces.as_posix()}"\n'
     )
     trial, name = measured_trial(read_subject(file))
     assert largest_residual(trial) < 1e-9
-    assert name.startswith("motion_capture_walk, 0.")
-    assert np.ptp(trial.time) == pytest.approx(1.24, abs=0.02)
+    assert name.startswith(f"{markers.stem}, {window_s[0]:.1f}")
+    assert np.ptp(trial.time) == pytest.approx(window_s[1] - window_s[0], abs=0.02)
     assert 0.0 < trial.deviation[:3].max() < 0.02
     assert 0.0 < trial.deviation[3:].max() < np.radians(10)
