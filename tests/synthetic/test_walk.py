@@ -32,7 +32,7 @@ CONSISTENT = {
         (0.6, 1.84),
     ),
 }
-"""Static trial, markers and forces, mass (kg), height (m), and between which times all ground contact is measured (s)."""
+"""Static trial, markers and forces, mass (kg), height (m), and when all ground contact is measured (s)."""
 
 
 @pytest.fixture(scope="module")

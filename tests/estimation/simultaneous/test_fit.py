@@ -1,21 +1,14 @@
-import json
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
-from kinertia.estimation.estimate import estimate_bsp
-from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
-from kinertia.report.files import save_fit
-from kinertia.settings import Settings, Subject
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -306,30 +299,6 @@ def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
     assert any("did not converge within 1 steps" in w for w in fitted(trial).warnings)
 
 
-def fit_of_files(recording_of, folder: str, sex: str) -> Fit:
-    walked, static = (recording_of(f"{folder}{kind}.c3d") for kind in ("walk", "static"))
-    return estimate_bsp(Subject(name="B", sex=sex), static, [TrialInput(walked)], Settings(method="simultaneous"))
-
-
-@pytest.fixture(scope="module")
-def of_files(recording_of) -> Fit:
-    return fit_of_files(recording_of, "synthetic/", "male")
-
-
-@pytest.mark.slow
-def test_measured_walk_meets_residuals_and_markers(recording_of):
-    found = fit_of_files(recording_of, "pig_c3d/subject_b_", "female")
-    (trial,) = found.trials
-    residual = np.sqrt(np.square(trial.residuals["estimate"]).reshape(-1, 2, 3).sum(axis=2).mean(axis=0))
-    assert residual[0] < 5.0
-    assert residual[1] < 3.0
-    rms = {stage: np.sqrt(np.nanmean(np.square(errors))) for stage, errors in trial.marker_errors_m.items()}
-    assert rms["final"] < 0.012
-    assert rms["final"] < 1.3 * rms["ik"]
-    assert found.converged
-    assert found.estimate.physically_consistent().all()
-
-
 def test_forces_of_one_of_two_trials_are_late(trial):
     """The delay is that trial's: neither the other one nor the plates are accused."""
 
@@ -384,22 +353,6 @@ def test_the_only_trial_of_a_person_is_one_of_several_of_the_session(trial):
     assert value == pytest.approx(2 * (trial.time[1] - trial.time[0]), abs=3.0 * sd)
     assert late.result.clock_s[0] == pytest.approx(0.0, abs=0.001)
     assert fit_of(0).result.delays_s == ()
-
-
-def test_files_of_a_simultaneous_fit(of_files, tmp_path):
-    folder = save_fit(of_files, tmp_path / "out")
-    bsp = pd.read_csv(folder / "bsp.csv")
-    assert len(bsp) == 120
-    np.testing.assert_allclose(bsp["information"], 1 - (bsp["sd"] / bsp["prior_sd"]) ** 2, atol=1e-9)
-    summary = json.loads((folder / "fit.json").read_text())
-    assert summary["method"] == "simultaneous"
-    assert summary["converged"] is True
-    assert summary["iterations"] > 1
-    assert set(summary["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
-    noise = summary["marker_noise"][of_files.trials[0].name]
-    assert noise["correlation_s"] > 0
-    assert min(noise["sd_m"].values()) >= 0.001
-    assert isinstance(noise["wandering"], list)
 
 
 @pytest.mark.slow

@@ -1,0 +1,53 @@
+"""Fits of recordings as they are read: what they leave on the disk, and what must hold on a measured walk."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from kinertia.estimation.estimate import estimate_bsp
+from kinertia.estimation.prepare import TrialInput
+from kinertia.estimation.result import Fit
+from kinertia.report.files import save_fit
+from kinertia.settings import Settings, Subject
+
+
+def fit_of_files(recording_of, folder: str, sex: str) -> Fit:
+    walked, static = (recording_of(f"{folder}{kind}.c3d") for kind in ("walk", "static"))
+    return estimate_bsp(Subject(name="B", sex=sex), static, [TrialInput(walked)], Settings(method="simultaneous"))
+
+
+@pytest.fixture(scope="module")
+def of_files(recording_of) -> Fit:
+    return fit_of_files(recording_of, "synthetic/", "male")
+
+
+@pytest.mark.slow
+def test_measured_walk_meets_residuals_and_markers(recording_of):
+    found = fit_of_files(recording_of, "pig_c3d/subject_b_", "female")
+    (trial,) = found.trials
+    residual = np.sqrt(np.square(trial.residuals["estimate"]).reshape(-1, 2, 3).sum(axis=2).mean(axis=0))
+    assert residual[0] < 5.0
+    assert residual[1] < 3.0
+    rms = {stage: np.sqrt(np.nanmean(np.square(errors))) for stage, errors in trial.marker_errors_m.items()}
+    assert rms["final"] < 0.012
+    assert rms["final"] < 1.3 * rms["ik"]
+    assert found.converged
+    assert found.estimate.physically_consistent().all()
+
+
+def test_files_of_a_simultaneous_fit(of_files, tmp_path):
+    folder = save_fit(of_files, tmp_path / "out")
+    bsp = pd.read_csv(folder / "bsp.csv")
+    assert len(bsp) == 120
+    np.testing.assert_allclose(bsp["information"], 1 - (bsp["sd"] / bsp["prior_sd"]) ** 2, atol=1e-9)
+    summary = json.loads((folder / "fit.json").read_text())
+    assert summary["method"] == "simultaneous"
+    assert summary["converged"] is True
+    assert summary["iterations"] > 1
+    assert set(summary["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
+    noise = summary["marker_noise"][of_files.trials[0].name]
+    assert noise["correlation_s"] > 0
+    assert min(noise["sd_m"].values()) >= 0.001
+    assert isinstance(noise["wandering"], list)
