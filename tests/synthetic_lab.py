@@ -41,7 +41,7 @@ from synthetic_clusters import STATIC_ONLY, with_clusters
 from synthetic_motions import long_walk, run, squats
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
-_MARKER_DIAMETER_M = 0.014
+MARKER_DIAMETER_M = 0.014
 _LOADS = """<?xml version="1.0" encoding="UTF-8"?>
 <OpenSimDocument Version="40000">
   <ExternalLoads name="loads">
@@ -153,7 +153,7 @@ def with_plug_in_gait(person: SyntheticSubject) -> SyntheticSubject:
     widths = {
         f"{side}{joint}Width": float(
             np.linalg.norm(np.subtract(*(_at(person.skeleton, f"{side}.{joint}.{end}") for end in ("Lat", "Med"))))
-            - _MARKER_DIAMETER_M
+            - MARKER_DIAMETER_M
         )
         for side in "RL"
         for joint in ("Knee", "Ankle")
