@@ -15,6 +15,7 @@ from kinertia.io.recording import read_recording
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Markers, PlateLoads
+from recordings import here
 
 
 @pytest.fixture(scope="module")
@@ -204,10 +205,14 @@ def test_static_trial_without_a_landmark(lab, marker_set):
 
 @pytest.mark.parametrize(
     ("markers", "forces"),
-    [
-        ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
-        ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
-    ],
+    here(
+        [
+            ("synthetic/long.trc", "synthetic/long_grf.mot"),
+            ("synthetic/run.trc", "synthetic/run_grf.mot"),
+            ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+            ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
+        ]
+    ),
 )
 def test_mass_on_one_belt_is_that_of_two_plates(recording_of, markers, forces):
     """While both feet stand on it, the sum of their loads is known, which is all that weighs."""
@@ -221,6 +226,10 @@ def test_mass_on_one_belt_is_that_of_two_plates(recording_of, markers, forces):
 
 
 WALKS = {
+    "synthetic/walk.trc": ("synthetic/walk_grf.mot", 72.6, "pass", (1.09, 2.17)),
+    "synthetic/long.trc": ("synthetic/long_grf.mot", 72.6, "pass", (0.0, 3.7)),
+    "synthetic/squats.trc": ("synthetic/squats_grf.mot", 72.6, "pass", (0.0, 5.0)),
+    "synthetic/walk.c3d": (None, 72.6, "pass", (1.09, 2.17)),
     "gait2354/subject01_walk1.trc": ("gait2354/subject01_walk1_grf.mot", 72.6, "pass", (0.0, 2.5)),
     "rajagopal_walk/motion_capture_walk.trc": ("rajagopal_walk/grf_walk.mot", 84.0, "pass", (0.48, 1.95)),
     "pig_c3d/subject_a_walk.c3d": (None, 41.5, "caution", (2.76, 3.58)),
@@ -229,7 +238,7 @@ WALKS = {
 }
 
 
-@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize("name", here(WALKS))
 def test_measured_walks(recording_of, name):
     forces, mass_kg, level, window = WALKS[name]
     recording = recording_of(name, forces)
