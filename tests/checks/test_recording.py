@@ -298,5 +298,5 @@ def test_a_file_of_another_laboratory(of_another_laboratory, recording_of, unit,
         ("plates_type1", "m", "+Y"),
     ],
 )
-def test_measured_files_of_other_laboratories(measured_folder, name, unit, vertical):
-    assert_foreign(read_recording(measured_folder / "c3d_variety" / f"{name}.c3d"), unit, vertical)
+def test_measured_files_of_other_laboratories(file_of, name, unit, vertical):
+    assert_foreign(read_recording(file_of(f"c3d_variety/{name}.c3d")), unit, vertical)
