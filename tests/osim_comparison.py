@@ -5,16 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from kinertia.model.imported import OsimModel
 from kinertia.motion.dynamics import Motion, inverse_dynamics
+from recordings import here
 
-MODELS = (
-    "gait2354/subject01_scaled.osim",
-    "rajagopal_walk/Rajagopal2016.osim",
-    "rajagopal_walk/scaled.osim",
-    "subject4/addbiomechanics_scaled.osim",
-)
+SYNTHETIC, GAIT2354, RAJAGOPAL = "synthetic/scaled.osim", "gait2354/subject01_scaled.osim", "rajagopal_walk/scaled.osim"
+SMALL = here([SYNTHETIC, GAIT2354])
+LARGE = here(["rajagopal_walk/Rajagopal2016.osim", RAJAGOPAL, "subject4/addbiomechanics_scaled.osim"])
+MODELS = [*SMALL, *LARGE]
+SLOW_IF_LARGE = [*SMALL, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)]
+"""Files of models; comparisons of large ones take seconds."""
 N_STATES = 20
 
 

@@ -77,6 +77,15 @@ CUSTOM_ROOT = transform(
     ]
 )
 
+
+def coupler(function: str, dependent: str = "b", leader: str = "a", scale: str = "") -> str:
+    return (
+        f'<CoordinateCouplerConstraint name="pair{dependent}"><coupled_coordinates_function>{function}'
+        f"</coupled_coordinates_function><independent_coordinate_names>{leader}</independent_coordinate_names>"
+        f"<dependent_coordinate_name>{dependent}</dependent_coordinate_name>{scale}</CoordinateCouplerConstraint>"
+    )
+
+
 STANDING = (("0 0 0", "0 0 0"), ("0 0 0", "0 0 0"))
 
 

@@ -46,7 +46,7 @@ from synthetic_motions import long_walk, run, squats
 from users_model import users_model
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
-_MARKER_DIAMETER_M = 0.014
+MARKER_DIAMETER_M = 0.014
 _LOADS = """<?xml version="1.0" encoding="UTF-8"?>
 <OpenSimDocument Version="40000">
   <ExternalLoads name="loads">
@@ -171,7 +171,7 @@ def with_plug_in_gait(person: SyntheticSubject) -> SyntheticSubject:
     widths = {
         f"{side}{joint}Width": float(
             np.linalg.norm(np.subtract(*(_at(person.skeleton, f"{side}.{joint}.{end}") for end in ("Lat", "Med"))))
-            - _MARKER_DIAMETER_M
+            - MARKER_DIAMETER_M
         )
         for side in "RL"
         for joint in ("Knee", "Ankle")

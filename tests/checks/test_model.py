@@ -7,13 +7,15 @@ import upright_model as upright
 from kinertia.checks.model import check_model
 from kinertia.checks.verdict import stands_against
 from kinertia.errors import SubjectError
-from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.io.osim.exporter import export_osim
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.model.anatomy import model_segments
 from kinertia.model.anthropometry import SEGMENTS, literature_bsp
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.gait27 import build_gait27
+from recordings import here
 
 PERSON = (upright.MASS_KG, upright.HEIGHT_M, upright.SEX)
 
@@ -187,6 +189,7 @@ def test_a_person_who_cannot_be():
 
 
 KNOWN = {
+    "synthetic/scaled.osim": ((70.0, 1.803, "male"), False, "the bodies weigh 72.6 kg together"),
     "gait2354/subject01_scaled.osim": ((72.6, 1.803, "male"), False, "three equal moments of inertia"),
     "gait2354/gait2354_simbody.osim": ((), False, "rounded to two digits or less: calcn_r"),
     "rajagopal_walk/Rajagopal2016.osim": ((), True, "rounded to two digits or less: calcn_r"),
@@ -195,31 +198,42 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("name", KNOWN)
-def test_models_in_use(measured_folder, name):
+@pytest.mark.parametrize("name", here(KNOWN))
+def test_models_in_use(file_of, name):
     """None is impossible; those with arms carry them twice, which is known of them."""
     person, arms_twice, words = KNOWN[name]
-    model = read_osim(measured_folder / name)
+    model = read_osim(file_of(name))
     model_check = check_model(model.skeleton, model.bsp, *person)
     assert not stands_against(model_check.verdicts)
     assert words in sentences(model_check, "caution")
     assert ("still seems to include the arms' inertia" in sentences(model_check, "caution")) == arms_twice
 
 
-MEASURED = {  # the static trial; how far the pelvis may be off, whose hips the model's scaling places otherwise
+SCALED = {  # the static trial; how far the pelvis may be off, whose hips the model's scaling places otherwise
+    "synthetic": ("synthetic/static.trc", (72.6, 1.803, "male"), 0.1),
     "gait2354/subject01_scaled.osim": ("gait2354/subject01_static.trc", (72.6, 1.80, "male"), 0.1),
     "rajagopal_walk/scaled.osim": ("rajagopal_walk/static_walk_1.trc", (85.0, 1.83, "male"), 0.3),
 }
 
 
+@pytest.fixture
+def harringtons_model(file_of, tmp_path):
+    """File of a synthetic person's model with the hips where a model's are taken to be: by Harrington, not Bell."""
+    static, (mass_kg, *rest), _ = SCALED["synthetic"]
+    model = build_gait27(read_recording(file_of(static)), read_marker_set("cleveland-clinic"), *rest, "harrington")
+    export_osim(tmp_path / "scaled.osim", model.skeleton, literature_bsp(mass_kg, *rest, model.geometry))
+    return tmp_path / "scaled.osim"
+
+
 @pytest.mark.parametrize("source", ["deleva", "dumas"])
-@pytest.mark.parametrize("name", MEASURED)
-def test_literature_for_the_trunk_is_the_one_of_a_fit(measured_folder, name, source):
+@pytest.mark.parametrize("name", ["synthetic", *here([name for name in SCALED if name != "synthetic"])])
+def test_literature_for_the_trunk_is_the_one_of_a_fit(file_of, harringtons_model, name, source):
     """As `kinertia fit` has it by the markers of the static trial, whatever the model's lumbar joint."""
-    trial, person, off = MEASURED[name]
-    static = read_recording(measured_folder / trial)
-    own = build_gait27(static, choose_marker_set(static.markers.labels), *person[1:]).geometry
-    model = read_osim(measured_folder / name)
+    trial, person, off = SCALED[name]
+    static = read_recording(file_of(trial))
+    hips = "harrington" if name == "synthetic" else "bell"
+    own = build_gait27(static, choose_marker_set(static.markers.labels), *person[1:], hips).geometry
+    model = read_osim(harringtons_model if name == "synthetic" else file_of(name))
     segments = model_segments(model.skeleton, model.bsp, *person[1:])
     bodies = [literature_bsp(*person, geometry, source).table() for geometry in (segments.geometry, own)]
     pelvis, torso = SEGMENTS.index("pelvis"), SEGMENTS.index("torso")

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import ezc3d
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from kinertia.io.recording import read_recording
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Markers, PlateLoads
+from recordings import here
 
 
 @pytest.fixture(scope="module")
@@ -204,10 +206,14 @@ def test_static_trial_without_a_landmark(lab, marker_set):
 
 @pytest.mark.parametrize(
     ("markers", "forces"),
-    [
-        ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
-        ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
-    ],
+    here(
+        [
+            ("synthetic/long.trc", "synthetic/long_grf.mot"),
+            ("synthetic/run.trc", "synthetic/run_grf.mot"),
+            ("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot"),
+            ("field/hamner_run/subject02_running.trc", "field/hamner_run/subject02_running_grf.mot"),
+        ]
+    ),
 )
 def test_mass_on_one_belt_is_that_of_two_plates(recording_of, markers, forces):
     """While both feet stand on it, the sum of their loads is known, which is all that weighs."""
@@ -221,6 +227,10 @@ def test_mass_on_one_belt_is_that_of_two_plates(recording_of, markers, forces):
 
 
 WALKS = {
+    "synthetic/walk.trc": ("synthetic/walk_grf.mot", 72.6, "pass", (1.09, 2.17)),
+    "synthetic/long.trc": ("synthetic/long_grf.mot", 72.6, "pass", (0.0, 3.7)),
+    "synthetic/squats.trc": ("synthetic/squats_grf.mot", 72.6, "pass", (0.0, 5.0)),
+    "synthetic/walk.c3d": (None, 72.6, "pass", (1.09, 2.17)),
     "gait2354/subject01_walk1.trc": ("gait2354/subject01_walk1_grf.mot", 72.6, "pass", (0.0, 2.5)),
     "rajagopal_walk/motion_capture_walk.trc": ("rajagopal_walk/grf_walk.mot", 84.0, "pass", (0.48, 1.95)),
     "pig_c3d/subject_a_walk.c3d": (None, 41.5, "caution", (2.76, 3.58)),
@@ -229,8 +239,8 @@ WALKS = {
 }
 
 
-@pytest.mark.parametrize("name", WALKS)
-def test_measured_walks(recording_of, name):
+@pytest.mark.parametrize("name", here(WALKS))
+def test_sound_trials(recording_of, name):
     forces, mass_kg, level, window = WALKS[name]
     recording = recording_of(name, forces)
     own = Path(__file__).parents[1] / "subject4.toml"
@@ -242,6 +252,43 @@ def test_measured_walks(recording_of, name):
     assert check.mass.mass_kg == pytest.approx(mass_kg, rel=0.065)
 
 
+@pytest.fixture
+def of_another_laboratory(tmp_path, synthetic_lab):
+    """Writes the synthetic walk with labels that nobody knows, in this unit and with this axis up."""
+
+    def write(unit, vertical):
+        file = ezc3d.c3d(str(synthetic_lab / "walk.c3d"))
+        points, plates = file["parameters"]["POINT"], file["parameters"]["FORCE_PLATFORM"]
+        turn = {"+Z": np.eye(3), "+Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])}[vertical]
+        turn = turn * {"mm": 1.0, "m": 1e-3}[unit]
+        points["UNITS"]["value"], points["Y_SCREEN"]["value"] = [unit], [vertical]
+        points["LABELS"]["value"] = [f"M{k}" for k in range(len(points["LABELS"]["value"]))]
+        file["data"]["points"][:3] = np.einsum("ij,jmn->imn", turn, file["data"]["points"][:3])
+        plates["CORNERS"]["value"] = np.einsum("ij,jcp->icp", turn, plates["CORNERS"]["value"])
+        del file["parameters"]["PROCESSING"], file["data"]["meta_points"]
+        file.write(str(tmp_path / "other.c3d"))
+        return tmp_path / "other.c3d"
+
+    return write
+
+
+def assert_foreign(recording, unit, vertical):
+    check = check_recording(recording)
+    assert (recording.length_unit, recording.vertical) == (unit, vertical)
+    assert "no marker set fits" in sentences(check, "fail")
+    assert all(plate.outside_share in (None, 0.0) for plate in check.plates)
+    return check
+
+
+@pytest.mark.parametrize("unit", ["mm", "m"])
+@pytest.mark.parametrize("vertical", ["+Y", "+Z"])
+def test_a_file_of_another_laboratory(of_another_laboratory, recording_of, unit, vertical):
+    check = assert_foreign(read_recording(of_another_laboratory(unit, vertical)), unit, vertical)
+    own = check_recording(recording_of("synthetic/walk.c3d", None))
+    assert [plate.outside_share for plate in check.plates] == [plate.outside_share for plate in own.plates] == [0.0] * 2
+    assert [plate.peak_n for plate in check.plates] == pytest.approx([plate.peak_n for plate in own.plates])
+
+
 @pytest.mark.parametrize(
     ("name", "unit", "vertical"),
     [
@@ -251,9 +298,5 @@ def test_measured_walks(recording_of, name):
         ("plates_type1", "m", "+Y"),
     ],
 )
-def test_files_of_other_laboratories(measured_folder, name, unit, vertical):
-    recording = read_recording(measured_folder / "c3d_variety" / f"{name}.c3d")
-    check = check_recording(recording)
-    assert (recording.length_unit, recording.vertical) == (unit, vertical)
-    assert "no marker set fits" in sentences(check, "fail")
-    assert all(plate.outside_share in (None, 0.0) for plate in check.plates)
+def test_measured_files_of_other_laboratories(file_of, name, unit, vertical):
+    assert_foreign(read_recording(file_of(f"c3d_variety/{name}.c3d")), unit, vertical)

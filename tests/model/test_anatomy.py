@@ -6,6 +6,7 @@ import upright_model as upright
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.anatomy import model_segments, segment_of
 from kinertia.model.bsp import BodySegmentParameters
+from recordings import here
 
 
 @pytest.mark.parametrize(
@@ -83,17 +84,22 @@ def test_models_without_arms_or_without_known_names():
     assert segments.geometry is None
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["gait2354/subject01_scaled.osim", "rajagopal_walk/scaled.osim", "subject4/addbiomechanics_scaled.osim"],
-)
-def test_measured_models_keep_their_mass_and_whole_body_centre(measured_folder, name):
+THIGHS = {
+    "synthetic/scaled.osim": "thigh",
+    "gait2354/subject01_scaled.osim": "femur",
+    "rajagopal_walk/scaled.osim": "femur",
+    "subject4/addbiomechanics_scaled.osim": "femur",
+}
+
+
+@pytest.mark.parametrize("name", here(THIGHS))
+def test_scaled_models_keep_their_mass_and_whole_body_centre(file_of, name):
     """All bodies have a segment, and femurs, whose frames nearly are the segment's, stay as they are."""
-    model = read_osim(measured_folder / name)
+    model = read_osim(file_of(name))
     segments = model_segments(model.skeleton, model.bsp)
     assert segments.unknown == ()
     assert segments.bsp.total_mass_kg == pytest.approx(model.bsp.total_mass_kg)
-    femur = model.bsp.segments.index("femur_r")
+    femur = model.bsp.segments.index(f"{THIGHS[name]}_r")
     thigh = segments.bsp.segments.index("thigh_r")
     assert segments.bsp.com_m[thigh] == pytest.approx(model.bsp.com_m[femur], abs=0.008)
     assert segments.geometry.lengths_m["thigh_r"] == pytest.approx(segments.geometry.lengths_m["thigh_l"])

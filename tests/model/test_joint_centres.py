@@ -9,21 +9,32 @@ from kinertia.io.recording import read_recording
 from kinertia.model import joint_centres as jc
 from kinertia.model.gait27 import build_gait27
 from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.synthetic.walk import HEIGHT_M
+from synthetic_lab import MARKER_DIAMETER_M, symmetric_person
 
 PLUG_IN = read_marker_set("plug-in-gait")
 
 
-@pytest.fixture(scope="module", params=[("a", 1.61), ("b", 1.505)], ids=["A", "B"])
-def vicon(request, measured_folder):
-    """Our static model and its angles (deg), and Plug-in Gait's own outputs in ground axes (m, deg)."""
-    subject, height = request.param
-    path = measured_folder / f"pig_c3d/subject_{subject}_static.c3d"
+SAGITTAL = {"hip_flexion": "Hip", "knee_angle": "Knee", "ankle_angle": "Ankle"}
+"""Coordinates, and what Plug-in Gait calls them."""
+
+
+def standing(path, height_m):
+    """Model of a static trial, origins of its segments in ground axes (m), and its angles (deg)."""
     static = read_recording(path)
-    skeleton = build_gait27(static, PLUG_IN, height, "male").skeleton
+    skeleton = build_gait27(static, PLUG_IN, height_m, "male").skeleton
     ik = solve_ik(skeleton, static.markers)
     pose = skeleton.pose(ik.q[:1])
     origins = dict(zip(skeleton.segments, pose.translation[0], strict=True))
-    angles = dict(zip(ik.coordinates, np.degrees(ik.q.mean(axis=0)), strict=True))
+    return static, origins, dict(zip(ik.coordinates, np.degrees(ik.q.mean(axis=0)), strict=True))
+
+
+@pytest.fixture(scope="module", params=[("a", 1.61), ("b", 1.505)], ids=["A", "B"])
+def vicon(request, file_of):
+    """Our static model and its angles (deg), and Plug-in Gait's own outputs in ground axes (m, deg)."""
+    subject, height = request.param
+    path = file_of(f"pig_c3d/subject_{subject}_static.c3d")
+    static, origins, angles = standing(path, height)
     file = ezc3d.c3d(str(path))
     labels = file["parameters"]["POINT"]["LABELS"]["value"]
     mean = dict(zip(labels, file["data"]["points"][:3].mean(axis=2).T, strict=True))
@@ -33,20 +44,40 @@ def vicon(request, measured_folder):
     return origins, angles, mean, to_ground
 
 
-@pytest.mark.parametrize("side", "rl")
-def test_knee_and_ankle_centres_are_plug_in_gaits(vicon, side):
+def test_knee_and_ankle_centres_are_plug_in_gaits(vicon):
     """Within the difference of the hip centres (Bell's, not Davis') and the medians' from the means."""
     origins, _, mean, to_ground = vicon
-    for segment, label, tolerance in (("shank", "FEO", 0.004), ("talus", "TIO", 0.002)):
-        theirs = 1e-3 * mean[side.upper() + label] @ to_ground
-        assert np.linalg.norm(origins[f"{segment}_{side}"] - theirs) < tolerance
+    for side in "rl":
+        for segment, label, tolerance in (("shank", "FEO", 0.004), ("talus", "TIO", 0.002)):
+            theirs = 1e-3 * mean[side.upper() + label] @ to_ground
+            assert np.linalg.norm(origins[f"{segment}_{side}"] - theirs) < tolerance, (segment, side)
+
+
+def test_sagittal_angles_are_plug_in_gaits(vicon):
+    _, angles, mean, _ = vicon
+    for side in "rl":
+        for coordinate, output in SAGITTAL.items():
+            theirs = mean[f"{side.upper()}{output}Angles"][0]
+            assert angles[f"{coordinate}_{side}"] == pytest.approx(theirs, abs=2.0), (coordinate, side)
 
 
 @pytest.mark.parametrize("side", "rl")
-def test_sagittal_angles_are_plug_in_gaits(vicon, side):
-    _, angles, mean, _ = vicon
-    for coordinate, output in (("hip_flexion", "Hip"), ("knee_angle", "Knee"), ("ankle_angle", "Ankle")):
-        assert angles[f"{coordinate}_{side}"] == pytest.approx(mean[f"{side.upper()}{output}Angles"][0], abs=2.0)
+def test_joints_by_widths_are_the_persons(synthetic_lab, side):
+    """Centres half a width inward of the marker, as close to the truth as a level axis is to that of a tilted ankle."""
+    static, origins, angles = standing(synthetic_lab / "static.c3d", HEIGHT_M)
+    person = symmetric_person()
+    ik = solve_ik(person.skeleton, person.static.markers)
+    true = dict(zip(ik.coordinates, np.degrees(ik.q.mean(axis=0)), strict=True))
+    pose = person.skeleton.pose(ik.q[:1])
+    centres = dict(zip(person.skeleton.segments, pose.translation[0], strict=True))
+    marks = jc.find_landmarks(static, PLUG_IN)
+    for joint, segment in (("knee", "shank"), ("ankle", "talus")):
+        centre, outer = origins[f"{segment}_{side}"], marks[f"{joint}_lateral_{side}"]
+        width = static.measurements[f"{side.upper()}{joint.capitalize()}Width"] + MARKER_DIAMETER_M
+        assert np.linalg.norm(centre - outer) == pytest.approx(width / 2, abs=1e-3)
+        assert np.linalg.norm((centre - centres[f"{segment}_{side}"])[[0, 2]]) < 0.003
+    for coordinate in SAGITTAL:
+        assert angles[f"{coordinate}_{side}"] == pytest.approx(true[f"{coordinate}_{side}"], abs=2.0)
 
 
 def test_hip_regressions_by_hand():

@@ -11,8 +11,9 @@ from kinertia.io.osim.exporter import export_osim
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
-from osim_comparison import MODELS, assert_opensim_agrees
+from osim_comparison import RAJAGOPAL, SLOW_IF_LARGE, SMALL, SYNTHETIC, assert_opensim_agrees
 from osim_text import custom_root, frame, joint, model, old_model
+from recordings import here
 
 PIN = joint("PinJoint", "between", "/bodyset/pelvis", "leg", "a")
 
@@ -52,9 +53,10 @@ def old_text(text: bytes, changes) -> bytes:
     return text
 
 
-@pytest.mark.parametrize("name", [MODELS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in MODELS[1:])])
-def test_only_mass_properties_change(opensim, measured_folder, tmp_path, name):
-    ours = read_osim(measured_folder / name)
+@pytest.mark.parametrize("name", SLOW_IF_LARGE)
+def test_only_mass_properties_change(opensim, file_of, tmp_path, name):
+    source = file_of(name)
+    ours = read_osim(source)
     wanted = other_bsp(ours.bsp)
     path = tmp_path / "out.osim"
     changes = write_osim(path, ours, wanted)
@@ -65,20 +67,22 @@ def test_only_mass_properties_change(opensim, measured_folder, tmp_path, name):
     theirs = opensim_table(opensim, path)
     for segment, row in zip(wanted.segments, wanted.table(), strict=True):
         np.testing.assert_allclose(theirs[segment], row, rtol=1e-15)
-    before, after = (warnings_of(opensim, p, tmp_path / f"{p.stem}.log") for p in (measured_folder / name, path))
+    before, after = (warnings_of(opensim, p, tmp_path / f"{p.stem}.log") for p in (source, path))
     assert after == before
     assert_opensim_agrees(path, read_osim(path))
 
 
-def test_nothing_changes_without_a_change(measured_folder, tmp_path):
-    ours = read_osim(measured_folder / MODELS[0])
+@pytest.mark.parametrize("name", SMALL)
+def test_nothing_changes_without_a_change(file_of, tmp_path, name):
+    ours = read_osim(file_of(name))
     path = tmp_path / "out.osim"
     assert write_osim(path, ours, ours.bsp).empty
     assert path.read_bytes() == ours.content
 
 
-def test_one_body_changes_alone(measured_folder, tmp_path):
-    ours = read_osim(measured_folder / MODELS[2])
+@pytest.mark.parametrize("name", here([SYNTHETIC, RAJAGOPAL]))
+def test_one_body_changes_alone(file_of, tmp_path, name):
+    ours = read_osim(file_of(name))
     i = ours.bsp.segments.index("torso")
     torso = BodySegmentParameters(
         ("torso",), ours.bsp.mass_kg[i : i + 1] + 1, ours.bsp.com_m[i : i + 1], ours.bsp.inertia_kgm2[i : i + 1]
@@ -116,13 +120,14 @@ def test_properties_that_the_file_leaves_out_or_empty(tmp_path):
     np.testing.assert_array_equal(read_osim(path).bsp.table(), wanted.table())
 
 
-@pytest.mark.parametrize("name", [MODELS[0], pytest.param(MODELS[3], marks=pytest.mark.slow)])
-def test_markers_and_joints_that_moved(opensim, measured_folder, tmp_path, name):
-    ours = read_osim(measured_folder / name)
+@pytest.mark.parametrize("name", SLOW_IF_LARGE)
+def test_markers_and_joints_that_moved(opensim, file_of, tmp_path, name):
+    ours = read_osim(file_of(name))
     positions = {m.label: m.position + np.array([0.01, -0.02, 0.03]) for m in ours.skeleton.markers[::5]}
     shift = np.array([0.004, -0.005, 0.006])
+    hip, thigh = ("to_thigh_r", "thigh_r") if name == SYNTHETIC else ("hip_r", "femur_r")
     path = tmp_path / "out.osim"
-    changes = write_osim(path, ours, ours.bsp, positions, {"hip_r": shift})
+    changes = write_osim(path, ours, ours.bsp, positions, {hip: shift})
     assert sorted(set(changes["property"])) == ["location", "translation"]
     again = read_osim(path)
     for marker in again.skeleton.markers:
@@ -131,7 +136,7 @@ def test_markers_and_joints_that_moved(opensim, measured_folder, tmp_path, name)
     before, after = ({j.child: j for j in m.skeleton.joints} for m in (ours, again))
     for child, joint_before in before.items():
         moved = after[child].translation - joint_before.translation
-        np.testing.assert_allclose(moved, shift if child == "femur_r" else 0.0, atol=1e-15)
+        np.testing.assert_allclose(moved, shift if child == thigh else 0.0, atol=1e-15)
     assert_opensim_agrees(path, again)
 
 
@@ -177,10 +182,10 @@ def test_the_27_dof_model_as_a_file(opensim, tmp_path):
     assert_opensim_agrees(path, ours)
 
 
-def test_bodies_are_welded_to_those_of_the_file(opensim, measured_folder, tmp_path):
+def test_bodies_are_welded_to_those_of_the_file(opensim, file_of, tmp_path):
     """In format 4 and in format 3, where the joint stands in its body."""
     (tmp_path / "old.osim").write_text(old_model())
-    for source in (measured_folder / MODELS[0], tmp_path / "old.osim"):
+    for source in (file_of(SYNTHETIC), tmp_path / "old.osim"):
         ours = read_osim(source)
         parent = ours.skeleton.segments[-1]
         row = np.array([[3.0, -0.1, 0.2, 0.05, 0.03, 0.02, 0.04, 0.001, -0.002, 0.0]])

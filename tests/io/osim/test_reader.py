@@ -8,12 +8,22 @@ from kinertia.errors import FileError, OsimError
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.imported import OsimModel
 from kinertia.motion.dynamics import Motion
-from osim_comparison import MODELS, N_STATES, assert_opensim_agrees, free_dynamics, mass_matrices, random_states
+from osim_comparison import (
+    MODELS,
+    N_STATES,
+    SLOW_IF_LARGE,
+    SMALL,
+    assert_opensim_agrees,
+    free_dynamics,
+    mass_matrices,
+    random_states,
+)
 from osim_text import (
     LINEAR,
     ZERO,
     body,
     coordinate,
+    coupler,
     custom_root,
     frame,
     joint,
@@ -38,57 +48,27 @@ def written(tmp_path):
 # --- whole models
 
 
-@pytest.mark.parametrize("name", [MODELS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in MODELS[1:])])
-def test_opensim_agrees_on_markers_forces_and_mass_matrix(opensim, measured_folder, name):
-    ours = read_osim(measured_folder / name)
-    assert_opensim_agrees(measured_folder / name, ours)
+@pytest.mark.parametrize("name", SLOW_IF_LARGE)
+def test_opensim_agrees_on_markers_forces_and_mass_matrix(opensim, file_of, name):
+    ours = read_osim(file_of(name))
+    assert_opensim_agrees(file_of(name), ours)
 
 
-def test_a_file_that_opensim_converted_is_the_same_model(opensim, measured_folder, tmp_path):
+@pytest.mark.parametrize("name", SMALL)
+def test_a_file_that_opensim_converted_is_the_same_model(opensim, file_of, tmp_path, name):
     path = tmp_path / "converted.osim"
-    opensim.Model(str(measured_folder / MODELS[0])).printToXML(str(path))
-    first, second = read_osim(measured_folder / MODELS[0]), read_osim(path)
+    opensim.Model(str(file_of(name))).printToXML(str(path))
+    first, second = read_osim(file_of(name)), read_osim(path)
     assert b'Version="40600"' in second.content
     assert [c.name for c in first.coordinates] == [c.name for c in second.coordinates]
     np.testing.assert_array_equal(first.bsp.table(), second.bsp.table())
     assert_opensim_agrees(path, second)
 
 
-def test_coordinates_ranges_locks_and_couplings(measured_folder):
-    ours = read_osim(measured_folder / MODELS[2])
-    by_name = {c.name: c for c in ours.coordinates}
-    assert len(by_name) == 39
-    assert by_name["knee_angle_r"].range == (0.0, 2.0944)
-    assert by_name["mtp_angle_r"].locked
-    assert "mtp_angle_r" in ours.skeleton.locked
-    assert by_name["pelvis_ty"].default == 0.94
-    assert {c.dependent: c.independent for c in ours.couplings} == {
-        "knee_angle_r_beta": "knee_angle_r",
-        "knee_angle_l_beta": "knee_angle_l",
-    }
-    assert len(ours.skeleton.coordinates) == 29
-    assert ours.skeleton.coordinates[:6] == tuple(
-        f"pelvis_{name}" for name in ("tx", "ty", "tz", "tilt", "list", "rotation")
-    )
-    assert ours.bsp.total_mass_kg == pytest.approx(85.0668)
-    assert len(ours.skeleton.markers) == 41
-
-
-def test_all_coordinates_of_the_file_are_given_back(measured_folder):
-    ours = read_osim(measured_folder / MODELS[2])
-    q = random_states(ours, 4, 1.0).q
-    every = ours.all_coordinates(ours.skeleton, q)
-    column = [c.name for c in ours.coordinates].index
-    assert every.shape == (4, 39)
-    knee = q[:, ours.skeleton.coordinates.index("knee_angle_l")]
-    np.testing.assert_array_equal(every[:, column("knee_angle_l_beta")], knee)
-    np.testing.assert_array_equal(every[:, column("mtp_angle_r")], 0.0)
-
-
 @pytest.mark.parametrize("name", MODELS)
-def test_degrees_where_opensim_has_degrees(opensim, measured_folder, name):
-    ours = read_osim(measured_folder / name)
-    theirs = opensim.Model(str(measured_folder / name))
+def test_degrees_where_opensim_has_degrees(opensim, file_of, name):
+    ours = read_osim(file_of(name))
+    theirs = opensim.Model(str(file_of(name)))
     theirs.initSystem()
     coordinate_set = theirs.getCoordinateSet()
     rotational = opensim.Coordinate.Rotational
@@ -179,14 +159,6 @@ def test_joints_whose_speeds_are_not_the_rates_of_their_coordinates(opensim, wri
         theirs = speeds.T @ oracle.inverse_dynamics(q, still[k], still[k])
         np.testing.assert_allclose(weight[k], theirs, atol=1e-6)
         np.testing.assert_allclose(mass[k], speeds.T @ oracle.mass_matrix(q) @ speeds, atol=1e-9)
-
-
-def coupler(function: str, dependent: str = "b", leader: str = "a", scale: str = "") -> str:
-    return (
-        f'<CoordinateCouplerConstraint name="pair{dependent}"><coupled_coordinates_function>{function}'
-        f"</coupled_coordinates_function><independent_coordinate_names>{leader}</independent_coordinate_names>"
-        f"<dependent_coordinate_name>{dependent}</dependent_coordinate_name>{scale}</CoordinateCouplerConstraint>"
-    )
 
 
 @pytest.mark.parametrize("name", ["LinearFunction", "mirrored", "PolynomialFunction", "SimmSpline"])
