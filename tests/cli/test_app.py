@@ -19,7 +19,7 @@ from command_line import fitted, run
 from kinertia.checks.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
 from kinertia.cli import terminal
 from kinertia.cli.fit_report import report_fit
-from walks import fit_arguments
+from synthetic_lab import synthetic_arguments
 
 
 def test_version_and_help():
@@ -68,7 +68,7 @@ def test_installed_command():
 
 @pytest.mark.slow
 def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
-    fit = fit_of("gait2354")
+    fit = fit_of("synthetic")
     lines = fit.outcome.out.splitlines()
     assert max(len(line) for line in lines if not line.startswith("results in ")) <= 80
     assert len(lines) < 80
@@ -95,7 +95,7 @@ def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
 
 @pytest.mark.slow
 def test_progress_is_plain_lines_in_a_log(fit_of):
-    assert fit_of("gait2354").outcome.err.splitlines() == ["reading", "calibration", "inverse kinematics", "estimate"]
+    assert fit_of("synthetic").outcome.err.splitlines() == ["reading", "calibration", "inverse kinematics", "estimate"]
 
 
 def test_progress_is_a_bar_on_a_terminal(monkeypatch):
@@ -259,17 +259,17 @@ def test_init_without_recordings(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_evaluations")
-def test_one_walk_as_two_trials(tmp_path, measured_folder):
-    walk, _, forces, _, loads, _, static, *_ = fit_arguments(measured_folder, "gait2354")
+def test_one_walk_as_two_trials(tmp_path, synthetic_lab):
+    walk, _, forces, _, loads, _, static, *_ = synthetic_arguments(synthetic_lab)
     trial = f'[[trial]]\nmarkers = "{walk}"\nforces = "{forces}"\nloads = "{loads}"\n'
     (tmp_path / "subject.toml").write_text(
         f'[subject]\nsex = "male"\nmass_kg = 72.6\nheight_m = 1.803\n[model]\nstatic = "{static}"\n'
-        f'{trial}name = "first"\nwindow_s = [0.3, 0.6]\n{trial}name = "second"\nwindow_s = [1.2, 1.5]\n'
+        f'{trial}name = "first"\nwindow_s = [1.2, 1.5]\n{trial}name = "second"\nwindow_s = [1.7, 2.0]\n'
     )
     fit = fitted(tmp_path / "out", tmp_path / "subject.toml", "--method", "two-level")
     assert [trial["name"] for trial in fit.summary["trials"]] == ["first", "second"]
-    for trial, window in zip(fit.summary["trials"], ([0.3, 0.6], [1.2, 1.5]), strict=True):
-        assert trial["window_s"] == pytest.approx(window, abs=1 / 60)
+    for trial, window in zip(fit.summary["trials"], ([1.2, 1.5], [1.7, 2.0]), strict=True):
+        assert trial["window_s"] == pytest.approx(window, abs=1 / 100)
         residual = trial["residual_force_rms_N"]
         assert residual["estimate"] < residual["corrected"] < residual["literature"]
         assert (fit.folder / trial["name"] / "kinematics.mot").is_file()

@@ -6,9 +6,12 @@ import shutil
 import numpy as np
 import pytest
 
+from c3d_writer import plate_parameters, write_c3d
 from command_line import run
+from kinertia.io.c3d import read_c3d
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
+from recordings import named_here
 from spoilt_lab import COMMAND, changed_markers, complaint, edit_cell, expect, refused, replace_in, spoil
 
 
@@ -224,19 +227,41 @@ def test_trial_without_forces(lab):
     expect(refused(lab, forces=None, loads=None), "walk", "force", "--forces|give")
 
 
-@pytest.mark.parametrize(
-    ("name", "parts"),
-    [
-        ("rotations_only.c3d", ("marker",)),
-        pytest.param("plates_kistler_type3.c3d", ("no points", "marker"), marks=pytest.mark.slow),
-        ("plates_type1.c3d", ("marker",)),
-        pytest.param("bts.c3d", ("marker",), marks=pytest.mark.slow),
-        ("duplicate_labels.c3d", ("marker",)),
-    ],
-)
-def test_c3d_that_cannot_be_used(lab, measured_folder, name, parts):
-    shutil.copyfile(measured_folder / "c3d_variety" / name, lab / name)
-    expect(refused(lab, name, mass="60", height="1.7"), re.escape(name.removesuffix(".c3d")), *parts)
+UNUSABLE = {
+    "other labels": ("marker",),
+    "labels twice": ("marker",),
+    "plates alone": ("no points", "marker"),
+    "rotations_only": ("marker",),
+    "plates_kistler_type3": ("no points", "marker"),
+    "plates_type1": ("marker",),
+    "bts": ("marker",),
+    "duplicate_labels": ("marker",),
+}
+"""C3D files: those of which the name has a blank are written, the others are measured."""
+LARGE = ("plates_kistler_type3", "bts")
+AT_HAND = named_here({name: f"{'synthetic' if ' ' in name else 'c3d_variety'}/{name}.c3d" for name in UNUSABLE})
+
+
+def write_unusable(path, markers):
+    """A walk with markers of no known set, or with labels twice; or plates alone."""
+    points, labels = 1000.0 * markers.positions, [f"M{k:02d}" for k in range(len(markers.labels))]
+    if path.stem == "labels twice":
+        labels = [*labels[::2], *labels[::2]][: len(labels)]
+    if path.stem == "plates alone":
+        points, labels = points[:, :0], []
+    forces = np.tile([0.0, 0.0, -600.0, 0.0, 0.0, 0.0], (10 * len(points), 1))
+    corners = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)
+    parameters = {"POINT": {"Y_SCREEN": ["+Y"]}, "FORCE_PLATFORM": plate_parameters(corners)}
+    write_c3d(path, points, labels, forces, parameters)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE)) for name in AT_HAND])
+def test_c3d_that_cannot_be_used(lab, file_of, name):
+    if " " in name:
+        write_unusable(lab / f"{name}.c3d", read_c3d(lab / "walk.c3d").markers)
+    else:
+        shutil.copyfile(file_of(AT_HAND[name]), lab / f"{name}.c3d")
+    expect(refused(lab, f"{name}.c3d", mass="60", height="1.7"), name, *UNUSABLE[name])
 
 
 def test_c3d_without_plates(lab):

@@ -76,8 +76,8 @@ def test_errors_with_letters_that_it_lacks(done):
 
 
 @pytest.mark.slow
-def test_a_whole_fit(encoding, tmp_path):
-    done = run_apart("demo", "--measured", "-o", tmp_path / NAME, encoding=encoding)
+def test_a_whole_fit(encoding, c3d_lab, tmp_path):
+    done = run_apart("fit", c3d_lab / "subject.toml", "-o", tmp_path / NAME, encoding=encoding)
     assert done.status == 0, done.err
     assert "results in" in done.out
     assert (tmp_path / NAME / "report.html").is_file()
