@@ -31,7 +31,7 @@ _WORDS = {
 }
 """How the names of the bodies of each segment begin."""
 _LEAST_LENGTH_M = 0.01
-"""Joints nearer to each other are a mistake in the model: they tell neither length nor direction of a segment."""
+"""Joints closer together than this are a mistake in the model: they give neither length nor direction of a segment."""
 
 
 @dataclass(frozen=True, eq=False)

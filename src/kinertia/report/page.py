@@ -54,7 +54,7 @@ from kinertia.trial.sampled_time import runs
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
 VIEW_FRAMES = 300
-"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3 MB."""
+"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3.2 MB."""
 
 _SUMMARY_LINES, _LINE_LETTERS = 8, 95
 """Of warnings in the printed summary, whose first page has no room for more, and letters in one of them."""

@@ -5,11 +5,11 @@ A report carries it, and unpacks it when it is opened, so that it stays one file
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
+from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
 from kinertia.report.packing import packed
 
@@ -37,7 +37,5 @@ def packed_script() -> str:
     with suppress(OSError):  # where nothing can be kept, every report compresses it
         for older in kept.parent.glob("plotly-*.txt"):
             older.unlink()
-        half = kept.with_suffix(f".{os.getpid()}")
-        half.write_text(text, encoding="ascii")
-        half.replace(kept)
+        write_then_rename(kept, text)
     return text
