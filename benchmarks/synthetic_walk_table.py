@@ -77,9 +77,9 @@ def write_walk(kinematics: Kinematics, trial: Trial) -> None:
     coefficients, moved = balanced(coefficients, wrench, period_s)
     contacts = _contacts(trial.loads.time, trial.loads.force[:, :, 1], period_s)
     header = [
-        "# Joint coordinates of a walk (rad, m) as Fourier series over one stride. At time t: mean, plus for every",
-        "# h cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t / period); pelvis_tx moves on at the walking speed.",
-        "# Fitted by benchmarks/synthetic_walk_table.py to two treadmill strides of OpenSim's gait2354 example",
+        "# Fitted by benchmarks/synthetic_walk_table.py: joint coordinates of a walk (rad, m) as Fourier series over one",
+        "# stride. At time t: mean, plus for every h cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t / period);",
+        "# pelvis_tx moves on at the walking speed. Of two treadmill strides of OpenSim's gait2354 example",
         "# (opensim-models, Pipelines/Gait2354_Simbody, subject01_walk1); RMS misfit "
         f"{np.degrees(rms[3:]).mean():.2f} deg, {rms[:3].max() * 1e3:.1f} mm; then the pelvis",
         f"# moved by RMS {moved[:3].max() * 1e3:.1f} mm, {np.degrees(moved[3:]).max():.2f} deg, so that it asks for "
@@ -137,9 +137,8 @@ def write_standing(skeleton: Skeleton, static: Recording) -> None:
     ankle = static.markers.positions[:, [static.markers.labels.index(skeleton.labels[i]) for i in feet], 1]
     positions[:, 1] += np.median(ankle) - np.median(positions[feet, 1])
     header = [
-        "# Markers (m; X forward, Y up, Z right) of the synthetic walker standing: the gait2354 subject (72.6 kg, "
-        "1.803 m),",
-        "# made by benchmarks/synthetic_walk_table.py.",
+        "# Made by benchmarks/synthetic_walk_table.py: markers (m; X forward, Y up, Z right) of the synthetic walker",
+        "# standing, the gait2354 subject (72.6 kg, 1.803 m).",
     ]
     table = pd.DataFrame(positions, index=pd.Index(skeleton.labels, name="label"), columns=["x", "y", "z"])
     _write(DATA / "standing.csv", header, table, "%.5f")
