@@ -77,9 +77,9 @@ def write_walk(kinematics: Kinematics, trial: Trial) -> None:
     coefficients, moved = balanced(coefficients, wrench, period_s)
     contacts = _contacts(trial.loads.time, trial.loads.force[:, :, 1], period_s)
     header = [
-        "# Fitted by benchmarks/synthetic_walk_table.py: joint coordinates of a walk (rad, m) as Fourier series over one",
-        "# stride. At time t: mean, plus for every h cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t / period);",
-        "# pelvis_tx moves on at the walking speed. Of two treadmill strides of OpenSim's gait2354 example",
+        "# Fitted by benchmarks/synthetic_walk_table.py: joint coordinates of a walk (rad, m) as Fourier series",
+        "# over one stride. At time t: mean, plus for every h cos_h cos(2 pi h t / period) and sin_h sin(2 pi h t /",
+        "# period); pelvis_tx moves on at the walking speed. Of two treadmill strides of OpenSim's gait2354 example",
         "# (opensim-models, Pipelines/Gait2354_Simbody, subject01_walk1); RMS misfit "
         f"{np.degrees(rms[3:]).mean():.2f} deg, {rms[:3].max() * 1e3:.1f} mm; then the pelvis",
         f"# moved by RMS {moved[:3].max() * 1e3:.1f} mm, {np.degrees(moved[3:]).max():.2f} deg, so that it asks for "
