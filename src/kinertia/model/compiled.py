@@ -30,6 +30,7 @@ SOURCES = (
     "motion/rigid_body.py",
     "motion/regressor.py",
     "motion/marker_sums.py",
+    "motion/load_splines.py",
     "estimation/simultaneous/plate_loads.py",
     "estimation/simultaneous/normal_equations.py",
     "estimation/simultaneous/knot_interval.py",

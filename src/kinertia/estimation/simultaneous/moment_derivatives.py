@@ -63,7 +63,7 @@ def moment_derivatives(
     tau, (dq, dv, da) = axis_force_derivatives(tree, gravity, skeleton.bodies(problem.bsp(static)), *state)
     (d, axes), chain = tau.shape, dynamic_jacobian(static[layout.theta])
     time = trial.time[frames]
-    loads, rates, fast = reactions.at(time), reactions.rate(time), reactions.impact_at(time)
+    (loads, rates), fast = reactions.with_rate(time), reactions.impact_at(time)
     ground = problem.grounds[k]
     by_plate = ground.by_plate(loads, reactions.loaded_at(time), ground.carrier[frames], problem.plates_in(k, static))
     pose = skeleton.pose(q)
