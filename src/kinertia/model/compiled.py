@@ -32,6 +32,7 @@ SOURCES = (
     "motion/marker_sums.py",
     "motion/load_splines.py",
     "estimation/simultaneous/plate_loads.py",
+    "estimation/simultaneous/axis_columns.py",
     "estimation/simultaneous/normal_equations.py",
     "estimation/simultaneous/knot_interval.py",
     "estimation/simultaneous/marker_terms.py",
