@@ -29,6 +29,7 @@ SOURCES = (
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
     "motion/regressor.py",
+    "motion/root_columns.py",
     "motion/marker_sums.py",
     "motion/load_splines.py",
     "estimation/simultaneous/plate_loads.py",
