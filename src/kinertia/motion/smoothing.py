@@ -202,10 +202,7 @@ def interpolate(time: Array, values: Array) -> SmoothedSpline:
 
 
 def _natural(time: Array, values: Array) -> BSpline:
-    """Quintic splines through values (n, c) that go on as parabolas at either end.
-
-    Those of long records are laid a stretch at a time: samples know nothing of one another that far apart.
-    """
+    """Quintic splines through values (n, c) that go on as parabolas at either end; of long records in stretches."""
     n = len(time)
     if n <= 2 * _ROWS_AT_ONCE:
         ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
