@@ -350,9 +350,17 @@ def axis_forces(
 
 @compiled
 def axis_force_derivatives(
-    tree: KinematicTree, gravity_m_s2: float, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray
+    tree: KinematicTree,
+    gravity_m_s2: float,
+    bodies: np.ndarray,
+    x: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    moving: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, a) as `axis_forces` and (3, n, a, a) their derivatives by x, v and a (columns)."""
+    """(n, a) as `axis_forces` and (3, n, a, a) their derivatives by x, v and a (columns); zero of forces of axes that
+    are not among those `moving` (a,), and by their v and a.
+    """
     n, count = x.shape
     tau, by = np.empty((n, count)), np.zeros((3, n, count, count))
     frame = empty_frame(count, gravity_m_s2)
@@ -361,30 +369,32 @@ def axis_force_derivatives(
         differentiate(tree, bodies, frame)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
-        _through_axes(tree.parent, frame, by[0, k], by[1, k], by[2, k])
+        _through_axes(tree.parent, moving, frame, (by[0, k], by[1, k], by[2, k]))
     return tau, by
 
 
 @part
-def _through_axes(
-    parent: np.ndarray, frame: Frame, place: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
-) -> None:
-    """Derivatives (a, a) of the forces of axes, from those of what they carry."""
+def _through_axes(parent: np.ndarray, moving: np.ndarray, frame: Frame, by: tuple[np.ndarray, ...]) -> None:
+    """Derivatives (a, a) of the forces of axes, by places, rates and accelerations, from those of what they carry."""
     axes, swept, turned, inertia, bias = frame.axes, frame.swept, frame.turned, frame.inertia, frame.bias
-    column = frame.column
-    biased, borne = frame.spare[0], frame.spare[1]
+    (place, rate, acceleration), column, biased, borne = by, frame.column, frame.spare[0], frame.spare[1]
     for j in range(len(parent)):
         i = j
         while i >= 0:
-            place[i, j] = inner(axes, i, column[0], j)
-            rate[i, j] = inner(axes, i, column[1], j)
-            acceleration[i, j] = inner(axes, i, column[2], j)
+            if moving[i]:
+                place[i, j] = inner(axes, i, column[0], j)
+                if moving[j]:
+                    rate[i, j] = inner(axes, i, column[1], j)
+                    acceleration[i, j] = inner(axes, i, column[2], j)
             i = parent[i]
+        if not moving[j]:
+            continue
         _times_bias(bias, j, axes, j, biased, j)
         _inertia_times(inertia, j, axes, j, borne, j)
         i = parent[j]
         while i >= 0:
             place[j, i] = inner(biased, j, swept, i) + inner(borne, j, turned, i)
-            rate[j, i] = inner(biased, j, axes, i) + 2.0 * inner(borne, j, swept, i)
-            acceleration[j, i] = inner(borne, j, axes, i)
+            if moving[i]:
+                rate[j, i] = inner(biased, j, axes, i) + 2.0 * inner(borne, j, swept, i)
+                acceleration[j, i] = inner(borne, j, axes, i)
             i = parent[i]

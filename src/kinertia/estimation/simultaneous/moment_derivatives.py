@@ -58,18 +58,18 @@ def moment_derivatives(
     skeleton, layout = problem.placed(static), problem.layout
     q, qd, qdd = motion
     state = axis_motion(skeleton, Motion(q, qd, qdd))
-    bodies = skeleton.bodies(problem.bsp(static))
-    tau, (dq, dv, da) = axis_force_derivatives(skeleton.tree, skeleton.gravity_m_s2, bodies, *state)
+    bodies, moving, row = skeleton.bodies(problem.bsp(static)), problem.moving, np.full(q.shape[1], -1)
+    row[moving] = np.arange(len(moving))
+    rows = row[skeleton.map.owner]
+    tau, (dq, dv, da) = axis_force_derivatives(skeleton.tree, skeleton.gravity_m_s2, bodies, *state, rows >= 0)
     pose, impact = skeleton.pose(q), np.zeros(tau.shape)
     slopes = np.ones(tau.shape) if pose.slopes is None else np.ascontiguousarray(pose.slopes)
-    moving, row = problem.moving, np.full(q.shape[1], -1)
-    row[moving] = np.arange(len(moving))
-    axes = pose.axes, slopes, row[skeleton.map.owner]
+    axes = pose.axes, slopes, rows
     by_static = np.zeros((len(q), len(moving), layout.in_root.stop))
-    rows = [skeleton.segments.index(segment) for segment in problem.segments]
-    shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, rows]
+    carrying = [skeleton.segments.index(segment) for segment in problem.segments]
+    shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, carrying]
     shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout.theta]))
-    add_bodies(*axes, skeleton.support[rows], shown, by_static)
+    add_bodies(*axes, skeleton.support[carrying], shown, by_static)
     loads, by_load = _loads(problem, k, static, reactions, frames)
     fast = reactions.impact_at(problem.trials[k].time[frames])
     for foot, name in enumerate(skeleton.feet):
