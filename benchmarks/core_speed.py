@@ -34,7 +34,7 @@ def core_section(runs: int) -> str:
     trial = walk(walking_subject(), DURATION_S, trapezoid=False)
     skeleton, state = trial.skeleton, axis_motion(trial.skeleton, trial.motion)
     core = (skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(trial.bsp), *state)
-    origin = np.zeros((len(trial.time), 3))
+    origin, every = np.zeros((len(trial.time), 3)), np.ones(len(skeleton.tree.parent), dtype=bool)
     model = pinocchio_model(skeleton, trial.bsp)
     data, rows = model.createData(), list(zip(*state, strict=True))
 
@@ -48,7 +48,7 @@ def core_section(runs: int) -> str:
     spent = {
         "root": best(lambda: root_load(*core, origin), runs),
         "regressor": best(lambda: regressor(*core[:2], *state, origin), runs),
-        "all axes": best(lambda: axis_force_derivatives(*core), runs),
+        "all axes": best(lambda: axis_force_derivatives(*core, every), runs),
         "poses": best(lambda: skeleton.pose(trial.motion.q), runs),
     }
     derivatives, torque = (

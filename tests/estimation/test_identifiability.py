@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation import identifiability
 from kinertia.estimation.identifiability import base_parameters, evidence
 from kinertia.estimation.prior import literature_prior
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, block_diagonal, dynamic_by_table
@@ -100,3 +101,20 @@ def test_two_trials_show_more_than_one(person, trial, base):
     assert both.best[0].gain == pytest.approx(np.sqrt(2) * base.best[0].gain)
     assert both.condition == pytest.approx(base.condition, rel=1e-3)
     assert both.shown >= base.shown
+
+
+def test_long_motions_are_told_by_some_of_their_frames(person, trial, monkeypatch):
+    prior, each = literature_prior(person.literature), [trial.motion] * 3
+    every = base_parameters(trial.skeleton, person.literature, prior.sd, each, [ROOT_SD] * 3)
+    monkeypatch.setattr(identifiability, "_ENOUGH_FRAMES", len(trial.time))
+    some = base_parameters(trial.skeleton, person.literature, prior.sd, each, [ROOT_SD] * 3)
+    assert (some.count, some.never) == (every.count, every.never)
+    np.testing.assert_allclose([one.gain for one in some.best], [one.gain for one in every.best], rtol=0.2)
+    assert some.best[0].words == every.best[0].words
+
+
+def test_one_frame_of_every_few_is_drawn():
+    drawn = identifiability._one_of(4, 41)
+    np.testing.assert_array_equal(drawn // 4, np.arange(10))
+    assert len(set(drawn % 4)) > 1
+    np.testing.assert_array_equal(identifiability._one_of(1, 5), np.arange(5))

@@ -2,6 +2,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from kinertia.motion.ground_reactions import ground_reactions, measured_reactions
 from kinertia.motion.smoothing import smooth
@@ -96,7 +97,26 @@ def test_between_samples_loads_are_splines_of_force_point_and_torque():
     np.testing.assert_allclose(reactions.at(TIME[5:-5]), reactions.wrench[5:-5], atol=1e-9)
     h, at = 1e-6, TIME[100:-100:50] + 0.0003
     slope = (reactions.at(at + h) - reactions.at(at - h)) / (2 * h)
-    np.testing.assert_allclose(reactions.rate(at), slope, atol=1e-4 * np.abs(slope).max())
+    loads, rates = reactions.with_rate(at)
+    np.testing.assert_allclose(rates, slope, atol=1e-4 * np.abs(slope).max())
+    columns = np.concatenate([reactions.wrench[..., :3], reactions.point, reactions.torque], axis=-1)
+    force, point, torque = np.split(CubicSpline(TIME, columns, bc_type="natural")(at), 3, axis=-1)
+    expected = np.concatenate([force, torque + np.cross(point, force)], axis=-1)
+    np.testing.assert_allclose(loads, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("beyond_s", [-0.0002, 0.0002])
+def test_loads_just_beyond_the_samples_go_on(beyond_s):
+    """Clocks differ: the first or last frame may lie outside."""
+    reactions = measured_reactions(kinematics(passed_on()))
+    end = reactions.time[[0 if beyond_s < 0.0 else -1]]
+    loads, rates = reactions.with_rate(end)
+    np.testing.assert_allclose(reactions.at(end + beyond_s), loads + beyond_s * rates, atol=1e-3)
+
+
+def test_no_times_have_no_loads():
+    reactions = measured_reactions(kinematics(passed_on()))
+    assert reactions.at(np.empty(0)).shape == (0, 2, 6)
 
 
 def test_a_foot_off_the_ground_keeps_its_last_centre_of_pressure():

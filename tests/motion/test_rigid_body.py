@@ -25,6 +25,11 @@ def skeleton(request):
     return skeleton if request.param == "as it is" else skeleton.lock({"knee_angle_r": 0.4, "lumbar_bending": -0.2})
 
 
+def every(skeleton) -> np.ndarray:
+    """All of its axes."""
+    return np.ones(len(skeleton.tree.parent), dtype=bool)
+
+
 @pytest.fixture(scope="module")
 def bsp():
     return literature_bsp(70.0, 1.75, "male", generic_model().geometry)
@@ -49,7 +54,7 @@ def close(ours, theirs):
 def test_forces_and_all_their_derivatives_are_pinocchios(skeleton, bsp, state):
     model = pinocchio_model(skeleton, bsp)
     data = model.createData()
-    tau, (by_x, by_v, by_a) = axis_force_derivatives(*state)
+    tau, (by_x, by_v, by_a) = axis_force_derivatives(*state, every(skeleton))
     np.testing.assert_array_equal(axis_forces(*state)[0], tau)
     close(tau, oracle_forces(model, state[3:]))
     for k, rows in enumerate(zip(*state[3:], strict=True)):
@@ -116,12 +121,23 @@ def test_regressor_through_the_axes_is_pinocchios(skeleton, state):
             np.testing.assert_allclose(ours, expected[:, 10 * carrier : 10 * carrier + 10], atol=1e-9)
 
 
+def test_axes_that_do_not_move_are_left_out(skeleton, state):
+    moving = np.arange(len(skeleton.tree.parent)) % 3 != 1
+    tau, (by_x, by_v, by_a) = axis_force_derivatives(*state, every(skeleton))
+    some, (some_x, some_v, some_a) = axis_force_derivatives(*state, moving)
+    np.testing.assert_array_equal(some, tau)
+    np.testing.assert_array_equal(some_x, by_x * moving[:, None])
+    for ours, whole in ((some_v, by_v), (some_a, by_a)):
+        np.testing.assert_array_equal(ours, whole * moving[:, None] * moving)
+
+
 def test_no_frame_knows_of_another(skeleton, bsp):
     """A stretch of a motion gives what the whole motion gives there."""
     _, motion = smooth_motion(skeleton, n=12, rate_hz=50.0)
-    whole = axis_force_derivatives(skeleton.tree, 9.81, skeleton.bodies(bsp), *axis_motion(skeleton, motion))
+    body = (skeleton.tree, 9.81, skeleton.bodies(bsp))
+    whole = axis_force_derivatives(*body, *axis_motion(skeleton, motion), every(skeleton))
     part = motion.cut(slice(5, 9))
-    cut = axis_force_derivatives(skeleton.tree, 9.81, skeleton.bodies(bsp), *axis_motion(skeleton, part))
+    cut = axis_force_derivatives(*body, *axis_motion(skeleton, part), every(skeleton))
     np.testing.assert_array_equal(whole[0][5:9], cut[0])
     np.testing.assert_array_equal(whole[1][:, 5:9], cut[1])
 
@@ -142,7 +158,7 @@ def test_branches_may_come_in_any_order():
     )
     state = [rng.normal(size=(3, 5)) for _ in range(3)]
     tree = (skeleton.tree, 9.81, skeleton.bodies(bsp))
-    _, by = axis_force_derivatives(*tree, *state)
+    _, by = axis_force_derivatives(*tree, *state, every(skeleton))
     for order, j in np.ndindex(3, 5):
         ends = []
         for sign in (1.0, -1.0):

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 
+from kinertia.motion import smoothing
 from kinertia.motion.smoothing import SmoothingError, _System, smooth
 
 
@@ -286,3 +287,29 @@ def test_wrong_arguments(time, values, smoothing, message):
 def test_wrong_derivative():
     with pytest.raises(ValueError, match="0 to 4"):
         smooth(np.arange(9.0), np.ones(9), 0.1)(1.0, 5)
+
+
+@pytest.mark.parametrize("cutoff", [8.0, 120.0])
+@pytest.mark.parametrize("ragged", [0.0, 0.3])
+def test_long_records_in_pieces_are_as_in_one(monkeypatch, cutoff, ragged):
+    rng = np.random.default_rng(5)
+    time = (np.arange(9000) + ragged * rng.uniform(-1.0, 1.0, 9000)) / 250.0
+    values = rng.standard_normal((len(time), 2)).cumsum(axis=0)
+    whole = smooth(time, values, cutoff)
+    monkeypatch.setattr(smoothing, "_ROWS_AT_ONCE", 1000)
+    parts = smooth(time, values, cutoff)
+    assert_allclose(parts.sigma, whole.sigma, rtol=1e-9)
+    for derivative, rounding in ((0, 1e-10), (2, 1e-7)):
+        expected = whole(time, derivative)
+        assert_allclose(parts(time, derivative), expected, atol=rounding * np.abs(expected).max())
+
+
+def test_splines_through_long_records_are_as_in_one(monkeypatch):
+    rng = np.random.default_rng(6)
+    time = np.arange(3000) + 0.3 * rng.uniform(-1.0, 1.0, 3000)
+    values = rng.standard_normal((len(time), 2))
+    whole = smoothing._natural(time, values)
+    monkeypatch.setattr(smoothing, "_ROWS_AT_ONCE", 700)
+    parts = smoothing._natural(time, values)
+    assert_allclose(parts.t, whole.t)
+    assert_allclose(parts.c, whole.c, atol=1e-12 * np.abs(whole.c).max())

@@ -43,9 +43,9 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
         skeleton, bsp, motion = short.skeleton, short.bsp, short.motion
         residual_terms(skeleton, bsp, motion, short.foot_loads.sum(axis=1))
         root_regressor(skeleton, bsp.segments, motion)
-        axis_force_derivatives(
-            skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *axis_motion(skeleton, motion)
-        )
+        state = axis_motion(skeleton, motion)
+        every = np.ones(len(skeleton.tree.parent), dtype=bool)
+        axis_force_derivatives(skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state, every)
         progress(_STAGE, _DYNAMICS_SHARE)
     with _without_looking_for_garbage():
         fit_simultaneous(short.skeleton, literature_prior(subject.literature), [kinematics])

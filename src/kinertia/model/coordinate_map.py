@@ -79,6 +79,18 @@ class CoordinateMap:
         rate = qd[:, self.owner]
         return self._evaluated(q, 0), first * rate, first * qdd[:, self.owner] + second * rate**2
 
+    def bends(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+        """(n, a, 3) how every axis follows its coordinate, as the compiled functions take it: its slope, and the
+        derivatives of the axis' rate and acceleration by the coordinate.
+
+        None of it, (0, a, 3), where every axis is its own coordinate.
+        """
+        if self.identity:
+            return np.empty((0, self.count, 3))
+        first, second, third = (self._evaluated(q, order) for order in (1, 2, 3))
+        v, a = qd[:, self.owner], qdd[:, self.owner]
+        return np.stack([first, second * v, second * a + third * v**2], axis=-1)
+
     def to_coordinates(self, columns: np.ndarray, slopes: np.ndarray | None) -> np.ndarray:
         """(n, ..., c) from (n, ..., a): forces, or derivatives by axes, to those by coordinates.
 
@@ -111,9 +123,7 @@ class CoordinateMap:
         if self.identity:
             return by_axes
         at, rate, acceleration = by_axes
-        first, second, third = (self._evaluated(q, order) for order in (1, 2, 3))
-        v, a = qd[:, self.owner], qdd[:, self.owner]
-        by_q = at * first[:, None] + rate * (second * v)[:, None]
-        by_q += acceleration * (second * a + third * v**2)[:, None]
-        by_qd = rate * first[:, None] + acceleration * (2.0 * second * v)[:, None]
-        return by_q @ self._sum, by_qd @ self._sum, (acceleration * first[:, None]) @ self._sum
+        slope, of_rate, of_acceleration = np.moveaxis(self.bends(q, qd, qdd)[:, None], -1, 0)
+        by_q = at * slope + rate * of_rate + acceleration * of_acceleration
+        by_qd = rate * slope + acceleration * (2.0 * of_rate)
+        return by_q @ self._sum, by_qd @ self._sum, (acceleration * slope) @ self._sum

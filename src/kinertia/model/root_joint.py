@@ -39,6 +39,11 @@ class Root:
         return result
 
     @property
+    def moves(self) -> np.ndarray:
+        """(3, 3): rows are the directions in ground in which the first three coordinates move the centre."""
+        return np.ascontiguousarray(self._slides.T)
+
+    @property
     def _slides(self) -> np.ndarray:
         result: np.ndarray = self.rotation @ self.slides
         return result

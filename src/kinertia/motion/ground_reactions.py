@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.load_splines import loads_and_rates
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
@@ -90,40 +90,28 @@ class GroundReactions:
     @property
     def torque(self) -> np.ndarray:
         """(k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
-        return self._torque(slice(None))
+        result: np.ndarray = self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
+        return result
 
     def at(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) loads at these times: natural cubic splines of force, point and torque, as OpenSim's tools lay them
         through the columns of the file that is written of them.
         """
-        return np.concatenate([np.empty((0, 2, 6)), *(self._at(time[some]) for some in pieces(len(time)))])
+        return self.with_rate(time)[0]
 
-    def rate(self, time: np.ndarray) -> np.ndarray:
-        """(n, 2, 6) derivative of `at` by time, N/s and N m/s."""
-        return np.concatenate([self._rate(time[some]) for some in pieces(len(time))])
+    def with_rate(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same, and its derivative by time (n, 2, 6), N/s and N m/s."""
+        parts = [np.empty((2, 0, 2, 6)), *(self._with_rate(time[some]) for some in pieces(len(time)))]
+        loads, rates = zip(*parts, strict=True)
+        return np.concatenate(loads), np.concatenate(rates)
 
-    def _at(self, time: np.ndarray) -> np.ndarray:
-        force, point, torque = np.moveaxis(self._spline(time)(time), 2, 0)
-        return np.concatenate([force, torque + np.cross(point, force)], axis=-1)
-
-    def _rate(self, time: np.ndarray) -> np.ndarray:
-        spline = self._spline(time)
-        (force, point, _), (by_force, by_point, by_torque) = (
-            np.moveaxis(spline(time, order), 2, 0) for order in (0, 1)
-        )
-        return np.concatenate([by_force, by_torque + np.cross(by_point, force) + np.cross(point, by_force)], axis=-1)
-
-    def _spline(self, time: np.ndarray) -> BSpline:
-        """Of all samples, as far as these times can tell: of those around them."""
+    def _with_rate(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From the samples around these times, as far as they can tell."""
         first, last = np.searchsorted(self.time, (time.min(), time.max()))
         near = slice(max(int(first) - _FORGOTTEN, 0), int(last) + _FORGOTTEN)
-        columns = np.stack([self.wrench[near, :, :3], self.point[near], self._torque(near)], axis=2)
-        return make_interp_spline(self.time[near], columns, k=3, bc_type="natural")
-
-    def _torque(self, samples: slice) -> np.ndarray:
-        wrench = self.wrench[samples]
-        result: np.ndarray = wrench[..., 3:] - np.cross(self.point[samples], wrench[..., :3])
-        return result
+        samples = self.time[near]
+        interval = np.clip(np.searchsorted(samples, time, side="right") - 1, 0, len(samples) - 2)
+        return loads_and_rates(samples, self.wrench[near], self.point[near], np.ascontiguousarray(time), interval)
 
     def impact_at(self, time: np.ndarray) -> np.ndarray:
         """(n, 2, 6) `impact` at the samples nearest to these times."""

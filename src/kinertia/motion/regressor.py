@@ -32,14 +32,14 @@ def regressor(
             carrier = tree.carrier[s]
             if carrier < 0:
                 continue
-            _in_segment(frame.velocity[carrier], frame.acceleration[carrier], rotation[s], translation[s], w, e, b)
-            _own_regressor(w, e, b, own)
-            _to_ground(rotation[s], translation[s], about[k], own, result[k, :, s])
+            in_segment(frame.velocity[carrier], frame.acceleration[carrier], rotation[s], translation[s], w, e, b)
+            own_regressor(w, e, b, own)
+            to_ground(rotation[s], translation[s], about[k], own, result[k, :, s])
     return result
 
 
 @part
-def _in_segment(
+def in_segment(
     velocity: np.ndarray,
     acceleration: np.ndarray,
     rotation: np.ndarray,
@@ -68,7 +68,7 @@ def _in_segment(
 
 
 @part
-def _own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
+def own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
     """out = (6, 10) in the segment's axes, about its origin."""
     out[:] = 0.0
     out[0, 0], out[1, 0], out[2, 0] = b[0], b[1], b[2]
@@ -95,7 +95,7 @@ def _own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray)
 
 
 @part
-def _to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
+def to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
     """out = (6, 10) the same in ground axes and about another point, for a segment whose origin is at `at`."""
     x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
     for c in range(10):

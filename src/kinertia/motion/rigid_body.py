@@ -221,7 +221,7 @@ def _bears(bodies: np.ndarray, j: int) -> bool:
 
 
 @part
-def _fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
+def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
     """Motion and forces of one frame, from bodies (a, 10) and places, rates and accelerations (a,) as `root_load` has
     them; the inertia is of what each axis itself bears.
     """
@@ -242,8 +242,8 @@ def _fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray,
 
 
 @part
-def _differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
-    """Inertia and bias of all that the axes carry, and the derivatives `column`, after `_fill`."""
+def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
+    """Inertia and bias of all that the axes carry, and the derivatives `column`, after `fill`."""
     frame.bias[:] = 0.0
     for j in range(len(bodies)):
         if _bears(bodies, j):
@@ -281,12 +281,12 @@ def root_load(
     frame = empty_frame(count, gravity_m_s2)
     column = frame.column
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame)
-        _differentiate(tree, bodies, frame)
+        fill(tree, bodies, x[k], v[k], a[k], frame)
+        differentiate(tree, bodies, frame)
         for j in range(count):
             for order in range(3):
-                _taken_about(column[order, j], about[k], by[order, k, :, j])
-        _whole(tree.parent, frame.force, load, k)
+                taken_about(column[order, j], about[k], by[order, k, :, j])
+        whole_load(tree.parent, frame.force, load, k)
     return load, by
 
 
@@ -306,17 +306,17 @@ def root_balance(
     frame = empty_frame(count, gravity_m_s2)
     inertia, column = frame.inertia, frame.spare[0]
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame)
+        fill(tree, bodies, x[k], v[k], a[k], frame)
         hand_down(tree.parent, inertia)
         for j in range(6):
             _inertia_times(inertia, j, frame.axes, j, column, j)
-            _taken_about(column[j], about[k], by[k, :, j])
-        _whole(tree.parent, frame.force, load, k)
+            taken_about(column[j], about[k], by[k, :, j])
+        whole_load(tree.parent, frame.force, load, k)
     return load, by
 
 
 @inlined
-def _taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
+def taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
     """out = (6,) a force, and its moment about another point than the ground origin."""
     fx, fy, fz, x, y, z = force[0], force[1], force[2], about[0], about[1], about[2]
     out[0], out[1], out[2] = fx, fy, fz
@@ -324,7 +324,7 @@ def _taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
 
 
 @part
-def _whole(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -> None:
+def whole_load(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -> None:
     """out[k] = (6,) sum over the axes that stand on the ground."""
     for j in range(len(parent)):
         if parent[j] < 0:
@@ -341,50 +341,60 @@ def axis_forces(
     tau, load = np.empty((n, count)), np.zeros((n, 6))
     frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame)
+        fill(tree, bodies, x[k], v[k], a[k], frame)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
-        _whole(tree.parent, frame.force, load, k)
+        whole_load(tree.parent, frame.force, load, k)
     return tau, load
 
 
 @compiled
 def axis_force_derivatives(
-    tree: KinematicTree, gravity_m_s2: float, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray
+    tree: KinematicTree,
+    gravity_m_s2: float,
+    bodies: np.ndarray,
+    x: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    moving: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, a) as `axis_forces` and (3, n, a, a) their derivatives by x, v and a (columns)."""
+    """(n, a) as `axis_forces` and (3, n, a, a) their derivatives by x, v and a (columns); zero of forces of axes that
+    are not among those `moving` (a,), and by their v and a.
+    """
     n, count = x.shape
     tau, by = np.empty((n, count)), np.zeros((3, n, count, count))
     frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
-        _fill(tree, bodies, x[k], v[k], a[k], frame)
-        _differentiate(tree, bodies, frame)
+        fill(tree, bodies, x[k], v[k], a[k], frame)
+        differentiate(tree, bodies, frame)
         for j in range(count):
             tau[k, j] = inner(frame.axes, j, frame.force, j)
-        _through_axes(tree.parent, frame, by[0, k], by[1, k], by[2, k])
+        _through_axes(tree.parent, moving, frame, (by[0, k], by[1, k], by[2, k]))
     return tau, by
 
 
 @part
-def _through_axes(
-    parent: np.ndarray, frame: Frame, place: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
-) -> None:
-    """Derivatives (a, a) of the forces of axes, from those of what they carry."""
+def _through_axes(parent: np.ndarray, moving: np.ndarray, frame: Frame, by: tuple[np.ndarray, ...]) -> None:
+    """Derivatives (a, a) of the forces of axes, by places, rates and accelerations, from those of what they carry."""
     axes, swept, turned, inertia, bias = frame.axes, frame.swept, frame.turned, frame.inertia, frame.bias
-    column = frame.column
-    biased, borne = frame.spare[0], frame.spare[1]
+    (place, rate, acceleration), column, biased, borne = by, frame.column, frame.spare[0], frame.spare[1]
     for j in range(len(parent)):
         i = j
         while i >= 0:
-            place[i, j] = inner(axes, i, column[0], j)
-            rate[i, j] = inner(axes, i, column[1], j)
-            acceleration[i, j] = inner(axes, i, column[2], j)
+            if moving[i]:
+                place[i, j] = inner(axes, i, column[0], j)
+                if moving[j]:
+                    rate[i, j] = inner(axes, i, column[1], j)
+                    acceleration[i, j] = inner(axes, i, column[2], j)
             i = parent[i]
+        if not moving[j]:
+            continue
         _times_bias(bias, j, axes, j, biased, j)
         _inertia_times(inertia, j, axes, j, borne, j)
         i = parent[j]
         while i >= 0:
             place[j, i] = inner(biased, j, swept, i) + inner(borne, j, turned, i)
-            rate[j, i] = inner(biased, j, axes, i) + 2.0 * inner(borne, j, swept, i)
-            acceleration[j, i] = inner(borne, j, axes, i)
+            if moving[i]:
+                rate[j, i] = inner(biased, j, axes, i) + 2.0 * inner(borne, j, swept, i)
+                acceleration[j, i] = inner(borne, j, axes, i)
             i = parent[i]

@@ -68,6 +68,9 @@ MIN_SAMPLES = 6
 _STEP = 1e-30  # of the complex-step derivative: its square vanishes beside 1
 _BAND = 4  # diagonals on either side of the main one
 _ROWS_AT_ONCE = 20000
+_FORGOTTEN_PERIODS, _FORGOTTEN_SAMPLES = 13.0, 50
+"""Periods of the cutoff, and samples more, over which a sample loses all influence: exp(-pi) per period.
+Splines through samples forget by 0.43 per sample."""
 
 
 class SmoothingError(KinertiaError):
@@ -199,9 +202,20 @@ def interpolate(time: Array, values: Array) -> SmoothedSpline:
 
 
 def _natural(time: Array, values: Array) -> BSpline:
-    """Quintic splines through values (n, c) that go on as parabolas at either end."""
-    ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
-    return make_interp_spline(time, values, k=5, bc_type=(ends, ends))
+    """Quintic splines through values (n, c) that go on as parabolas at either end; of long records in stretches."""
+    n = len(time)
+    if n <= 2 * _ROWS_AT_ONCE:
+        ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
+        return make_interp_spline(time, values, k=5, bc_type=(ends, ends))
+    coefficients = np.empty((n + 4, values.shape[1]))
+    for own in pieces(n, _ROWS_AT_ONCE):
+        near = slice(max(own.start - _FORGOTTEN_SAMPLES, 0), min(own.stop + _FORGOTTEN_SAMPLES, n))
+        # the splines stand two samples before those of the same index
+        kept = slice(own.start and own.start + 2, own.stop + (2 if own.stop < n else 4))
+        part = _natural(time[near], values[near]).c
+        coefficients[kept] = part[kept.start - near.start : kept.stop - near.start]
+    knots = np.concatenate([np.full(5, time[0]), time, np.full(5, time[-1])])
+    return BSpline.construct_fast(knots, coefficients, 5)
 
 
 def _validated(
@@ -279,44 +293,51 @@ class _System:
     Attributes:
         differences: (n - 3, 4), row j of D: integral of N_j s''' = sum_m differences[j, m] s(t_{j+m}).
         gram: (3, n - 3), diagonals of G: gram[a, j] = integral of N_j N_{j+a}.
+        least: the shortest spacing.
     """
 
     differences: Array
     gram: Array
+    least: float
 
     @classmethod
     def of(cls, t: Array) -> _System:
         """A stretch at a time: row j of either knows of t[j] to t[j + 5] only."""
-        parts = [cls._of(t[rows.start : rows.stop + 5]) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
+        parts = [_matrices(t[rows.start : rows.stop + 5]) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
         rows = [slice(0, _ROWS_AT_ONCE)] * (len(parts) - 1) + [slice(None)]
-        differences = [part.differences[kept] for part, kept in zip(parts, rows, strict=True)]
-        gram = [part.gram[:, kept] for part, kept in zip(parts, rows, strict=True)]
-        return cls(np.concatenate(differences), np.concatenate(gram, axis=1))
-
-    @classmethod
-    def _of(cls, t: Array) -> _System:
-        n = len(t)
-        knots = np.stack([t[m : n - 3 + m] for m in range(4)], axis=1)
-        factors = knots[:, :, None] - knots[:, None, :] + np.eye(4)
-        differences = 2 * (knots[:, 3] - knots[:, 0])[:, None] / factors.prod(axis=2)
-
-        nodes, weights = np.polynomial.legendre.leggauss(3)  # exact to degree 5; the integrand has degree 4
-        x = t[:-1, None] + np.diff(t)[:, None] * (nodes + 1) / 2
-        weight = np.diff(t)[:, None] * weights / 2
-        padded = np.concatenate([t[0] - [2, 1], t, t[-1] + [1, 2]])
-        # basis[i, g, k] is N_{i-2+k} at Gauss point g of interval i
-        basis = BSpline.design_matrix(x.ravel(), padded, 2).data.reshape(n - 1, 3, 3)
-        gram = np.zeros((3, n - 3))
-        for a in range(3):
-            size = n - 3 - a
-            for k in range(a, 3):
-                piece = slice(k, k + size)
-                product = basis[piece, :, 2 - k] * basis[piece, :, 2 - k + a]
-                gram[a, :size] += (weight[piece] * product).sum(axis=1)
-        return cls(differences, gram)
+        differences = [own[kept] for (own, _), kept in zip(parts, rows, strict=True)]
+        gram = [own[:, kept] for (_, own), kept in zip(parts, rows, strict=True)]
+        return cls(np.concatenate(differences), np.concatenate(gram, axis=1), float(np.diff(t).min()))
 
     def fit(self, y: Array, visible: NDArray[np.bool_], f: float) -> tuple[Array, Array, float]:
         """Fitted values (n, c), residual sums of squares (c,), trace A for a cutoff of f cycles per spacing.
+
+        Long records without gaps are fitted in pieces, with so much around each that it does not matter; what traces
+        have of samples that two pieces share is that of these samples by themselves, ends included.
+        """
+        n, around = len(y), int(np.ceil(_FORGOTTEN_PERIODS / (f * self.least))) + _FORGOTTEN_SAMPLES
+        most = max(_ROWS_AT_ONCE, 2 * around)
+        if n <= 2 * most or not visible.all():
+            return self._fit(y, visible, f)
+        fitted, rss, trace = np.empty_like(y), np.zeros(y.shape[1]), 0.0
+        for own in pieces(n, most):
+            near = slice(max(own.start - around, 0), min(own.stop + around, n))
+            part, _, of_part = self._cut(near)._fit(y[near], visible[near], f)
+            fitted[own] = part[own.start - near.start : own.stop - near.start]
+            rss += np.square(y[own] - fitted[own]).sum(axis=0)
+            trace += of_part
+            if own.start:
+                shared = slice(near.start, min(own.start + around, n))
+                trace -= self._cut(shared)._fit(y[shared, :1], visible[shared], f)[2]
+        return fitted, rss, trace
+
+    def _cut(self, samples: slice) -> _System:
+        """Of these samples."""
+        rows = slice(samples.start, samples.stop - 3)
+        return _System(self.differences[rows], self.gram[:, rows], self.least)
+
+    def _fit(self, y: Array, visible: NDArray[np.bool_], f: float) -> tuple[Array, Array, float]:
+        """The same of all samples at once.
 
         The unknown e_i stands at place 2 i, x_j at place 2 j + 3, between the e that it couples; the second
         and the second last place are empty.
@@ -328,7 +349,7 @@ class _System:
         diagonal = factors[2 * _BAND]
         trace = 1.5 + float((diagonal.imag / diagonal.real).sum()) / _STEP
         real = factors.real.copy(order="F")
-        del matrix, factors, diagonal  # of plates they are some hundred MB
+        del matrix, factors, diagonal  # of long records with gaps they are some hundred MB
         right = np.zeros((2 * n - 1, y.shape[1]), order="F")
         for m in range(4):
             right[places] += self.differences[:, m, None] * y[m : n - 3 + m]
@@ -352,3 +373,26 @@ class _System:
             matrix[main - 2 * a, places[:size] + 2 * a] = -root * self.gram[a, :size]
             matrix[main + 2 * a, places[:size]] = -root * self.gram[a, :size]
         return matrix
+
+
+def _matrices(t: Array) -> tuple[Array, Array]:
+    """`differences` and `gram` of `_System` for sample times (n,)."""
+    n = len(t)
+    knots = np.stack([t[m : n - 3 + m] for m in range(4)], axis=1)
+    factors = knots[:, :, None] - knots[:, None, :] + np.eye(4)
+    differences = 2 * (knots[:, 3] - knots[:, 0])[:, None] / factors.prod(axis=2)
+
+    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact to degree 5; the integrand has degree 4
+    x = t[:-1, None] + np.diff(t)[:, None] * (nodes + 1) / 2
+    weight = np.diff(t)[:, None] * weights / 2
+    padded = np.concatenate([t[0] - [2, 1], t, t[-1] + [1, 2]])
+    # basis[i, g, k] is N_{i-2+k} at Gauss point g of interval i
+    basis = BSpline.design_matrix(x.ravel(), padded, 2).data.reshape(n - 1, 3, 3)
+    gram = np.zeros((3, n - 3))
+    for a in range(3):
+        size = n - 3 - a
+        for k in range(a, 3):
+            piece = slice(k, k + size)
+            product = basis[piece, :, 2 - k] * basis[piece, :, 2 - k + a]
+            gram[a, :size] += (weight[piece] * product).sum(axis=1)
+    return differences, gram

@@ -16,6 +16,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.repetition import Repetition
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.frames_at_once import pieces
 
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0
@@ -103,22 +104,21 @@ def marker_noise(
         taken: (m,) share of each marker's variance that is missing in them by chance, since the regression fits noise.
         rate_hz: of the frames.
     """
-    seen = np.isfinite(errors)
-    filled = np.where(seen, errors, 0.0)
-    per_frame = seen.sum() / np.count_nonzero(seen.any(axis=(1, 2)))
+    seen = np.isfinite(errors).all(axis=-1)
+    per_frame = 3 * seen.sum() / np.count_nonzero(seen.any(axis=1))
     lost = np.sqrt(per_frame / max(per_frame - len(skeleton.coordinates), 1.0))
     sd = np.maximum(lost * root_mean_square(errors), SMALLEST_MARKER_SD_M)
     frames = frames_alike(errors, sd)
     usual = float(np.median(sd))
-    labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=(0, 2)), strict=True) if shown]
+    labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=0), strict=True) if shown]
     deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
     noise = MarkerNoise(
         {label: deviations[label] for label in labels},
         frames / rate_hz,
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
-    effective = sd * np.sqrt(markers_alike(skeleton, filled) / (1.0 - taken))
-    return noise, effective, frames, lost**2 * _products(skeleton, errors / effective[:, None])
+    effective = sd * np.sqrt(markers_alike(skeleton, errors) / (1.0 - taken))
+    return noise, effective, frames, lost**2 * _products(skeleton, errors, effective)
 
 
 def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float) -> np.ndarray:
@@ -131,8 +131,12 @@ def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float
 
 def root_mean_square(errors: np.ndarray) -> np.ndarray:
     """(m,) of errors (n, m, 3); zero for markers that are never seen."""
-    count = np.maximum(np.isfinite(errors).sum(axis=(0, 2)), 1)
-    result: np.ndarray = np.sqrt(np.nansum(np.square(errors), axis=(0, 2)) / count)
+    squares, counts = np.zeros((2, errors.shape[1]))
+    for some in pieces(len(errors)):
+        seen = np.isfinite(errors[some])
+        squares += np.square(np.where(seen, errors[some], 0.0)).sum(axis=(0, 2))
+        counts += seen.sum(axis=(0, 2))
+    result: np.ndarray = np.sqrt(squares / np.maximum(counts, 1))
     return result
 
 
@@ -141,35 +145,49 @@ def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
     return Repetition.of(weighed(errors, sd_m)).frames
 
 
-def _products(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
-    """(2, 3, 3) mean products of the errors (n, m, 3) of a frame and of the two before it, those of each marker and
-    those that the markers of a segment have in common, as `markers_alike` counts it.
+def _products(skeleton: Skeleton, errors: np.ndarray, sd_m: np.ndarray) -> np.ndarray:
+    """(2, 3, 3) mean products of the errors (n, m, 3), over their deviations (m,), of a frame and of the two before it,
+    those of each marker and those that the markers of a segment have in common, as `markers_alike` counts it.
     """
-    three = np.stack([errors[2:], errors[1:-1], errors[:-2]])
-    shown = np.isfinite(three).all(axis=(0, 3))
-    three = np.where(shown[..., None], three, 0.0)
-    common = [three[:, :, skeleton.marker_segments == s].sum(axis=2) for s in np.unique(skeleton.marker_segments)]
-    kinds = [each.reshape(3, -1) for each in (three, np.stack(common, axis=1))]
-    result: np.ndarray = np.stack([each @ each.T for each in kinds]) / max(3 * np.count_nonzero(shown), 1)
+    result, count = np.zeros((2, 3, 3)), 0
+    of_segments = _of_segments(skeleton)
+    for some in pieces(len(errors) - 2):
+        here = errors[some.start : some.stop + 2] / sd_m[:, None]
+        three = np.stack([here[2:], here[1:-1], here[:-2]])
+        shown = np.isfinite(three).all(axis=(0, 3))
+        three[:, ~shown] = 0.0
+        common = np.einsum("sm,tnmk->tnsk", of_segments, three, optimize=True)
+        kinds = [each.reshape(3, -1) for each in (three, common)]
+        result += [each @ each.T for each in kinds]
+        count += 3 * int(np.count_nonzero(shown))
+    return result / max(count, 1)
+
+
+def _of_segments(skeleton: Skeleton) -> np.ndarray:
+    """(s, m) 1 where a marker is on a segment; segments that have markers."""
+    result: np.ndarray = (np.unique(skeleton.marker_segments)[:, None] == skeleton.marker_segments).astype(float)
     return result
 
 
 def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:
     """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
     each = np.broadcast_to(sd_m, errors.shape[1])
-    result: np.ndarray = np.nan_to_num(errors / np.where(each > 0.0, each, 1.0)[:, None]).reshape(len(errors), -1)
-    return result
+    result = errors / np.where(each > 0.0, each, 1.0)[:, None]
+    return np.nan_to_num(result, copy=False).reshape(len(errors), -1)
 
 
 def markers_alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
     """(m,) how many markers of each marker's segment err as one, from errors (n, m, 3): 1 if each errs on its own.
 
-    The variance of a sum of k equal errors is k times that of k independent ones.
+    The variance of a sum of k equal errors is k times that of k independent ones. What was not seen, NaN, counts as
+    none.
     """
-    count = np.ones(errors.shape[1])
-    for segment in np.unique(skeleton.marker_segments):
-        own = skeleton.marker_segments == segment
-        apart = np.square(errors[:, own]).sum()
-        if apart > 0:
-            count[own] = max(1.0, float(np.square(errors[:, own].sum(axis=1)).sum() / apart))
-    return count
+    of_segments = _of_segments(skeleton)
+    together, apart = np.zeros((2, len(of_segments)))
+    for some in pieces(len(errors)):
+        here = np.nan_to_num(errors[some])
+        together += np.square(np.einsum("sm,nmk->nsk", of_segments, here, optimize=True)).sum(axis=(0, 2))
+        apart += of_segments @ np.square(here).sum(axis=(0, 2))
+    each = np.where(apart > 0.0, np.maximum(1.0, together / np.where(apart > 0.0, apart, 1.0)), 1.0)
+    result: np.ndarray = each @ of_segments
+    return result

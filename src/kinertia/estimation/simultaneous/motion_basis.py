@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
+from scipy.sparse import csr_array
 
 from kinertia.motion.smoothing import columns_alike
 
@@ -56,11 +57,12 @@ class MotionBasis:
         for mask, columns in columns_alike(seen):
             value = self.values[0] * mask[:, None]
             band = np.zeros((_ACTIVE, self.size))
-            right = np.zeros((self.size, len(columns)))
             for a in range(_ACTIVE):
-                np.add.at(right, self.active[:, a], value[:, a, None] * filled[:, columns])
                 for b in range(a, _ACTIVE):
-                    np.add.at(band[b - a], self.active[:, a], value[:, a] * value[:, b])
+                    band[b - a] += np.bincount(self.active[:, a], value[:, a] * value[:, b], self.size)
+            rows = np.arange(0, value.size + 1, _ACTIVE)
+            every = csr_array((value.ravel(), self.active.ravel(), rows), (len(value), self.size))
+            right = every.T @ filled[:, columns]
             band[0] += _RIDGE
             coefficients[:, columns] = solveh_banded(band, right, lower=True)
         return coefficients

@@ -172,15 +172,17 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     measured = kinematics.trial.markers.arranged(skeleton.labels)[frames]
     measured[~solved] = np.nan
     known = np.where(np.isfinite(q), q, bridged)
-    local = np.empty_like(measured)
+    local, total, count = np.empty_like(measured), np.zeros(measured.shape[1:]), np.zeros(measured.shape[1:])
     for some in pieces(len(known)):
         pose = skeleton.pose(known[some])
         turned = pose.rotation[:, skeleton.marker_segments].transpose(0, 1, 3, 2)
         local[some] = (turned @ (measured[some] - skeleton.marker_positions(pose))[..., None])[..., 0]
+        total += np.nansum(local[some], axis=0)
+        count += np.isfinite(local[some]).sum(axis=0)
     # what a marker is off its place in the segment all the time is calibration, not noise
-    shown = np.isfinite(local).any(axis=0)
-    displaced = np.where(shown, np.nanmean(np.where(shown, local, 0.0), axis=0), np.nan)
-    return _Errors(time[frames], q, measured, displaced, local - displaced, bridged)
+    displaced = total / np.where(count > 0, count, np.nan)
+    local -= displaced
+    return _Errors(time[frames], q, measured, displaced, local, bridged)
 
 
 def _observed(

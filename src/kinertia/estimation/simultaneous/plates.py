@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinertia.estimation.simultaneous import plate_loads
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -31,9 +32,6 @@ PLATE_ERRORS = {**PLATE_UNKNOWNS, **FLOOR_UNKNOWNS}
 ZERO_UNKNOWNS = {"zero x": "N", "zero z": "N"}
 """Of each plate in one trial, and its unit: what it reads too much of horizontal force while somebody stands on it.
 Amplifiers drift and are reset, so that the next trial has other zeros."""
-_PLANE = (0, 2)
-"""Axes of the floor's plane, to which places and zeros belong."""
-_TURN, *_ZEROS = (list({**PLATE_ERRORS, **ZERO_UNKNOWNS}).index(name) for name in ("turn", *ZERO_UNKNOWNS))
 _UP = np.array([0.0, 1.0, 0.0])
 _FIRM_N = 5 * LOAD_THRESHOLD_N
 
@@ -64,13 +62,6 @@ def turned_loads(loads: np.ndarray, middle: np.ndarray, angle_rad: np.ndarray | 
     cosine, sine = (np.asarray(each)[..., None] for each in (np.cos(angle_rad), np.sin(angle_rad)))
     force, moment = loads[..., :3], loads[..., 3:] - np.cross(middle, loads[..., :3])
     force, moment = (_UP * each + cosine * (each - _UP * each) + sine * np.cross(_UP, each) for each in (force, moment))
-    return np.concatenate([force, moment + np.cross(middle, force)], axis=-1)
-
-
-def turning_loads(loads: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Derivative of `turned_loads` with respect to the angle, from what has been turned."""
-    force, moment = loads[..., :3], loads[..., 3:] - np.cross(middle, loads[..., :3])
-    force, moment = np.cross(_UP, force), np.cross(_UP, moment)
     return np.concatenate([force, moment + np.cross(middle, force)], axis=-1)
 
 
@@ -125,7 +116,7 @@ class FootPlates:
             plates: (p, 7) what is wrong with the plates: PLATE_ERRORS, ZERO_UNKNOWNS.
         """
         loads = self.loads(time, derivative).reshape(len(time), 2, 6)
-        return self._put_right(self._zeroed(loads, self.loaded(time, derivative), carrier, plates), carrier, plates)
+        return self._put_right(loads, self.loaded(time, derivative), carrier, plates)
 
     def corrected_reactions(self, plates: np.ndarray, late_s: float) -> GroundReactions:
         """The loads for the joint moments, of plates (p, 7) put right, by the clock of the markers.
@@ -135,48 +126,20 @@ class FootPlates:
             late_s: by how much forces are recorded late.
         """
         raw = self.reactions
-        wrench = self._zeroed(raw.wrench, raw.loaded, raw.carrier, plates)
-        wrench, impact = (self._put_right(part, raw.carrier, plates) for part in (wrench, raw.impact))
+        wrench = self._put_right(raw.wrench, raw.loaded, raw.carrier, plates)
+        impact = self._put_right(raw.impact, np.zeros(raw.carrier.shape), raw.carrier, plates)
         return replace(raw, time=raw.time - late_s, wrench=wrench, impact=impact)
-
-    def _zeroed(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """Loads (k, 2, 6) without what plates (k, 2) with errors (p, 7) read too much where somebody stands (k, 2)."""
-        for zero, axis in zip(_ZEROS, _PLANE, strict=True):
-            loads = loads - (loaded * plates[carrier, zero])[..., None] * self._push(axis, carrier)
-        return loads
-
-    def _put_right(self, loads: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
-        """Loads (k, 2, 6) of plates (k, 2) with errors (p, 7), but for their zeros."""
-        here = plates[carrier]
-        loads = turned_loads(loads, self.middles[carrier], -here[..., _TURN])
-        moment = loads[..., 3:] + np.cross(self._ground_offset(here), loads[..., :3])
-        moment[..., 1] += here[..., 3] * loads[..., 1]
-        result: np.ndarray = (1.0 + here[..., 2:3]) * np.concatenate([loads[..., :3], moment], axis=-1)
-        return result
-
-    def _push(self, axis: int, carrier: np.ndarray) -> np.ndarray:
-        """(k, 2, 6) load of 1 N along an axis of the laboratory at the middle of each plate."""
-        along = np.broadcast_to(self.turn[:, axis], (*carrier.shape, 3))
-        return np.concatenate([along, np.cross(self.middles[carrier], along)], axis=-1)
 
     def by_plate(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
         """(n, 2, 6, p, 7) derivative of the corrected loads (n, 2, 6), where somebody stands (n, 2), by what is wrong
         with the plates (p, 7).
         """
-        here = plates[carrier]
-        by_own = np.zeros((*loads.shape, plates.shape[1]))
-        for j, axis in enumerate(_PLANE):
-            by_own[..., 3:, j] = np.cross(self.turn[:, axis], loads[..., :3])
-        by_own[..., 2] = loads / (1.0 + here[..., 2:3])
-        by_own[..., 4, 3] = loads[..., 1]
-        by_own[..., _TURN] = -turning_loads(loads, self.middles[carrier] + self._ground_offset(here))
-        for zero, axis in zip(_ZEROS, _PLANE, strict=True):
-            by_own[..., zero] = -loaded[..., None] * self._put_right(self._push(axis, carrier), carrier, plates)
-        under = carrier[..., None] == np.arange(len(plates))
-        result: np.ndarray = by_own[..., None, :] * under[:, :, None, :, None]
-        return result
+        return plate_loads.by_plate(*self._as_compiled(loads, loaded, carrier, plates))
 
-    def _ground_offset(self, plates: np.ndarray) -> np.ndarray:
-        """(..., 3) m: offsets of plates (..., 7) in the trial's axes."""
-        result: np.ndarray = plates[..., :1] * self.turn[:, 0] + plates[..., 1:2] * self.turn[:, 2]
-        return result
+    def _put_right(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+        """Loads (k, 2, 6) of plates (k, 2) with errors (p, 7), without their zeros where somebody stands (k, 2)."""
+        return plate_loads.put_right(*self._as_compiled(loads, loaded, carrier, plates))
+
+    def _as_compiled(self, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The arguments of `plate_loads`: these, the middles and the turn, all contiguous."""
+        return tuple(map(np.ascontiguousarray, (*arrays, self.middles, self.turn)))

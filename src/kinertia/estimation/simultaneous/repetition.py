@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import next_fast_len
+from scipy.fft import next_fast_len, rfft
 
 from kinertia.motion.frames_at_once import pieces
 
@@ -30,7 +30,7 @@ chance, or because two trials cut from one have frames in common.
 _WHITE = 0.1
 """Share of the variance that one frame shares with the next below which errors are the cameras' noise."""
 
-_COLUMNS_AT_ONCE = 16
+_COLUMNS_AT_ONCE = 4
 """Spectra are four times larger than what they are of."""
 
 
@@ -117,6 +117,8 @@ def _counted(alike: np.ndarray, share: np.ndarray) -> float:
 
 def _resampled(errors: np.ndarray, step: float) -> np.ndarray:
     """Errors (n, k) at every so many frames."""
+    if step == 1.0:
+        return errors
     at = np.arange(0.0, len(errors) - 1 + 1e-9, step)
     before = np.minimum(at.astype(int), len(errors) - 1)
     after = np.minimum(before + 1, len(errors) - 1)
@@ -154,9 +156,16 @@ def _correlation(errors: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.
     padded = next_fast_len(size, real=True)
     spectrum = np.zeros(padded // 2 + 1, dtype=complex)
     for some in pieces(errors.shape[1], _COLUMNS_AT_ONCE):
-        ours, theirs = (np.fft.rfft(each[:, some], padded, axis=0) for each in (errors, other))
-        spectrum += (ours.conj() * theirs).sum(axis=1)
+        ours = _spectra(errors[:, some], padded)
+        theirs = ours if other is errors else _spectra(other[:, some], padded)
+        spectrum += np.einsum("kf,kf->f", ours.conj(), theirs)
     alike = np.roll(np.fft.irfft(spectrum, padded), n - 1)[:size]
     lags = np.arange(1 - n, m)
     overlap = np.minimum(n, m - lags) - np.maximum(0, -lags)
     return alike / power if power > 0 else np.zeros(size), overlap
+
+
+def _spectra(columns: np.ndarray, padded: int) -> np.ndarray:
+    """(k, f) of columns (n, k), with zeros to this length; rows that lie together take half the time."""
+    result: np.ndarray = rfft(np.ascontiguousarray(columns.T), padded)
+    return result

@@ -1,0 +1,91 @@
+"""What bodies and loads make of the forces of axes and of their derivatives, frame by frame in compiled code.
+
+A load f on a segment takes S . f off the force of every axis S that moves the segment.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.model.compiled import compiled
+
+
+@compiled
+def add_bodies(
+    axes: np.ndarray, slopes: np.ndarray, rows: np.ndarray, moved: np.ndarray, by_body: np.ndarray, out: np.ndarray
+) -> None:
+    """Add derivatives of generalised forces by the bodies' unknowns to the first columns of `out` (n, c, s).
+
+    Args:
+        axes: (n, a, 6) motion in ground axes at the ground origin.
+        slopes: (n, a) of every axis by its coordinate.
+        rows: (a,) row of `out` of each axis' coordinate; -1 for none.
+        moved: (b, a) whether the axis moves the body.
+        by_body: (n, 6, 10 b) derivatives of the bodies' loads at the ground origin, ten of each body.
+        out: written.
+    """
+    for i in range(axes.shape[0]):
+        load = by_body[i]
+        for j in range(axes.shape[1]):
+            if rows[j] < 0:
+                continue
+            row, slope = out[i, rows[j]], slopes[i, j]
+            x, y, z = slope * axes[i, j, 0], slope * axes[i, j, 1], slope * axes[i, j, 2]
+            u, v, w = slope * axes[i, j, 3], slope * axes[i, j, 4], slope * axes[i, j, 5]
+            for b in range(len(moved)):
+                if moved[b, j]:
+                    for k in range(10 * b, 10 * b + 10):
+                        force = x * load[0, k] + y * load[1, k] + z * load[2, k]
+                        row[k] += force + u * load[3, k] + v * load[4, k] + w * load[5, k]
+
+
+@compiled
+def take_load(
+    axes: np.ndarray,
+    slopes: np.ndarray,
+    rows: np.ndarray,
+    moved: np.ndarray,
+    loads: np.ndarray,
+    by_load: np.ndarray,
+    first: int,
+    tau: np.ndarray,
+    by_place: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Take a load on a segment off the axes that move it.
+
+    Args:
+        axes, slopes, rows: as `add_bodies` has them.
+        moved: (k,) the axes, in order, each of which turns those after it.
+        loads: (n, 6) at the ground origin.
+        by_load: (n, 6, s) its derivatives by the static unknowns, from the column `first` on; zero before.
+        first: the column.
+        tau: (n, a) forces of the axes, written.
+        by_place: (n, a, a) their derivatives by the axes' places (columns), written.
+        out: (n, c, s) derivatives of generalised forces by the static unknowns, written.
+    """
+    carried = np.empty(6)
+    for i in range(axes.shape[0]):
+        by, fx, fy, fz = by_load[i], loads[i, 0], loads[i, 1], loads[i, 2]
+        mx, my, mz = loads[i, 3], loads[i, 4], loads[i, 5]
+        for at in range(len(moved)):
+            j = moved[at]
+            x, y, z, u, v, w = axes[i, j, 0], axes[i, j, 1], axes[i, j, 2], axes[i, j, 3], axes[i, j, 4], axes[i, j, 5]
+            tau[i, j] -= x * fx + y * fy + z * fz + u * mx + v * my + w * mz
+            # (S_j x S_l) . f = S_l . (f carried along by j)
+            carried[0], carried[1], carried[2] = fy * w - fz * v, fz * u - fx * w, fx * v - fy * u
+            carried[3] = my * w - mz * v + fy * z - fz * y
+            carried[4] = mz * u - mx * w + fz * x - fx * z
+            carried[5] = mx * v - my * u + fx * y - fy * x
+            for after in range(at + 1, len(moved)):
+                later = moved[after]
+                change = 0.0
+                for r in range(6):
+                    change += axes[i, later, r] * carried[r]
+                by_place[i, later, j] -= change
+            if rows[j] < 0:
+                continue
+            row, slope = out[i, rows[j]], slopes[i, j]
+            for k in range(first, out.shape[2]):
+                force = x * by[0, k] + y * by[1, k] + z * by[2, k] + u * by[3, k] + v * by[4, k] + w * by[5, k]
+                row[k] -= slope * force

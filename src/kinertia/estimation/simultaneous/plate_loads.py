@@ -1,0 +1,139 @@
+"""Loads of plates put right, and their derivatives by what is wrong with the plates, frame by frame in compiled code.
+
+A load that somebody adds to a plate is first freed of the plate's zeros, then turned about the vertical through the
+plate's middle, moved to where the plate stands, given the vertical moment that crosstalk took, and multiplied by the
+gain. What is wrong with a plate is a row of seven: PLATE_ERRORS, then ZERO_UNKNOWNS, of `plates`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.model.compiled import compiled, part
+
+X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
+"""Places of what is wrong with a plate."""
+
+
+@compiled
+def put_right(
+    loads: np.ndarray,
+    loaded: np.ndarray,
+    carrier: np.ndarray,
+    plates: np.ndarray,
+    middles: np.ndarray,
+    turn: np.ndarray,
+) -> np.ndarray:
+    """Loads on the feet (n, 2, 6), of plates put right.
+
+    Args:
+        loads: (n, 2, 6) as the plates gave them: force (N), moment about the ground origin (N m).
+        loaded: (n, 2) where somebody stands, and zeros count.
+        carrier: (n, 2) index of the plate under each foot.
+        plates: (p, 7) what is wrong with them.
+        middles: (p, 3) m, where they are turned about.
+        turn: (3, 3) from the laboratory's axes to those of the loads.
+    """
+    result, own, push = np.empty(loads.shape), np.empty(6), np.empty(6)
+    for i in range(loads.shape[0]):
+        for foot in range(loads.shape[1]):
+            plate = carrier[i, foot]
+            for k in range(6):
+                own[k] = loads[i, foot, k]
+            for zero, axis in ((ZERO_X, 0), (ZERO_Z, 2)):
+                _push(axis, middles[plate], turn, push)
+                for k in range(6):
+                    own[k] -= loaded[i, foot] * plates[plate, zero] * push[k]
+            _put_right(own, middles[plate], plates[plate], turn, result[i, foot])
+    return result
+
+
+@compiled
+def by_plate(
+    loads: np.ndarray,
+    loaded: np.ndarray,
+    carrier: np.ndarray,
+    plates: np.ndarray,
+    middles: np.ndarray,
+    turn: np.ndarray,
+) -> np.ndarray:
+    """(n, 2, 6, p, 7) derivatives of what `put_right` gives by what is wrong with the plates.
+
+    The arguments are its own, but for `loads`: (n, 2, 6) put right.
+    """
+    n, feet, _ = loads.shape
+    result = np.zeros((n, feet, 6, len(plates), plates.shape[1]))
+    # a zero shows as a push at the plate's middle, put right like any load
+    pushed, push = np.empty((len(plates), 2, 6)), np.empty(6)
+    for plate in range(len(plates)):
+        for k, axis in enumerate((0, 2)):
+            _push(axis, middles[plate], turn, push)
+            _put_right(push, middles[plate], plates[plate], turn, pushed[plate, k])
+    place = np.empty(3)
+    for i in range(n):
+        for foot in range(feet):
+            plate = carrier[i, foot]
+            own, load = result[i, foot, :, plate], loads[i, foot]
+            for r in range(3):
+                place[r] = middles[plate, r] + plates[plate, X] * turn[r, 0] + plates[plate, Z] * turn[r, 2]
+            _by_place(load, turn, own)
+            _by_turn(load, place, own)
+            own[4, FREE_MOMENT] = load[1]
+            for k in range(6):
+                own[k, GAIN] = load[k] / (1.0 + plates[plate, GAIN])
+                own[k, ZERO_X] = -loaded[i, foot] * pushed[plate, 0, k]
+                own[k, ZERO_Z] = -loaded[i, foot] * pushed[plate, 1, k]
+    return result
+
+
+@part
+def _push(axis: int, middle: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+    """out = (6,) load of 1 N along an axis of the laboratory at the middle of a plate."""
+    x, y, z = turn[0, axis], turn[1, axis], turn[2, axis]
+    out[0], out[1], out[2] = x, y, z
+    out[3] = middle[1] * z - middle[2] * y
+    out[4] = middle[2] * x - middle[0] * z
+    out[5] = middle[0] * y - middle[1] * x
+
+
+@part
+def _put_right(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+    """out = (6,) load of a plate put right, but for its zeros."""
+    x, y, z = middle[0], middle[1], middle[2]
+    fx, fy, fz = load[0], load[1], load[2]
+    # about the middle
+    mx, my, mz = load[3] - (y * fz - z * fy), load[4] - (z * fx - x * fz), load[5] - (x * fy - y * fx)
+    cosine, sine = np.cos(wrong[TURN]), -np.sin(wrong[TURN])
+    fx, fz = cosine * fx + sine * fz, cosine * fz - sine * fx
+    mx, mz = cosine * mx + sine * mz, cosine * mz - sine * mx
+    x += wrong[X] * turn[0, 0] + wrong[Z] * turn[0, 2]
+    y += wrong[X] * turn[1, 0] + wrong[Z] * turn[1, 2]
+    z += wrong[X] * turn[2, 0] + wrong[Z] * turn[2, 2]
+    gain = 1.0 + wrong[GAIN]
+    out[0], out[1], out[2] = gain * fx, gain * fy, gain * fz
+    out[3] = gain * (mx + y * fz - z * fy)
+    out[4] = gain * (my + z * fx - x * fz + wrong[FREE_MOMENT] * fy)
+    out[5] = gain * (mz + x * fy - y * fx)
+
+
+@part
+def _by_place(load: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+    """Write derivatives of a load (6,) put right by the plate's place to their columns of out (6, 7)."""
+    for place, axis in ((X, 0), (Z, 2)):
+        x, y, z = turn[0, axis], turn[1, axis], turn[2, axis]
+        out[3, place] = y * load[2] - z * load[1]
+        out[4, place] = z * load[0] - x * load[2]
+        out[5, place] = x * load[1] - y * load[0]
+
+
+@part
+def _by_turn(load: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
+    """Write the derivative of a load (6,) put right, of a plate at this place (3,), by its turn to out (6, 7)."""
+    x, y, z = place[0], place[1], place[2]
+    mx, mz = load[3] - (y * load[2] - z * load[1]), load[5] - (x * load[1] - y * load[0])
+    # the loads are turned backwards: v becomes (-v_z, 0, v_x)
+    fx, fz = -load[2], load[0]
+    out[0, TURN], out[2, TURN] = fx, fz
+    out[3, TURN] = y * fz - mz
+    out[4, TURN] = z * fx - x * fz
+    out[5, TURN] = mx - y * fx
