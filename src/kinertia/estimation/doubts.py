@@ -15,6 +15,7 @@ from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_on_person import model_on_person_doubts, model_on_person_trouble
 from kinertia.model.same_body import body_trouble, session_doubts
+from kinertia.model.segment_distances import SegmentDistances
 from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.model.torn_segments import torn_segments_trouble
 from kinertia.motion.caused_velocity import caused_velocities
@@ -99,8 +100,9 @@ def trial_doubts(
     session: list[str] = []
     # labels that are swapped in the static trial are named with it, and put its distances wrong
     if not trouble and static is not None and marker_set is not None and not _sides(static.markers, marker_set):
-        trouble = body_trouble(static.markers, markers, marker_set)
-        session = [] if trouble else session_doubts(static.markers, markers, marker_set)
+        distances = SegmentDistances.of(static.markers, markers, marker_set)
+        trouble = body_trouble(distances)
+        session = [] if trouble else session_doubts(distances)
     if not trouble and marker_set is not None and marker_set.in_model is not None:
         trouble = model_on_person_trouble(marker_set.in_model, own, marker_set)
         session = [] if trouble else model_on_person_doubts(marker_set.in_model, own, marker_set)
