@@ -8,7 +8,15 @@ PICTURES = {"plotly", "matplotlib"}
 SLOW = {*PICTURES, "scipy.stats", "scipy.signal"}
 SYNTHETIC = {"kinertia.studies", "kinertia.synthetic"}
 OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.estimation.prepare_osim"}
-C3D = {"ezc3d", "kinertia.io.c3d"}
+C3D = {"ezc3d", "kinertia.io.c3d", "kinertia.io.c3d_plates"}
+SELDOM_NAMED = {
+    "kinertia.estimation.known_body",
+    "kinertia.estimation.learnt_prior",
+    "kinertia.estimation.session",
+    "kinertia.io.measures_file",
+    "kinertia.io.population_file",
+    "kinertia.io.session_file",
+}
 
 
 def test_the_version_is_told_without_loading_the_commands():
@@ -29,7 +37,7 @@ def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(c3d_lab, tmp_pat
 def test_a_fit_of_text_files_does_not_load_the_reader_of_c3d(demo_run, tmp_path):
     loaded = loaded_by("fit", demo_run[1] / "lab" / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "bsp.csv").is_file()
-    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, *C3D, "pandas"}
+    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, *C3D, *SELDOM_NAMED, "pandas"}
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.same_body import body_trouble, session_doubts
+from kinertia.model.segment_distances import SegmentDistances
 from kinertia.trial.data import Markers
 from recordings import here
 
@@ -40,15 +41,15 @@ def person(request, recording_of):
 
 
 def test_the_own_static_trial(person):
-    assert body_trouble(*person) == ""
-    assert session_doubts(*person) == []
+    assert body_trouble(SegmentDistances.of(*person)) == ""
+    assert session_doubts(SegmentDistances.of(*person)) == []
 
 
 @pytest.mark.parametrize("size", [0.9, 1.1])
 def test_the_static_trial_of_a_person_of_another_size(person, size):
     static, walk, marker_set = person
     other = Markers(static.time, static.labels, size * static.positions)
-    trouble = body_trouble(other, walk, marker_set)
+    trouble = body_trouble(SegmentDistances.of(other, walk, marker_set))
     assert ("longer" if size < 1 else "shorter") in trouble
     assert "another person" in trouble
 
@@ -61,7 +62,8 @@ def test_markers_put_on_anew(person, seed):
     """By 12 mm, which the two or three markers of a segment in Plug-in Gait show for most people, not for all."""
     static, walk, marker_set = person
     offsets = np.random.default_rng(seed).normal(0.0, 0.012, (len(static.labels), 3))
-    (doubt,) = session_doubts(Markers(static.time, static.labels, static.positions + offsets), walk, marker_set)
+    put_on_anew = Markers(static.time, static.labels, static.positions + offsets)
+    (doubt,) = session_doubts(SegmentDistances.of(put_on_anew, walk, marker_set))
     assert "of another session" in doubt
 
 
@@ -72,7 +74,7 @@ def test_one_marker_that_was_moved(person):
     places = walk.positions.copy()
     away = places[:, walk.labels.index(label)] - places[:, [walk.labels.index(one) for one in mates]].mean(axis=1)
     places[:, walk.labels.index(label)] += 0.06 * away / np.linalg.norm(away, axis=1, keepdims=True)
-    (doubt,) = session_doubts(static, Markers(walk.time, walk.labels, places), marker_set)
+    (doubt,) = session_doubts(SegmentDistances.of(static, Markers(walk.time, walk.labels, places), marker_set))
     assert f"the marker {label}" in doubt
     assert "elsewhere" in doubt
 
@@ -83,7 +85,7 @@ def test_labels_that_were_exchanged(person):
     knee, ankle = (marker_set.landmarks[f"{name}_lateral_l"][0] for name in ("knee", "ankle"))
     other = {knee: ankle, ankle: knee}
     labels = tuple(other.get(label, label) for label in walk.labels)
-    trouble = body_trouble(static, Markers(walk.time, labels, walk.positions), marker_set)
+    trouble = body_trouble(SegmentDistances.of(static, Markers(walk.time, labels, walk.positions), marker_set))
     assert f"{knee} and {ankle} look swapped" in trouble or f"{ankle} and {knee} look swapped" in trouble
 
 
@@ -96,7 +98,7 @@ def test_front_and_back_of_the_pelvis_exchanged_in_one_trial(person):
         (front,), (back,) = (marker_set.landmarks[f"{name}_{side}"] for name in ("asis", "psis"))
         other |= {front: back, back: front}
     labels = tuple(other.get(label, label) for label in static.labels)
-    trouble = body_trouble(Markers(static.time, labels, static.positions), walk, marker_set)
+    trouble = body_trouble(SegmentDistances.of(Markers(static.time, labels, static.positions), walk, marker_set))
     assert trouble.count(" and ") >= 3
     assert "look swapped" in trouble
     assert all(label in trouble for label in other)
@@ -106,7 +108,7 @@ def test_front_and_back_of_the_pelvis_exchanged_in_one_trial(person):
 def test_another_scale_of_the_cameras(person, factor):
     static, walk, marker_set = person
     scaled = replace(walk, positions=factor * walk.positions)
-    (doubt,) = session_doubts(static, scaled, marker_set)
+    (doubt,) = session_doubts(SegmentDistances.of(static, scaled, marker_set))
     assert "segments alike" in doubt
     assert "longer" in doubt if factor > 1 else "shorter" in doubt
     assert float(doubt.partition("segment are ")[2].partition(" %")[0]) == pytest.approx(3.0, abs=1.0)
@@ -117,6 +119,7 @@ def test_a_camera_scale_that_is_1_5_percent_off(person, factor):
     """About the middle of the trial, so that the person stays on the plates."""
     static, walk, marker_set = person
     middle = np.nanmean(walk.positions, axis=(0, 1))
-    (doubt,) = session_doubts(static, replace(walk, positions=factor * (walk.positions - middle) + middle), marker_set)
+    scaled = replace(walk, positions=factor * (walk.positions - middle) + middle)
+    (doubt,) = session_doubts(SegmentDistances.of(static, scaled, marker_set))
     assert "longer" in doubt if factor > 1 else "shorter" in doubt
     assert "calibrated anew" in doubt

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.one_plate import plate_sign_trouble
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -38,8 +39,8 @@ def trouble_of(walk, marker_set=None):
         return trouble
     marker_set = marker_set or choose_marker_set(walk.markers.labels)
     trial = sorted_by_foot(walk, marker_set)
-    owners = owners_of(marker_set)
-    return direction_trouble(trial, owners) or offset_trouble(trial, owners)
+    parts = caused_velocities(trial, owners_of(marker_set))
+    return direction_trouble(trial, parts) or offset_trouble(parts)
 
 
 def sorted_by_foot(walk, marker_set=None):
@@ -110,12 +111,13 @@ def test_signs_over_two_windows(walk):
     parted = replace(trial, measured=trial.measured & ~cut)
     owners = owners_of(choose_marker_set(walk.markers.labels))
     assert len([one for one in parted.windows() if one[1] <= last]) == 2
-    assert plate_sign_trouble(walk.plates, parted, owners) == ""
+    assert plate_sign_trouble(walk.plates, caused_velocities(parted, owners)) == ""
 
 
 def one_plate_trouble(walk):
     marker_set = choose_marker_set(walk.markers.labels)
-    return plate_sign_trouble(walk.plates, sorted_by_foot(walk, marker_set), owners_of(marker_set))
+    parts = caused_velocities(sorted_by_foot(walk, marker_set), owners_of(marker_set))
+    return plate_sign_trouble(walk.plates, parts)
 
 
 def owners_of(marker_set):

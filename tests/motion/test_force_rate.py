@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.force_rate import rate_doubts
 from kinertia.trial.plate_assignment import build_trial
 from recordings import LONG_WALKS, WALKS
@@ -35,7 +36,8 @@ def doubts(recording, rate=1.0, late_s=0.0, gain=(1.0, 1.0)):
     present = set(recording.markers.labels)
     feet = {side: [one for one in own if one in present] for side, own in marker_set.foot_labels().items()}
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
-    return rate_doubts(build_trial(replace(recording, plates=wrong), feet), owners)
+    trial = build_trial(replace(recording, plates=wrong), feet)
+    return rate_doubts(trial, caused_velocities(trial, owners))
 
 
 @pytest.mark.parametrize(

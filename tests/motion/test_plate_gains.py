@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.plate_gains import gain_doubts
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.plate_assignment import build_trial
@@ -25,7 +26,8 @@ def told(walk):
     present = set(walk.markers.labels)
     feet = {side: [one for one in labels if one in present] for side, labels in marker_set.foot_labels().items()}
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
-    return gain_doubts(walk, build_trial(walk, feet), owners)
+    trial = build_trial(walk, feet)
+    return gain_doubts(walk, trial, owners, caused_velocities(trial, owners))
 
 
 def test_sound_plates(walk):

@@ -118,9 +118,10 @@ def fit(
         judged = verdicts(result)
         status = max(status, int(stands_against(judged)))
         summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
-        report_fit(result)
-        report_verdicts(judged, result, verbose)
-        out.print(f"results in {one.folder}", soft_wrap=True)
+        if not quiet:
+            report_fit(result)
+            report_verdicts(judged, result, verbose)
+            out.print(f"results in {one.folder}", soft_wrap=True)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
 

@@ -29,4 +29,7 @@ def main() -> None:
     gc.freeze()
     gc.set_threshold(_NEW_OBJECTS)
     gc.enable()
-    run(app, given)
+    try:
+        run(app, given)
+    finally:
+        gc.freeze()  # all of it ends with the process: Python need not look through it for garbage once more

@@ -243,7 +243,8 @@ def _turn_by_places(markers: Sequence[Marker], segment: str) -> np.ndarray:
 def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
     """(n, m, 3, c): velocity of every marker, at these positions (n, m, 3) m, for each coordinate at unit rate."""
     columns = pose.axes.transpose(0, 2, 1)
-    linear, angular = columns[:, None, :3], columns[:, None, 3:]
-    turning = np.cross(angular, positions[..., None], axis=2)
-    by_axes = (linear + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
+    x, y, z = positions[..., None].transpose(2, 0, 1, 3)
+    turn_x, turn_y, turn_z = columns[:, None, 3:].transpose(2, 0, 1, 3)
+    turning = np.stack([turn_y * z - turn_z * y, turn_z * x - turn_x * z, turn_x * y - turn_y * x], axis=2)
+    by_axes = (columns[:, None, :3] + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
     return skeleton.map.to_coordinates(by_axes, pose.slopes)

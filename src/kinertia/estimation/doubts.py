@@ -15,8 +15,10 @@ from kinertia.model.computed_markers import computed_doubts
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_on_person import model_on_person_doubts, model_on_person_trouble
 from kinertia.model.same_body import body_trouble, session_doubts
+from kinertia.model.segment_distances import SegmentDistances
 from kinertia.model.stature import flat_feet_doubts, floor_doubts, stature_doubts
 from kinertia.model.torn_segments import torn_segments_trouble
+from kinertia.motion.caused_velocity import caused_velocities
 from kinertia.motion.force_faults import direction_trouble, offset_trouble
 from kinertia.motion.force_rate import rate_doubts
 from kinertia.motion.one_plate import axis_gain_trouble, plate_offset_trouble, plate_sign_trouble
@@ -98,8 +100,9 @@ def trial_doubts(
     session: list[str] = []
     # labels that are swapped in the static trial are named with it, and put its distances wrong
     if not trouble and static is not None and marker_set is not None and not _sides(static.markers, marker_set):
-        trouble = body_trouble(static.markers, markers, marker_set)
-        session = [] if trouble else session_doubts(static.markers, markers, marker_set)
+        distances = SegmentDistances.of(static.markers, markers, marker_set)
+        trouble = body_trouble(distances)
+        session = [] if trouble else session_doubts(distances)
     if not trouble and marker_set is not None and marker_set.in_model is not None:
         trouble = model_on_person_trouble(marker_set.in_model, own, marker_set)
         session = [] if trouble else model_on_person_doubts(marker_set.in_model, own, marker_set)
@@ -140,20 +143,16 @@ def motion_doubts(recording: Recording, trial: Trial, marker_set: MarkerSet) -> 
         marker_set: which marker is on which segment.
     """
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
-    plates = recording.plates
-    trouble = over_smoothed_trouble(trial, owners)
+    plates, parts = recording.plates, caused_velocities(trial, owners)
+    trouble = over_smoothed_trouble(trial, owners, parts)
     if not trouble and plates is not None:
-        trouble = plate_sign_trouble(plates, trial, owners)
-    if trouble := trouble or direction_trouble(trial, owners):
+        trouble = plate_sign_trouble(plates, parts)
+    if trouble := trouble or direction_trouble(trial, parts):
         return _refused(trouble)
-    along = (
-        []
-        if plates is None
-        else [axis_gain_trouble(plates, trial, owners), plate_offset_trouble(plates, trial, owners)]
-    )
-    along = [one for one in along if one] or [offset_trouble(trial, owners)]
-    sentences = [*filter(None, along), *gain_doubts(recording, trial, owners)]
-    return _told([*rate_doubts(trial, owners), *sentences])
+    along = [] if plates is None else [axis_gain_trouble(plates, parts), plate_offset_trouble(plates, parts)]
+    along = [one for one in along if one] or [offset_trouble(parts)]
+    sentences = [*filter(None, along), *gain_doubts(recording, trial, owners, parts)]
+    return _told([*rate_doubts(trial, parts), *sentences])
 
 
 def uneven_scales(trials: Sequence[Trial], marker_set: MarkerSet) -> list[str]:

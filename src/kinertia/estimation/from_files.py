@@ -1,32 +1,33 @@
-"""From a subject file to the recordings that it names, to what an estimator needs, and to a `Fit`."""
+"""From a subject file to the recordings that it names, to what an estimator needs, and to a `Fit`.
+
+What only some subject files name is imported where it is read: all of it together takes as long as reading a trial.
+"""
 
 from __future__ import annotations
 
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kinertia.errors import PriorError, SessionError, SettingsError
 from kinertia.estimation.attached import with_attached
 from kinertia.estimation.estimate import estimate
-from kinertia.estimation.known_body import with_known_body
-from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.result import Fit
-from kinertia.estimation.session import with_instruments
 from kinertia.io.belt_file import read_belt
-from kinertia.io.bsp_file import read_bsp
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.measures_file import BodyMeasures, read_measures
-from kinertia.io.population_file import read_population
 from kinertia.io.provenance import command_line, recordings
 from kinertia.io.recording import read_recording
-from kinertia.io.session_file import read_session
 from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.stadium_body import expect_yeadon
 from kinertia.trial.data import Recording
 from kinertia.trial.plate_names import plate_of_trial
+
+if TYPE_CHECKING:
+    from kinertia.estimation.learnt_prior import LearntPrior
+    from kinertia.io.measures_file import BodyMeasures
+    from kinertia.io.session_file import PersonInstruments
 
 
 def read_inputs(
@@ -55,9 +56,7 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
     known = wanted.instruments
     _expect_no_mirrored_prosthesis(wanted)
-    session = () if known.session is None else read_session(known.session)
-    if session:
-        check_plates(wanted)
+    session = _session(wanted)
     measures = _measures(wanted)
     ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted, measures))
     if known.model_copy(update={"date": None}) == InstrumentsFiles():
@@ -66,6 +65,8 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
         return replace(
             ready, notes=(*ready.notes, "[instruments] is not used: two-level takes plates and clock as exact")
         )
+    from kinertia.estimation.session import with_instruments
+
     return with_instruments(ready, known, session, recordings(wanted))
 
 
@@ -78,10 +79,25 @@ def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
         )
 
 
+def _session(wanted: SubjectFile) -> tuple[PersonInstruments, ...]:
+    """What is known of the instruments from the others of their session, whose plates this person's are."""
+    if wanted.instruments.session is None:
+        return ()
+    from kinertia.io.session_file import read_session
+
+    session = read_session(wanted.instruments.session)
+    if session:
+        check_plates(wanted)
+    return session
+
+
 def _measures(wanted: SubjectFile) -> BodyMeasures | None:
     """The sheet of girths and lengths, read before anything is computed."""
     if wanted.prior.measures is None:
         return None
+    from kinertia.io.measures_file import read_measures
+    from kinertia.model.stadium_body import expect_yeadon
+
     expect_yeadon()
     return read_measures(wanted.prior.measures)
 
@@ -91,6 +107,9 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasure
         return ready
     if wanted.settings.method == "two-level":
         return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
+    from kinertia.estimation.known_body import with_known_body
+    from kinertia.io.bsp_file import read_bsp
+
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
     group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
     return with_known_body(ready, wanted.prior, earlier, wanted.segments, group, measures)
@@ -98,6 +117,9 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasure
 
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
     """What was learnt of the person's group, unless the person was in it."""
+    from kinertia.estimation.learnt_prior import LearntPrior
+    from kinertia.io.population_file import read_population
+
     file = read_population(path)
     if set(recordings(wanted)) & set(file.files):
         raise PriorError(

@@ -46,10 +46,10 @@ def write_archive(path: Path, content: object, kinds: Sequence[type], remarks: M
     Raises:
         TypeError: something else is in it.
     """
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_QUICK) as archive:
+    with zipfile.ZipFile(path, "w") as archive:
         tree = _Writer(archive, set(kinds)).plain(content, "")
         text = json.dumps({**remarks, "format": _FORMAT, "content": tree}, allow_nan=False)
-        archive.writestr(_member(_STRUCTURE), text)
+        archive.writestr(_member(_STRUCTURE), text, compresslevel=_QUICK)
 
 
 def read_archive(path: Path, kinds: Sequence[type]) -> Any:
@@ -126,7 +126,7 @@ class _Writer:
     def _array(self, values: np.ndarray, place: str) -> dict[str, str]:
         buffer = io.BytesIO()
         np.lib.format.write_array(buffer, values, allow_pickle=False)
-        self.archive.writestr(_member(f"{place}.npy"), buffer.getvalue())
+        self.archive.writestr(_member(f"{place}.npy"), buffer.getvalue(), compresslevel=_QUICK)
         return {"array": place}
 
 

@@ -13,9 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.model.camera_scale import scale_trouble
-from kinertia.model.marker_set import MarkerSet
 from kinertia.model.segment_distances import SegmentDistances
-from kinertia.trial.data import Markers
 
 _OTHER_BODY = 0.05
 """Median share by which the distances may differ."""
@@ -30,19 +28,17 @@ _SAME_SESSION_M = 0.009
 """
 
 
-def body_trouble(static: Markers, trial: Markers, marker_set: MarkerSet) -> str:
+def body_trouble(distances: SegmentDistances) -> str:
     """Why static trial and trial cannot be used together: swapped labels, or another person; empty where they may."""
-    distances = SegmentDistances.of(static, trial, marker_set)
     if not len(distances.pairs):
         return ""
     return swapped_labels(distances) or swapped_pairs(distances) or _another_body(distances)
 
 
-def session_doubts(static: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
+def session_doubts(distances: SegmentDistances) -> list[str]:
     """What speaks against markers that were left in place between static trial and trial, if `body_trouble` found
     nothing.
     """
-    distances = SegmentDistances.of(static, trial, marker_set)
     if not len(distances.pairs):
         return []
     off = distances.differences()

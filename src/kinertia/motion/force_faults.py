@@ -8,18 +8,13 @@ cause is 0.5 and more on sound walks and runs, 0.2 in squats, and trends of pelv
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.motion.caused_velocity import (
-    LEAST_CHANGE_M_S,
-    CausedVelocity,
-    VelocityChanges,
-    caused_velocities,
-)
+from kinertia.motion.caused_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
 from kinertia.motion.unexplained_velocity import TOLD_APART, Unexplained
 from kinertia.trial.data import Trial
 
@@ -49,15 +44,14 @@ class Agreement:
     limit_n: float
 
 
-def direction_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
+def direction_trouble(trial: Trial, parts: Sequence[CausedVelocity]) -> str:
     """Which horizontal forces point against the motion of the markers, and times that are not theirs; empty where
     neither.
 
     Args:
         trial: in ground axes.
-        owners: the segment that each marker is on.
+        parts: its `caused_velocities`.
     """
-    parts = caused_velocities(trial, owners)
     if not parts:
         return ""
     changes = VelocityChanges.of(parts)
@@ -121,9 +115,8 @@ def _turn(changes: VelocityChanges) -> tuple[float, float]:
     return float(np.degrees(np.angle(turn))), abs(turn)
 
 
-def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
+def offset_trouble(parts: Sequence[CausedVelocity]) -> str:
     """A horizontal force that no motion of the pelvis' markers accounts for; empty where there is none."""
-    parts = caused_velocities(trial, owners)
     agreements = _agreement(parts) if parts else {}
     off = {axis: one.offset_n for axis, one in agreements.items() if abs(one.offset_n) > one.limit_n}
     if not off:
@@ -140,18 +133,8 @@ def offset_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
     )
 
 
-def agreement(trial: Trial, owners: Mapping[str, str]) -> dict[str, Agreement]:
-    """Forces against markers along X and Z over the measured windows; empty where these are too short.
-
-    Args:
-        trial: in ground axes.
-        owners: the segment that each marker is on.
-    """
-    parts = caused_velocities(trial, owners)
-    return _agreement(parts) if parts else {}
-
-
 def _agreement(parts: Sequence[CausedVelocity]) -> dict[str, Agreement]:
+    """Forces against markers along X and Z over the measured windows."""
     changes = VelocityChanges.of(parts)
     spans = np.array([np.ptp(part.time) for part in parts])
     limit = OFFSET_LIMIT_N * max(1.0, OFFSET_WINDOW_S / float(spans.max()))

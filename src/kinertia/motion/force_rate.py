@@ -7,11 +7,11 @@ delay, and its growth, from the first and the last of a second. Two steps are en
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 
-from kinertia.motion.caused_velocity import caused_velocities
+from kinertia.motion.caused_velocity import CausedVelocity
 from kinertia.motion.ups_and_downs import ups_and_downs_of
 from kinertia.trial.data import Trial
 from kinertia.trial.sampled_time import span_s
@@ -21,14 +21,14 @@ _LEAST_WINDOW_S, _LEAST_GROWTH, _MOST_LEFT = 1.0, 0.0105, 0.22
 and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
 
 
-def rate_doubts(trial: Trial, owners: Mapping[str, str]) -> list[str]:
+def rate_doubts(trial: Trial, parts: Sequence[CausedVelocity]) -> list[str]:
     """Forces that come ever later, or ever earlier, in a measured window.
 
     Args:
         trial: in ground axes.
-        owners: the segment that each marker is on.
+        parts: its `caused_velocities`.
     """
-    for part in caused_velocities(trial, owners):
+    for part in parts:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         found = ups_and_downs_of(part, growing=True)

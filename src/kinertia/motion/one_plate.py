@@ -5,15 +5,15 @@ Judged is which single correction lets the forces move the body as its markers s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kinertia.motion.caused_velocity import CausedVelocity, caused_velocities
+from kinertia.motion.caused_velocity import CausedVelocity
 from kinertia.motion.force_faults import HORIZONTAL, OFFSET_WINDOW_S, offset_trouble
 from kinertia.motion.unexplained_velocity import TOLD_APART, Scaled, Unexplained
-from kinertia.trial.data import PlateLoads, Trial
+from kinertia.trial.data import PlateLoads
 from kinertia.trial.sampled_time import span_s
 
 _ONE_TURNED, _CLEARLY_BEST, _LEAST_TURNED_M_S = 0.65, 0.85, 0.08
@@ -28,7 +28,7 @@ _SCALED, _LEAST_GAIN_WINDOW_S, _FACTORS = 0.55, 1.0, ((0.4, 0.75), (1.35, 4.0))
 are as large another gain leaves 0.72 and more, or another zero explains more. Beyond these factors it is no gain."""
 
 
-def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str]) -> str:
+def plate_sign_trouble(plates: PlateLoads, parts: Sequence[CausedVelocity]) -> str:
     """Which single plate has a horizontal force of the wrong sign, where others have it right; empty where none.
 
     With its sign turned, the forces must move the body much more as the markers show: more than with that of any other
@@ -36,10 +36,8 @@ def plate_sign_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, st
 
     Args:
         plates: as read.
-        trial: what became of them, in the same axes.
-        owners: the segment that each marker is on.
+        parts: the trial's `caused_velocities`, in the same axes.
     """
-    parts = caused_velocities(trial, owners)
     if not parts or len(plates.names) < 2:
         return ""
     for axis, k in HORIZONTAL.items():
@@ -72,21 +70,20 @@ def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], k: int)
     return min(found, key=lambda one: min(one.as_read, float(one.plate_turned.min())))
 
 
-def plate_offset_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str]) -> str:
+def plate_offset_trouble(plates: PlateLoads, parts: Sequence[CausedVelocity]) -> str:
     """A horizontal force of one loaded plate that does not accelerate the body; empty where there is none, or where all
     plates show it (`offset_trouble`).
 
     Args:
         plates: as read.
-        trial: what became of them, in the same axes.
-        owners: the segment that each marker is on.
+        parts: the trial's `caused_velocities`, in the same axes.
     """
-    parts = [part for part in caused_velocities(trial, owners) if span_s(part.time) >= _LEAST_ZERO_WINDOW_S]
-    if not parts:
+    long = [part for part in parts if span_s(part.time) >= _LEAST_ZERO_WINDOW_S]
+    if not long:
         return ""
-    longest_s = max(span_s(part.time) for part in parts)
+    longest_s = max(span_s(part.time) for part in long)
     for axis, k in HORIZONTAL.items():
-        left = Unexplained.of(plates.time, plates.force, parts, k)
+        left = Unexplained.of(plates.time, plates.force, long, k)
         best = int(np.argmin(left.plate_zeroed))
         zero_n, zeroed = float(left.zero_n[best]), float(left.plate_zeroed[best])
         if left.as_read < _LEAST_OFF_M_S or zeroed > min(_ZEROED * left.as_read, _USUALLY_LEFT_M_S):
@@ -97,7 +94,7 @@ def plate_offset_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, 
             continue
         names = [plates.names[p] for p in np.flatnonzero(left.plate_zeroed * _CLEARLY_BEST < zeroed)]
         alone = len(names) == 1 and zeroed < _CLEARLY_BEST * left.without_trend
-        if not alone and offset_trouble(trial, owners):
+        if not alone and offset_trouble(parts):
             return ""
         return (
             f"the zero of the horizontal force of {' or '.join(names)} along {axis} is wrong, or drifts: while "
@@ -109,19 +106,18 @@ def plate_offset_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, 
     return ""
 
 
-def axis_gain_trouble(plates: PlateLoads, trial: Trial, owners: Mapping[str, str]) -> str:
+def axis_gain_trouble(plates: PlateLoads, parts: Sequence[CausedVelocity]) -> str:
     """A horizontal axis of one plate, or of all, that reads so many times as much as it should; empty where none does.
 
     Args:
         plates: as read.
-        trial: what became of them, in the same axes.
-        owners: the segment that each marker is on.
+        parts: the trial's `caused_velocities`, in the same axes.
     """
-    parts = [part for part in caused_velocities(trial, owners) if span_s(part.time) >= _LEAST_GAIN_WINDOW_S]
-    if not parts:
+    long = [part for part in parts if span_s(part.time) >= _LEAST_GAIN_WINDOW_S]
+    if not long:
         return ""
     for axis, k in HORIZONTAL.items():
-        left = Unexplained.of(plates.time, plates.force, parts, k)
+        left = Unexplained.of(plates.time, plates.force, long, k)
         best = min(left.scaled, key=lambda one: one.left)
         rivals = [_SCALED * left.as_read, _CLEARLY_BEST * float(left.plate_zeroed.min())]
         if left.as_read < _LEAST_OFF_M_S or best.left > min(rivals) or not _is_gain(best):

@@ -8,12 +8,12 @@ as fast as its markers show.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 
-from kinertia.motion.caused_velocity import VelocityChanges, caused_velocities
+from kinertia.motion.caused_velocity import CausedVelocity, VelocityChanges
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Trial
 
 _QUICK_HZ, _LEAST_QUICK, _LEAST_SWING_M_S = 4.0, 0.002, 1.0
@@ -24,14 +24,14 @@ turns quickly; a wrong rate does not."""
 _MOSTLY_SEEN = 0.9
 
 
-def over_smoothed_trouble(trial: Trial, owners: Mapping[str, str]) -> str:
+def over_smoothed_trouble(trial: Trial, owners: Mapping[str, str], parts: Sequence[CausedVelocity]) -> str:
     """Markers without the quick part of the motion that the forces show; empty where they have it, or nobody steps.
 
     Args:
         trial: in ground axes.
         owners: the segment that each marker is on.
+        parts: the trial's `caused_velocities`.
     """
-    parts = caused_velocities(trial, owners)
     quick = _quick_share(trial.markers, owners)
     if not parts or quick is None or quick > _LEAST_QUICK:
         return ""

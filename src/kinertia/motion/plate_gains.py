@@ -7,12 +7,12 @@ tell more: a plate that reads too much pushes it up whenever it is stood on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.motion.caused_velocity import caused_velocities
+from kinertia.motion.caused_velocity import CausedVelocity
 from kinertia.motion.markers_centre import markers_centre
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.motion.ups_and_downs import ups_and_downs_of
@@ -27,15 +27,18 @@ _LEAST_WINDOW_S, _LEAST_GAIN, _LEFT = 1.0, 0.025, 0.9
 1 % in one. They must also explain so much, which a jump's do not."""
 
 
-def gain_doubts(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> list[str]:
+def gain_doubts(
+    recording: Recording, trial: Trial, owners: Mapping[str, str], parts: Sequence[CausedVelocity]
+) -> list[str]:
     """Plates by which the body is heavier than by others.
 
     Args:
         recording: as read.
         trial: the same with measured frames.
         owners: the segment that each marker is on.
+        parts: the trial's `caused_velocities`.
     """
-    return _single_supports(_masses(recording, trial, owners)) or _ups_and_downs(recording, trial, owners)
+    return _single_supports(_masses(recording, trial, owners)) or _ups_and_downs(recording, parts)
 
 
 def _single_supports(mass_kg: Mapping[str, float]) -> list[str]:
@@ -53,12 +56,12 @@ def _single_supports(mass_kg: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _ups_and_downs(recording: Recording, trial: Trial, owners: Mapping[str, str]) -> list[str]:
+def _ups_and_downs(recording: Recording, parts: Sequence[CausedVelocity]) -> list[str]:
     """The plate whose other gain explains how the body goes up and down, better than another rate would."""
     plates = recording.plates
     if plates is None or len(plates.names) < 2:
         return []
-    for part in caused_velocities(trial, owners):
+    for part in parts:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         read, rate = ups_and_downs_of(part), ups_and_downs_of(part, growing=True)

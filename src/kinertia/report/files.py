@@ -104,6 +104,9 @@ def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
     if all(isinstance(cell, float) for cell in cells):
         texts = (" ".join([digits] * len(cells)) % tuple(cells)).split()
         return [None if text == "nan" else text for text in texts]
+    if all(isinstance(cell, str) for cell in cells):  # names, of which long tables have few
+        words = {cell: inert(cell) for cell in set(cells)}
+        return [words[cell] for cell in cells]
     return [None if cell != cell else inert(cell) for cell in cells]
 
 

@@ -38,7 +38,7 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
     forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
     """
     thin, axis = _thin(len(trial.time), most_frames), _time_axis(trial.kinematics)
-    marks = _events(trial.kinematics)
+    marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics))]
     stages = {
         stage_name(stage, start, _hz(trial, stage)): (style.STAGES[stage], values)
         for stage, values in trial.residuals.items()
@@ -54,7 +54,7 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
             for name, (line, values) in stages.items()
         ]
         title = f"{kind} {_AXES[k % 3]} (N)" if k < 3 else f"Moment about {_MOMENT_AXES[k - 3]} (N m)"
-        panels.append(Panel(title, traces, [*_unused(trial.kinematics, axis), *marks]))
+        panels.append(Panel(title, traces, marks))
     listed = "; ".join(
         f"{name} {rms_length(values[:, :3]):.1f} N and {rms_length(values[:, 3:]):.1f} N m"
         for name, (_, values) in stages.items()
@@ -85,6 +85,7 @@ def _hz(trial: TrialFit, stage: str) -> float:
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
     """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated with its 95 % band."""
     ik, axis = trial.kinematics.ik, _time_axis(trial.kinematics)
+    unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
     stages = (
         ("inverse kinematics", ik.time[shown], ik.q[shown], {"dash": "dot", "width": 1.6}),
@@ -100,7 +101,7 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
             thin = _thin(len(time), most_frames)
             traces += _sides(one, name, time, scale * values, thin, line)
         unit = "degrees" if one.rotational else "m"
-        panels.append(Panel(f"{one.title} ({unit})", traces, _background(trial.kinematics, axis, one)))
+        panels.append(Panel(f"{one.title} ({unit})", traces, [*unused, *_lines(events, one)]))
     change = np.degrees(motion_change(trial)[:, skeleton.rotational])
     alt = (
         f"Coordinates of {trial.name} over time, inverse kinematics against estimate; the joint angles differ by "
@@ -128,6 +129,7 @@ def moment_figure(
     `truth` (w, c) N m: of a synthetic person, dashed.
     """
     axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
+    unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
     sd = None if trial.deviations is None else trial.deviations.moments / mass_kg
     middle = trial.joint_loads["estimate"] / mass_kg
     panels = []
@@ -144,7 +146,7 @@ def moment_figure(
                 {**curve, "name": "truth"} for curve in _sides(one, "truth", trial.time, truth / mass_kg, thin, dashed)
             ]
         title = f"{load_title(one, 'moment')} (N m/kg)" if one.rotational else f"{load_title(one, 'force')} (N/kg)"
-        panels.append(Panel(title, traces, _background(trial.kinematics, axis, one)))
+        panels.append(Panel(title, traces, [*unused, *_lines(events, one)]))
     peak = np.abs(trial.joint_loads["estimate"][:, 6:]).max() / mass_kg
     alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
     return small_multiples(panels, alt, axis)
@@ -231,17 +233,17 @@ def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]
     ]
 
 
-def _background(kinematics: Kinematics, axis: dict[str, Any], one: Coordinate) -> list[dict[str, Any]]:
-    return [*_unused(kinematics, axis), *_events(kinematics, [side for side in one.columns if side])]
-
-
-def _events(kinematics: Kinematics, sides: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Lines at the gait events of these sides; of both where there is none."""
+def _shown_events(kinematics: Kinematics) -> list[GaitEvent]:
+    """In the frames shown; none where there are too many."""
     first, last = _time_axis(kinematics)["range"]
     shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
-    if len(shown) > MOST_EVENTS:
-        return []
-    return [_vertical_line(event) for event in shown if not sides or event.side in sides]
+    return shown if len(shown) <= MOST_EVENTS else []
+
+
+def _lines(events: Sequence[GaitEvent], one: Coordinate | None = None) -> list[dict[str, Any]]:
+    """At the events of the sides that the coordinate is on; at all where it is on none."""
+    sides = [] if one is None else [side for side in one.columns if side]
+    return [_vertical_line(event) for event in events if not sides or event.side in sides]
 
 
 def _vertical_line(event: GaitEvent) -> dict[str, Any]:
