@@ -89,7 +89,8 @@ def compile_markers() -> None:
     from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
     from kinertia.estimation.simultaneous.marker_terms import add_markers
     from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-    from kinertia.estimation.simultaneous.normal_equations import NormalEquations
+    from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
+    from kinertia.estimation.simultaneous.seen_markers import seen_markers
     from kinertia.estimation.simultaneous.skin import SkinPatterns
     from kinertia.estimation.simultaneous.stretches import Stretch
     from kinertia.synthetic.walk import walking_subject
@@ -101,11 +102,7 @@ def compile_markers() -> None:
     frames, stretch = len(basis.first), Stretch.whole(basis)
     # the body's parameters stand before the unknowns of the markers
     columns = slice(10, 10 + 3 * markers)
-    add_markers(
-        NormalEquations.zero(stretch.size, coordinates, columns.stop),
-        columns,
-        basis,
-        stretch,
+    seen = seen_markers(
         skeleton,
         np.zeros((frames, markers, 3)),
         np.zeros((frames, coordinates)),
@@ -114,3 +111,5 @@ def compile_markers() -> None:
         np.arange(coordinates),
         np.arange(0),
     )
+    for kind in (Gradient, NormalEquations):
+        add_markers(kind.zero(stretch.size, coordinates, columns.stop), columns, basis, stretch, seen, 0)

@@ -35,7 +35,10 @@ SOURCES = (
     "estimation/simultaneous/plate_loads.py",
     "estimation/simultaneous/axis_columns.py",
     "estimation/simultaneous/normal_equations.py",
+    "estimation/simultaneous/elimination.py",
     "estimation/simultaneous/knot_interval.py",
+    "estimation/simultaneous/seen_markers.py",
+    "estimation/simultaneous/marker_gradient.py",
     "estimation/simultaneous/marker_terms.py",
 )
 """Files of the package with compiled functions: those call one another."""

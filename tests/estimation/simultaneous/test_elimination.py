@@ -5,9 +5,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+import kinertia.estimation.simultaneous.elimination as elimination
 import kinertia.estimation.simultaneous.stretches as limits
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
-from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
@@ -15,6 +15,7 @@ from kinertia.estimation.simultaneous.static_information import StaticInformatio
 from kinertia.estimation.simultaneous.stretches import stretches
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin
+from study_bound import dense_band
 
 DAMPING = 1e-3
 
@@ -66,33 +67,72 @@ def here(whole):
     return coefficients, static
 
 
+@pytest.fixture
+def double(monkeypatch):
+    """All in double precision."""
+    monkeypatch.setattr(elimination, "UNSAFE", 0.0)
+
+
 def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
-    expected, actual = whole.normal(0, *here), cut.trial_normal(0, *here)
-    close(actual.static, expected.static)
+    expected, actual = whole.normal(0, *here), cut.gradient(0, *here)
     close(actual.static_right, expected.static_right)
     close(actual.right, expected.right)
     assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
-    band, border = np.zeros_like(expected.band), np.zeros_like(expected.border)
+    static, band, border = (np.zeros_like(each) for each in (expected.static, expected.band, expected.border))
     for stretch in cut.stretches[0]:
         part = cut.normal(0, *here, stretch)
+        static += part.static
         band[stretch.touched] += part.band
         border[stretch.touched] += part.border
+    close(static, expected.static)
     close(band, expected.band)
     close(border, expected.border)
 
 
-@pytest.mark.parametrize("damping", [DAMPING, 0.0], ids=["damping known beforehand", "made anew"])
-def test_elimination_and_step_are_those_of_the_whole(whole, cut, here, damping):
-    expected = reduced(whole.trial_normal(0, *here), DAMPING)
-    actual = reduced(cut.trial_normal(0, *here, damping), DAMPING)
+def test_elimination_and_steps_are_those_of_the_whole(whole, cut, here, double):
+    expected, actual = (each.eliminated(0, *here, DAMPING) for each in (whole, cut))
+    close(actual.gradient.right, whole.normal(0, *here).right)
     close(actual.information, expected.information)
-    close(actual.right, expected.right)
-    step = np.random.default_rng(0).normal(0.0, 1e-3, len(here[1]))
-    close(actual.motion_step(step), expected.motion_step(step))
+    close(actual.static_diagonal, np.diag(whole.normal(0, *here).static))
+    rng = np.random.default_rng(0)
+    right, step = rng.normal(size=here[0].shape), rng.normal(0.0, 1e-3, len(here[1]))
+    (solved, lost), (in_one, lost_in_one) = actual.forward(right), expected.forward(right)
+    close(lost, lost_in_one)
+    close(actual.motion_step(solved, step), expected.motion_step(in_one, step))
 
 
-def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here):
-    expected, actual = (reduced(each.trial_normal(0, *here), 0.0) for each in (whole, cut))
+def test_elimination_is_that_of_the_dense_matrix(whole, here, double):
+    normal, eliminated = whole.normal(0, *here), whole.eliminated(0, *here)
+    n, s = normal.right.size, len(here[1])
+    band, border = dense_band(normal.band), normal.border.reshape(n, s)
+    close(eliminated.information, normal.static - border.T @ np.linalg.solve(band, border), 1e-7)
+    step = np.random.default_rng(0).normal(0.0, 1e-3, s)
+    solved, lost = eliminated.forward(normal.right)
+    close(lost, border.T @ np.linalg.solve(band, normal.right.ravel()), 1e-7)
+    expected = np.linalg.solve(band, normal.right.ravel() - border @ step)
+    close(eliminated.motion_step(solved, step).ravel(), expected, 1e-6)
+
+
+def test_single_precision_loses_nothing_that_counts(cut, here, monkeypatch):
+    """In units of each unknown's own information, and of how much of that with the motion known is left of it."""
+    monkeypatch.setattr(elimination, "UNSAFE", np.inf)
+    single = cut.eliminated(0, *here)
+    assert single.last.border.dtype == np.float32
+    monkeypatch.setattr(elimination, "UNSAFE", 0.0)
+    double = cut.eliminated(0, *here)
+    assert double.last.border.dtype == np.float64
+    # zeros and plates of this problem are shown by next to nothing else
+    scale = np.sqrt(1.0 + np.diag(double.information) + np.diag(cut.prior_terms(here[1])[0]))
+    left = (double.static_diagonal / scale**2).max()
+    off = (single.information - double.information) / np.outer(scale, scale)
+    assert np.abs(off).max() < 2e-6 * left
+    right = double.gradient.right
+    difference = (single.forward(right)[1] - double.forward(right)[1]) / scale
+    assert np.abs(difference).max() < 2e-6 * left * np.linalg.norm(double.forward(right)[1] / scale)
+
+
+def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here, double):
+    expected, actual = (each.eliminated(0, *here) for each in (whole, cut))
     information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
     root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
     sd = [curve_deviations(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, actual))]
@@ -109,6 +149,7 @@ def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
         whole.calibration,
         [whole.trials[0], replace(small_problem().trials[0], spacing_s=0.05)],
     )
+    monkeypatch.setattr(elimination, "UNSAFE", 0.0)
     expected = estimate_simultaneous(*given)
     monkeypatch.setattr(limits, "TOGETHER_BYTES", 1)
     actual = estimate_simultaneous(*given)

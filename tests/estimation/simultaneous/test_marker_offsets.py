@@ -30,10 +30,12 @@ def test_eliminated_is_what_the_whole_system_gives(terms):
     information, right, elsewhere, sd, own = terms
     whole, both, _ = together(information, right, elsewhere, sd, own)
     expected = np.linalg.solve(whole, both)
-    displaced = Displaced.of(information, right, PLACES, sd, own)
-    step = np.linalg.solve(displaced.information + elsewhere, displaced.right)
+    displaced = Displaced.of(information, PLACES, sd)
+    on_displacements = sd * right[PLACES] - own
+    step = np.linalg.solve(displaced.information + elsewhere, right - on_displacements @ displaced.gain)
     np.testing.assert_allclose(step, expected[:SIZE], rtol=1e-10)
-    np.testing.assert_allclose(displaced.step(step), expected[SIZE:], rtol=1e-10)
+    found = displaced.rest(on_displacements) - displaced.gain @ step
+    np.testing.assert_allclose(found, expected[SIZE:], rtol=1e-10)
     np.testing.assert_allclose(np.linalg.inv(displaced.information + elsewhere), np.linalg.inv(whole)[:SIZE, :SIZE])
 
 
@@ -46,7 +48,8 @@ def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(terms):
 
 
 def test_without_deviation_there_are_no_displacements(terms):
-    information, right, _, _, _ = terms
-    displaced = Displaced.of(information, right, PLACES, np.zeros(6), np.zeros(6))
+    information, *_ = terms
+    displaced = Displaced.of(information, PLACES, np.zeros(6))
     np.testing.assert_array_equal(displaced.information, information)
-    assert not displaced.step(np.ones(SIZE)).any()
+    assert not displaced.gain.any()
+    assert not displaced.rest(np.ones(6)).any()

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.problem import MapProblem, Point
+from kinertia.estimation.simultaneous.linearised import Point
+from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.log_cholesky import nearest_consistent
 from small_problem import curved_problem, point, residuals, small_problem
@@ -30,7 +31,7 @@ def here(problem):
 
 
 def cost(problem: MapProblem, coefficients: np.ndarray, static: np.ndarray) -> float:
-    return problem.at(Point((coefficients,), static, problem.beginning.displaced)).cost
+    return problem.slope(Point((coefficients,), static, problem.beginning.displaced)).cost
 
 
 def sloped(function, size: float) -> float:
@@ -116,27 +117,52 @@ def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
     np.testing.assert_allclose(-right, gradient, atol=1e-6 * np.abs(gradient).max())
 
 
+def test_a_gradient_alone_is_that_of_the_normal_equations(any_problem):
+    problem = any_problem
+    (coefficients,), static = point(problem)
+    expected, actual = problem.normal(0, coefficients, static), problem.gradient(0, coefficients, static)
+    assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
+    for ours, theirs in ((actual.right, expected.right), (actual.static_right, expected.static_right)):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
+
+
+def test_a_slope_is_the_derivative_of_the_cost_by_everything(problem):
+    """Displacements of two trials and the instruments' Gaussian among it."""
+    trial = problem.trials[0]
+    sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
+    trials = [replace(trial, displacement_sd_m=sd), replace(trial, displacement_sd_m=sd[::-1].copy())]
+    pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, trials)
+    coefficients, static = point(pair)
+    rng = np.random.default_rng(0)
+    here = Point(tuple(coefficients), static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2)))
+    gaussian = GaussianPrior.of(pair.instruments)
+    slope, at = pair.slope(here), pair.at(here)
+    assert at.slope.cost == pytest.approx(slope.cost, rel=1e-12)
+    np.testing.assert_allclose(at.slope.right, slope.right, atol=1e-9 * np.abs(slope.right).max())
+    right = slope.under(gaussian)[1]
+    sizes = 1.0 / np.maximum(np.abs(right), 1.0)
+    for _ in range(5):
+        step = rng.normal(size=len(right)) * sizes
+        found = sloped(lambda h, s=step: pair.slope(here.like(here.vector + h * s)).under(gaussian)[0], 1e-5)
+        assert -right @ step == pytest.approx(found, rel=1e-4, abs=1e-6 * np.abs(right * step).sum())
+
+
 def test_prior_information_is_the_derivative_of_its_gradient(problem):
     """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
     static = problem.start_static
-    here = problem.at(Point(problem.beginning.coefficients, static, problem.beginning.displaced))
-    instruments, places = GaussianPrior.of(problem.instruments), problem.layout.instruments
-
-    def under(static):
-        at = replace(here, point=replace(here.point, static=static))
-        information, right, value = problem.prior_terms(static)
-        linearised = replace(at, information=information, right=right, cost=value).under(instruments, places)
-        return linearised.information, linearised.right, linearised.cost
-
-    information, right, value = under(static)
-    np.testing.assert_allclose(right / np.sqrt(np.diag(information)), 0.0, atol=1e-6)
-    assert value == pytest.approx(0.0, abs=1e-12)
+    information, right, value = problem.prior_terms(static)
+    # without that of the instruments, about which this says nothing
+    places = problem.layout.instruments
+    information[places, places] += GaussianPrior.of(problem.instruments).precision
     scale = 1.0 / np.sqrt(np.diag(information))
+    np.testing.assert_allclose(right * scale, 0.0, atol=1e-6)
+    assert value == pytest.approx(0.0, abs=1e-12)
     h = 1e-5
+    information = problem.prior_terms(static)[0]
     for j in np.random.default_rng(0).choice(len(static), 30, replace=False):
         step = np.zeros_like(static)
         step[j] = h * scale[j]
-        slope = (under(static - step)[1] - under(static + step)[1]) / (2 * h)
+        slope = (problem.prior_terms(static - step)[1] - problem.prior_terms(static + step)[1]) / (2 * h)
         np.testing.assert_allclose(slope * scale, information[:, j] * scale[j] * scale, atol=1e-4)
 
 
@@ -198,9 +224,9 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
     np.testing.assert_array_equal(pair.in_trial(1, at), on_time)
     together = pair.at(at)
-    assert together.normals[1].cost == pytest.approx(problem.normal(0, coefficients, static).cost)
-    expected = sum(normal.cost for normal in together.normals) + problem.prior_terms(static)[2]
-    assert together.cost == pytest.approx(expected + 0.5 * np.square(own).sum())
+    assert together.trials[1].gradient.cost == pytest.approx(problem.normal(0, coefficients, static).cost)
+    expected = sum(trial.gradient.cost for trial in together.trials) + problem.prior_terms(static)[2]
+    assert together.slope.cost == pytest.approx(expected + 0.5 * np.square(own).sum())
 
 
 def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):
@@ -224,23 +250,21 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
     static[problem.layout.theta].reshape(-1, 10)[:, 7:] = 0.0
     rows = np.arange(problem.layout.theta.stop).reshape(-1, 10)[:, place]
 
-    def at(values):
-        return problem.at(Point((coefficients,), values, problem.beginning.displaced))
+    def right(values):
+        place = Point((coefficients,), values, problem.beginning.displaced)
+        return place.like(problem.slope(place).right).static
 
-    def right(linearised):
-        return linearised.right + linearised.normals[0].static_right
-
-    start = at(static)
-    bends = problem.bends(start)
+    informed = problem.prior_terms(static)[0] + problem.normal(0, coefficients, static).static
+    bends = problem.bends(right(static))
     assert (bends[rows] >= 0.0).all()
-    pulled = [row for row in rows if right(start)[row] < 0.0]
+    pulled = [row for row in rows if right(static)[row] < 0.0]
     assert pulled
     step = 1e-5
     for row in pulled:
         change = np.zeros_like(static)
         change[row] = step
-        second = -(right(at(static + change))[row] - right(at(static - change))[row]) / (2.0 * step)
-        left_out = second - start.information[row, row] - start.normals[0].static[row, row]
+        second = -(right(static + change)[row] - right(static - change)[row]) / (2.0 * step)
+        left_out = second - informed[row, row]
         assert bends[row] == pytest.approx(left_out, rel=1e-3)
-    others = [row for row in rows if right(start)[row] > 0.0]
+    others = [row for row in rows if right(static)[row] > 0.0]
     np.testing.assert_array_equal(bends[others], 0.0)

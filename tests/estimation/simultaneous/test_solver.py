@@ -224,10 +224,10 @@ def test_impossible_priors_still_give_a_possible_body(trial, prior, calibration)
 
 
 def test_an_unfinished_run_says_so_and_keeps_the_best_iterate(trial, prior, calibration, monkeypatch):
-    monkeypatch.setattr(simultaneous, "_MAX_ITERATIONS", 1)
-    result = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)])
+    monkeypatch.setattr(simultaneous, "_MAX_ITERATIONS", 2)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial, noise_m=0.003)])
     assert not result.converged
-    assert result.iterations == 1
+    assert result.iterations == 2
     assert result.cost[1] < result.cost[0]
 
 

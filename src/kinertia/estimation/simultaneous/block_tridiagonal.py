@@ -8,9 +8,10 @@ that do not move. Work and memory grow linearly with the number of blocks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dtrsm
+from scipy.linalg.blas import dgemm, dsyrk, dtrsm, sgemm, strsm
 from scipy.linalg.lapack import dpotrf
 
 
@@ -28,33 +29,41 @@ class BlockBand:
     below: np.ndarray
 
     @classmethod
-    def factor(cls, diagonal: np.ndarray, below: np.ndarray) -> BlockBand:
+    def factor(cls, diagonal: np.ndarray, below: np.ndarray, in_place: bool = False) -> BlockBand:
         """Factor the matrix with these diagonal (b, k, k) and sub-diagonal (b - 1, k, k) blocks, or (b, k, k) where it
-        goes on.
+        goes on; in their place, if they may be written to.
 
         Raises:
             numpy.linalg.LinAlgError: it is not positive definite.
         """
-        factors, carried = np.empty_like(diagonal), np.empty_like(below)
-        for i in range(len(diagonal)):
-            left = diagonal[i] - carried[i - 1] @ carried[i - 1].T if i else diagonal[i]
-            factors[i] = _cholesky(left)
-            if i < len(below):
-                carried[i] = _times_inverse_transpose(factors[i], below[i])
+        factors, carried = (diagonal, below) if in_place else (diagonal.copy(), below.copy())
+        for i, factor in enumerate(factors):
+            if i:
+                dsyrk(-1.0, carried[i - 1].T, beta=1.0, c=factor.T, trans=1, overwrite_c=1)
+            _, failed = dpotrf(factor.T, clean=1, overwrite_a=1)
+            if failed:
+                raise np.linalg.LinAlgError("the matrix is not positive definite")
+            if i < len(carried):
+                dtrsm(1.0, factor.T, carried[i].T, trans_a=1, overwrite_b=1)
         return cls(factors, carried)
 
-    def forward(self, right: np.ndarray) -> np.ndarray:
-        """Solve L x = right; right is (b, k, m)."""
-        result = right.copy()
+    @cached_property
+    def single(self) -> BlockBand:
+        """In single precision."""
+        return BlockBand(self.diagonal.astype(np.float32), self.below.astype(np.float32))
+
+    def forward(self, right: np.ndarray, in_place: bool = False) -> np.ndarray:
+        """Solve L x = right; right is (b, k, m), of the factor's precision, and may be written to."""
+        result = right if in_place else right.copy()
         for i in range(len(result)):
             if i:
                 _subtract_product(result[i], self.below[i - 1], result[i - 1])
             _solve_in_place(self.diagonal[i], result[i])
         return result
 
-    def backward(self, right: np.ndarray, after: np.ndarray | None = None) -> np.ndarray:
+    def backward(self, right: np.ndarray, after: np.ndarray | None = None, in_place: bool = False) -> np.ndarray:
         """Solve L^T x = right; right is (b, k, m), and `after` (k, m) the solution's next block where it goes on."""
-        result, known = right.copy(), after
+        result, known = right if in_place else right.copy(), after
         for i in range(len(result) - 1, -1, -1):
             if known is not None:
                 _subtract_product(result[i], self.below[i].T, known)
@@ -83,25 +92,13 @@ class BlockBand:
 # BLAS and LAPACK take matrices column by column: a row-wise matrix is its own transpose there, and is not copied
 
 
-def _cholesky(matrix: np.ndarray) -> np.ndarray:
-    factor, failed = dpotrf(matrix.T, lower=0, clean=1)
-    if failed:
-        raise np.linalg.LinAlgError("the matrix is not positive definite")
-    result: np.ndarray = factor.T
-    return result
-
-
 def _solve_in_place(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
     """L^-1 right, or L^-T right, in the place of `right`, whose rows must lie one after the other."""
-    dtrsm(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed), overwrite_b=1)
+    solve = strsm if right.dtype == np.float32 else dtrsm
+    solve(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed), overwrite_b=1)
 
 
 def _subtract_product(target: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
     """Take left @ right off the target, in its place; its rows must lie one after the other."""
-    dgemm(-1.0, right.T, left.T, beta=1.0, c=target.T, overwrite_c=1)
-
-
-def _times_inverse_transpose(lower: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """left L^-T."""
-    result: np.ndarray = dtrsm(1.0, lower.T, left.T, side=0, lower=0, trans_a=1).T
-    return result
+    product = sgemm if target.dtype == np.float32 else dgemm
+    product(-1.0, right.T, left.T, beta=1.0, c=target.T, overwrite_c=1)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from kinertia.estimation.simultaneous.elimination import Factored, Reduced
+from kinertia.estimation.simultaneous.elimination import Eliminated, Factored
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
@@ -57,7 +57,7 @@ def curve_deviations(
     k: int,
     coefficients: np.ndarray,
     static: np.ndarray,
-    eliminated: Reduced,
+    eliminated: Eliminated,
     root: np.ndarray,
 ) -> CurveDeviations:
     """Posterior deviations of the curves of trial k.
@@ -151,12 +151,14 @@ class _MotionSpread:
     @classmethod
     def of(cls, part: Factored, c: int, root: np.ndarray, after: _MotionSpread | None) -> _MotionSpread:
         """Of a stretch, with this root (S, S) of the static unknowns' covariance; `after` is the next stretch's."""
-        start, size = part.stretch.splines.start, len(root)
+        start, size, precision = part.stretch.splines.start, len(root), part.border.dtype
+        band = part.band.single if precision == np.float32 else part.band
+        blocks = part.border @ root.astype(precision)
         if after is None:
-            carried = part.band.backward(part.border @ root)
+            carried = band.backward(blocks, in_place=True)
             return cls(start, *part.band.inverse_blocks(), carried.reshape(-1, c, size))
         block, first = after.diagonal[:1], after.carried[:SPLINES_PER_BLOCK]
-        carried = part.band.backward(part.border @ root, first.reshape(-1, size)).reshape(-1, c, size)
+        carried = band.backward(blocks, first.reshape(-1, size), in_place=True).reshape(-1, c, size)
         diagonal, below = part.band.inverse_blocks(block[0])
         return cls(start, np.append(diagonal, block, axis=0), below, np.append(carried, first, axis=0))
 
@@ -164,27 +166,32 @@ class _MotionSpread:
         """Write the variances of some frames into rows of `into`; `root` (n, n) is of the static unknowns that root
         equations depend on.
         """
-        by, c = seen.by, self.carried.shape[1]
+        by, c, precision = seen.by, self.carried.shape[1], self.carried.dtype
         still = by.static @ root
         into.ground_forces[rows] = np.square(by.ground @ root).sum(axis=-1).reshape(-1, 2, 3)
         moved = np.empty((3, *still.shape[:2]))  # variances of moments and speeds, and covariance, of these frames
+        orders = np.concatenate([by.q, by.qd, by.qdd], axis=2).astype(precision)
+        values, shaken = seen.values.astype(precision), seen.shaken.astype(precision)
+        still = still.astype(precision)
         for spline in np.unique(seen.first):
             own = np.flatnonzero(seen.first == spline)
             covariance, carried = self._active(int(spline) - self.start)
-            shaken, by_errors = seen.shaken[own], seen.shaken[own] @ covariance
+            by_errors = shaken[own] @ covariance.astype(precision)
             # how the static unknowns carry places, rates and accelerations along, and these the moments
-            q, qd, qdd = (-np.tensordot(value, carried.reshape(6, c, -1), (1, 0)) for value in seen.values[:, own])
-            moment = by.q[own] @ q + by.qd[own] @ qd + by.qdd[own] @ qdd
-            moment[..., : len(root)] += still[own]
+            along = values[:, own].transpose(1, 0, 2).reshape(-1, 6) @ carried.reshape(6, -1)
+            along = along.reshape(len(own), 3 * c, -1)
+            moment = orders[own] @ along
+            moment[..., : len(root)] -= still[own]
+            q, qd = along[:, :c], along[:, c : 2 * c]
             each = np.arange(c)
             blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of every coordinate alone
             place, rate = (share * value for share, value in zip(seen.shares[:2], seen.values[:2, own], strict=True))
             alone = [((one @ blocks) * one).sum(axis=-1).T for one in (place, rate)]
             together = by_errors.reshape(len(own), c, 6, c)[:, each, :, each].transpose(1, 0, 2)
-            into.coordinates[rows][own] = alone[0] + np.square(q).sum(axis=-1)
-            moved[0, own] = (by_errors * shaken).sum(axis=-1) + np.square(moment).sum(axis=-1)
-            moved[1, own] = alone[1] + np.square(qd).sum(axis=-1)
-            moved[2, own] = (together * rate[:, None]).sum(axis=-1) + (moment * qd).sum(axis=-1)
+            into.coordinates[rows][own] = alone[0] + np.einsum("ncs,ncs->nc", q, q)
+            moved[0, own] = np.einsum("ncs,ncs->nc", by_errors, shaken[own]) + np.einsum("ncs,ncs->nc", moment, moment)
+            moved[1, own] = alone[1] + np.einsum("ncs,ncs->nc", qd, qd)
+            moved[2, own] = (together * rate[:, None]).sum(axis=-1) + np.einsum("ncs,ncs->nc", moment, qd)
         into.moments[rows] = moved[0]
         speed, value = seen.speed, by.value
         into.powers[rows] = speed**2 * moved[0] + value**2 * moved[1] + 2.0 * speed * value * moved[2]

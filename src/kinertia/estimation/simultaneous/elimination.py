@@ -1,24 +1,32 @@
 """The motion of a trial eliminated from its normal equations, stretch by stretch.
 
-Forwards, each stretch is made, summed and eliminated, and all that stays of it is what it says of the static unknowns
-and of the block after it. Backwards, where a step of the motion or its covariance is asked for, the last stretch is
-still there; those before it are made anew, each from what the stretch before has left to it. A trial of one stretch
-keeps everything and computes nothing twice.
+Each stretch is made, summed and eliminated in turn, and leaves to the next what it says of its first block. What is
+needed of it again, to answer gradients with steps and for the covariance of the motion, is kept: in memory of the last
+stretch, in a temporary file of those before it.
+
+The border, which is most of the work, is in single precision. Gradients and the motion's own factor are in double, so
+that the optimum does not move; the information on what does not move loses nothing either, as long as eliminating the
+motion leaves a fair share of it: `UNSAFE`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
-from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
+from kinertia.estimation.simultaneous.kept_arrays import KeptArrays
+from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Gradient, NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
+from kinertia.model.compiled import compiled
 
-_Lost: TypeAlias = tuple[np.ndarray, np.ndarray]
+UNSAFE = 1e4
+"""Information on a static unknown with the motion known, over that with it unknown, from which on the border is in
+double precision. In measured trials it is at most 500."""
+_ROWS_AT_ONCE = 2000
+"""Sums in single precision are no longer."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +35,11 @@ class Carried:
 
     Attributes:
         diagonal: (k, k) to be added to the block.
-        right: (k, S + 1) to its border and right-hand side.
+        border: (k, S) to its border.
     """
 
     diagonal: np.ndarray
-    right: np.ndarray
+    border: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -41,169 +49,189 @@ class Factored:
     Attributes:
         stretch: of the trial.
         band: factor L of the motion's own normal matrix, those before it eliminated.
-        border: (b, k, S) L^-1 times the border.
-        motion: (b, k, 1) L^-1 times the motion's right-hand side.
+        border: (b, k, S) L^-1 times the border, in single or double precision.
         left: to the block after the stretch; None after the last.
     """
 
     stretch: Stretch
     band: BlockBand
     border: np.ndarray
-    motion: np.ndarray
     left: Carried | None
 
     @property
-    def lost(self) -> _Lost:
-        """What it takes of the information on the static unknowns (S, S), and of its right-hand side (S,)."""
-        flat = self.border.reshape(-1, self.border.shape[2])
-        return flat.T @ flat, flat.T @ self.motion.ravel()
+    def lost(self) -> np.ndarray:
+        """(S, S) what it takes of the information on the static unknowns."""
+        blocks, wide, s = self.border.shape
+        flat = self.border.reshape(blocks * wide, s)
+        result = np.zeros((s, s))
+        for start in range(0, len(flat), _ROWS_AT_ONCE):
+            rows = flat[start : start + _ROWS_AT_ONCE]
+            result += rows.T @ rows
+        return result
 
 
 @dataclass(frozen=True)
-class TrialNormal:
-    """Normal equations of a whole trial.
+class Eliminated:
+    """A trial with its motion eliminated.
 
     Attributes:
-        static, static_right, right, cost: as `NormalEquations` has them, of all stretches together.
+        gradient: of the whole trial, before.
+        static_diagonal: (S,) diagonal of the information on the static unknowns with the motion known.
+        information: (S, S) on them with the motion unknown (Schur complement).
         stretches: in time.
-        of: makes the normal equations of a stretch.
-        last: those of the last one.
-        damping: share by which the motion's diagonal is raised in what follows.
-        carried: per stretch what those before it leave to its first block; None for the first.
-        lost: as `Factored` has it, of all stretches before the last.
+        before: what is kept of all stretches but the last.
+        last: the last one.
     """
 
-    static: np.ndarray
-    static_right: np.ndarray
-    right: np.ndarray
-    cost: float
-    stretches: tuple[Stretch, ...]
-    of: Callable[[Stretch], NormalEquations]
-    last: NormalEquations
-    damping: float
-    carried: tuple[Carried | None, ...]
-    lost: _Lost
-
-
-@dataclass(frozen=True)
-class Reduced:
-    """Normal equations of a trial with the motion eliminated.
-
-    Attributes:
-        information: (S, S) on the static unknowns (Schur complement).
-        right: (S,) its right-hand side.
-        normal: at the damping that was asked for.
-        last: its last stretch.
-    """
-
+    gradient: Gradient
+    static_diagonal: np.ndarray
     information: np.ndarray
-    right: np.ndarray
-    normal: TrialNormal
+    stretches: tuple[Stretch, ...]
+    before: KeptArrays
     last: Factored
+
+    @classmethod
+    def of(cls, stretches: Sequence[Stretch], of: Callable[[Stretch], NormalEquations], damping: float) -> Eliminated:
+        """Eliminate the motion.
+
+        Args:
+            stretches: of the trial.
+            of: makes the normal equations of one.
+            damping: share by which the motion's diagonal is raised.
+        """
+        result = cls._of(stretches, of, damping, np.float32)
+        if (result.static_diagonal > UNSAFE * np.diag(result.information)).any():
+            return cls._of(stretches, of, damping, np.float64)
+        return result
+
+    @classmethod
+    def _of(
+        cls,
+        stretches: Sequence[Stretch],
+        of: Callable[[Stretch], NormalEquations],
+        damping: float,
+        precision: type[np.floating],
+    ) -> Eliminated:
+        normal = of(stretches[0])
+        whole = Gradient.zero(stretches[-1].splines.stop, normal.right.shape[1], len(normal.static_right))
+        static, lost, kept, carried = np.zeros_like(normal.static), np.zeros_like(normal.static), KeptArrays(), None
+        for k, stretch in enumerate(stretches):
+            normal = of(stretch) if k else normal
+            whole.add(normal, stretch.touched)
+            static += normal.static
+            part = factored(normal, stretch, damping, carried, precision)
+            lost += part.lost
+            carried = part.left
+            if not stretch.is_last:
+                kept.add(part.band.diagonal, part.band.below, part.border)
+        return cls(whole, np.diag(static), static - lost, tuple(stretches), kept, part)
+
+    def forwards(self) -> Iterator[Factored]:
+        """The stretches from the first to the last; what they left to one another is gone."""
+        for k, stretch in enumerate(self.stretches[:-1]):
+            yield self._kept(k, stretch)
+        yield self.last
 
     def backwards(self) -> Iterator[Factored]:
         """The stretches from the last to the first."""
         yield self.last
-        normal = self.normal
-        for stretch, carried in zip(normal.stretches[-2::-1], normal.carried[-2::-1], strict=True):
-            yield factored(normal.of(stretch), stretch, normal.damping, carried)
+        for k in range(len(self.stretches) - 2, -1, -1):
+            yield self._kept(k, self.stretches[k])
 
-    def motion_step(self, step: np.ndarray) -> np.ndarray:
-        """(size, c) step of the coefficients that goes with a step (S,) of the static unknowns."""
-        result, after = np.empty_like(self.normal.right), None
-        for part in self.backwards():
-            stretch_step = part.band.backward(part.motion - part.border @ step[:, None], after)
+    def _kept(self, k: int, stretch: Stretch) -> Factored:
+        diagonal, below, border = self.before.get(k)
+        return Factored(stretch, BlockBand(diagonal, below), border, None)
+
+    def forward(self, right: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+        """L^-1 times a right-hand side (size, c) of the motion, per stretch (b, k, 1), and what it takes of the
+        right-hand side of the static unknowns (S,).
+        """
+        solved, lost = [], np.zeros(len(self.information))
+        carried: np.ndarray | float = 0.0
+        for part in self.forwards():
+            blocks, wide = part.band.diagonal.shape[:2]
+            flat = np.zeros((blocks * wide, 1))
+            own = right[part.stretch.splines].ravel()
+            flat[: len(own), 0] = own
+            flat[:wide] += carried
+            motion = part.band.forward(flat.reshape(blocks, wide, 1))
+            if not part.stretch.is_last:
+                carried = -part.band.below[-1] @ motion[-1]
+            rows = part.border.reshape(blocks * wide, len(lost))
+            lost += motion.ravel().astype(rows.dtype) @ rows
+            solved.append(motion)
+        return solved, lost
+
+    def motion_step(self, solved: Sequence[np.ndarray], static: np.ndarray) -> np.ndarray:
+        """(size, c) step of the motion for a step (S,) of the static unknowns; `solved` is what `forward` gives."""
+        result, after = np.empty_like(self.gradient.right), None
+        for part, motion in zip(self.backwards(), reversed(solved), strict=True):
+            rows = part.border @ static.astype(part.border.dtype)
+            step = part.band.backward(motion - rows[..., None], after)
             own = result[part.stretch.splines]
-            own[:] = stretch_step.reshape(-1, own.shape[1])[: len(own)]
-            after = stretch_step[0]
+            own[:] = step.reshape(-1, own.shape[1])[: len(own)]
+            after = step[0]
         return result
 
 
-def summed(stretches: Sequence[Stretch], of: Callable[[Stretch], NormalEquations], damping: float) -> TrialNormal:
-    """Normal equations of a trial, all stretches but the last eliminated.
-
-    Args:
-        stretches: of the trial.
-        of: makes the normal equations of one.
-        damping: share by which the motion's diagonal is to be raised; trials of one stretch do not need to know.
-    """
-    normal = of(stretches[0])
-    c, s = normal.border.shape[1:]
-    static, static_right, right, cost = np.zeros((s, s)), np.zeros(s), np.zeros((stretches[-1].splines.stop, c)), 0.0
-    lost: _Lost = (np.zeros((s, s)), np.zeros(s))
-    carried: tuple[Carried | None, ...] = (None,)
-    for k, stretch in enumerate(stretches):
-        normal = of(stretch) if k else normal
-        static += normal.static
-        static_right += normal.static_right
-        right[stretch.touched] += normal.right
-        cost += normal.cost
-        if not stretch.is_last:
-            part = factored(normal, stretch, damping, carried[-1])
-            lost, carried = _both(lost, part.lost), (*carried, part.left)
-    return TrialNormal(static, static_right, right, cost, tuple(stretches), of, normal, damping, carried, lost)
-
-
-def reduced(normal: TrialNormal, damping: float) -> Reduced:
-    """Eliminate the motion, with its diagonal raised by this share; what is known for another one is made anew."""
-    if damping != normal.damping and len(normal.stretches) > 1:
-        normal = summed(normal.stretches, normal.of, damping)
-    last = factored(normal.last, normal.stretches[-1], damping, normal.carried[-1])
-    information, right = _both(normal.lost, last.lost)
-    return Reduced(normal.static - information, normal.static_right - right, normal, last)
-
-
-def _both(lost: _Lost, more: _Lost) -> _Lost:
-    return lost[0] + more[0], lost[1] + more[1]
-
-
-def factored(normal: NormalEquations, stretch: Stretch, damping: float, carried: Carried | None) -> Factored:
+def factored(
+    normal: NormalEquations,
+    stretch: Stretch,
+    damping: float,
+    carried: Carried | None,
+    precision: type[np.floating] = np.float64,
+) -> Factored:
     """Eliminate the splines of a stretch, with their diagonal raised by this share.
 
     Args:
         normal: its normal equations.
         carried: what the stretches before it leave to its first block.
+        precision: of the border.
     """
     size, c, s = normal.border.shape
     # one block more than just fits, so that six active splines always lie in two
     count = size // SPLINES_PER_BLOCK + (1 if stretch.is_last else 0)
     diagonal, below = _blocks(normal.band, count, damping)
-    right = np.zeros((count * SPLINES_PER_BLOCK, c, s + 1))
-    right[:size, :, :s], right[:size, :, s] = normal.border, normal.right
-    right = right.reshape(count, -1, s + 1)
+    border = np.empty((count * SPLINES_PER_BLOCK, c, s), precision)
+    border[:size], border[size:] = normal.border, 0.0
+    border = border.reshape(count, SPLINES_PER_BLOCK * c, s)
     if carried is not None:
         diagonal[0] += carried.diagonal
-        right[0] += carried.right
+        border[0] += carried.border
     own = count if stretch.is_last else count - 1
-    band = BlockBand.factor(diagonal[:own], below)
-    solved = band.forward(right[:own])
-    left = None
+    band = BlockBand.factor(diagonal[:own], below, in_place=True)
+    same = band.single if precision == np.float32 else band
+    solved, left = border[:own], None
+    if s:
+        same.forward(solved, in_place=True)
     if own < count:
         reach = band.below[-1]
-        left = Carried(diagonal[own] - reach @ reach.T, right[own] - reach @ solved[-1])
-    return Factored(stretch, band, solved[..., :s], solved[..., s:], left)
+        left = Carried(diagonal[own] - reach @ reach.T, border[own] - same.below[-1] @ solved[-1])
+    return Factored(stretch, band, solved, left)
 
 
+@compiled
 def _blocks(band: np.ndarray, count: int, damping: float) -> tuple[np.ndarray, np.ndarray]:
     """Diagonal blocks (b, k, k), k = c SPLINES_PER_BLOCK, and those below (b - 1, k, k); ones where the band ends."""
     size, wide, c, _ = band.shape
     each = SPLINES_PER_BLOCK
-    padded = np.zeros((each * count + each, wide, c, c))
-    padded[:size] = band
-    diagonal, below = np.zeros((count, each, c, each, c)), np.zeros((count, each, c, each, c))
-    for i in range(each):
-        rows = padded[i : each * count : each]
-        for offset in range(wide):
+    diagonal, below = np.zeros((count, each * c, each * c)), np.zeros((count - 1, each * c, each * c))
+    for spline in range(size):
+        block, i = spline // each, spline % each
+        for offset in range(min(wide, size - spline)):
             j = i + offset
-            if j < each:
-                diagonal[:, i, :, j, :] += rows[:, offset]
-                if offset:
-                    diagonal[:, j, :, i, :] += rows[:, offset].transpose(0, 2, 1)
-            else:
-                below[:, j - each, :, i, :] = rows[:, offset].transpose(0, 2, 1)
-    k = each * c
-    inside = np.arange(count * k) < size * c
-    entries = np.einsum("bii->bi", diagonal.reshape(count, k, k))
-    entries *= 1.0 + damping
-    entries += np.where(inside, 0.0, 1.0).reshape(count, -1)
-    return diagonal.reshape(count, k, k), below.reshape(count, k, k)[:-1]
+            for row in range(c):
+                for column in range(c):
+                    value = band[spline, offset, row, column]
+                    if j >= each:
+                        below[block, (j - each) * c + column, i * c + row] = value
+                    else:
+                        diagonal[block, i * c + row, j * c + column] = value
+                        diagonal[block, j * c + column, i * c + row] = value
+        for row in range(c):
+            diagonal[block, i * c + row, i * c + row] *= 1.0 + damping
+    for spline in range(size, count * each):
+        for row in range(c):
+            place = spline % each * c + row
+            diagonal[spline // each, place, place] = 1.0
+    return diagonal, below

@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.elimination import reduced
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -42,8 +41,8 @@ class Information:
     def of_trials(self) -> tuple[np.ndarray, ...]:
         """Per trial (S, S) information on the static unknowns, motion eliminated."""
         problem = self.problem
-        normals = (problem.trial_normal(k, start, problem.start_static) for k, start in enumerate(problem.start))
-        return tuple(reduced(normal, 0.0).information for normal in normals)
+        trials = (problem.eliminated(k, start, problem.start_static) for k, start in enumerate(problem.start))
+        return tuple(trial.information for trial in trials)
 
     @cached_property
     def of_prior(self) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK
-from kinertia.model.compiled import part
+from kinertia.model.compiled import inlined, part
 
 _TOGETHER = SPLINES_PER_BLOCK + 1
 
@@ -48,11 +48,14 @@ def to_splines(
     start: int,
     end: int,
     interval: Interval,
+    reach: np.ndarray,
     band: np.ndarray,
     border: np.ndarray,
     right: np.ndarray,
 ) -> None:
-    """Weigh the terms of an interval with the splines that are active, two by two."""
+    """Weigh the terms of an interval with the splines that are active, two by two; `reach` (c, r, 2) are the runs of
+    columns of S that each coordinate meets. What is across the frames after the interval is left for the next.
+    """
     n, size, c, at, most = len(first), len(band), right.shape[1], first[start], len(interval.gradient)
     own = np.zeros((1 + LATER, most, _TOGETHER))
     for k in range(start, end):
@@ -72,11 +75,35 @@ def to_splines(
                         block[row, column] += products[pair, row * c + column]
             pair += 1
     for j in range(c):
-        for i in range(6):
-            for k in range(end - start):
-                weight = own[0, k, i]
-                for s in range(border.shape[2]):
-                    border[at + i, j, s] += weight * interval.across[k, j, s]
+        for run in range(reach.shape[1]):
+            begin, stop = reach[j, run, 0], reach[j, run, 1]
+            if begin < stop:
+                for i in range(6):
+                    _weigh(own[0, :, i], end - start, interval.across[:, j, begin:stop], border[at + i, j, begin:stop])
+                _pass_on(end - start, interval.across[:, j, begin:stop])
+
+
+@inlined
+def _weigh(weights: np.ndarray, count: int, across: np.ndarray, border: np.ndarray) -> None:
+    """Add the weighted terms (f, s) of so many frames, four at once."""
+    k = 0
+    while k + 4 <= count:
+        w0, w1, w2, w3 = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
+        for s in range(len(border)):
+            border[s] += w0 * across[k, s] + w1 * across[k + 1, s] + w2 * across[k + 2, s] + w3 * across[k + 3, s]
+        k += 4
+    while k < count:
+        for s in range(len(border)):
+            border[s] += weights[k] * across[k, s]
+        k += 1
+
+
+@inlined
+def _pass_on(count: int, across: np.ndarray) -> None:
+    """Leave the terms of the frames after an interval of so many frames to the next interval, zeros behind them."""
+    for row in range(min(count + LATER, len(across))):
+        for s in range(across.shape[1]):
+            across[row, s] = across[count + row, s] if row < LATER else 0.0
 
 
 @part

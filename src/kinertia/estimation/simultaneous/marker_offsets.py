@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cholesky, solve_triangular
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,38 +23,38 @@ class Displaced:
 
     Attributes:
         information: (S, S).
-        right: (S,) its right-hand side.
-        gain: (k, S) how far the displacements follow a step of the static unknowns, ...
-        rest: (k,) ... and how far they step if those stay; in prior deviations.
+        gain: (k, S) how far the displacements follow when the static unknowns step back.
+        factor: (k, k) lower Cholesky factor of the information on the displacements; None where none may be displaced.
     """
 
     information: np.ndarray
-    right: np.ndarray
     gain: np.ndarray
-    rest: np.ndarray
+    factor: np.ndarray | None
 
     @classmethod
-    def of(
-        cls, information: np.ndarray, right: np.ndarray, places: slice, sd_m: np.ndarray, own: np.ndarray
-    ) -> Displaced:
+    def of(cls, information: np.ndarray, places: slice, sd_m: np.ndarray) -> Displaced:
         """Eliminate displacements.
 
         Args:
-            information, right: of the trial on the static unknowns as they are in the trial.
+            information: of the trial on the static unknowns as they are in the trial.
             places: of the marker positions among them.
             sd_m: (k,) prior deviations of the displacements.
-            own: (k,) where the displacements are, in prior deviations.
         """
         if not sd_m.any():
-            return cls(information, right, np.zeros((len(sd_m), len(right))), np.zeros(len(sd_m)))
+            return cls(information, np.zeros((len(sd_m), len(information))), None)
         border = information[places] * sd_m[:, None]
-        inner = cho_factor(border[:, places] * sd_m + np.eye(len(sd_m)))
-        gain, rest = cho_solve(inner, border), cho_solve(inner, sd_m * right[places] - own)
-        return cls(information - border.T @ gain, right - border.T @ rest, -gain, rest)
+        factor = cholesky(border[:, places] * sd_m + np.eye(len(sd_m)), lower=True)
+        half = solve_triangular(factor, border, lower=True)
+        return cls(information - half.T @ half, solve_triangular(factor, half, lower=True, trans="T"), factor)
 
-    def step(self, step: np.ndarray) -> np.ndarray:
-        """(k,) step of the displacements that goes with a step (S,) of the static unknowns."""
-        result: np.ndarray = self.rest + self.gain @ step
+    def rest(self, right: np.ndarray) -> np.ndarray:
+        """(k,) step of the displacements for this right-hand side (k,), while the static unknowns stay; they get
+        `-right @ gain` of it.
+        """
+        if self.factor is None:
+            return np.zeros_like(right)
+        half = solve_triangular(self.factor, right, lower=True)
+        result: np.ndarray = solve_triangular(self.factor, half, lower=True, trans="T")
         return result
 
 
@@ -62,4 +62,4 @@ def as_displaced(information: np.ndarray, places: slice, sd_m: np.ndarray) -> np
     """(S, S) what information on the static unknowns says of the same with the places displaced by unknown amounts: of
     a trial about the person, or of everything else about a trial. The arguments are those of `Displaced.of`.
     """
-    return Displaced.of(information, np.zeros(len(information)), places, sd_m, np.zeros_like(sd_m)).information
+    return Displaced.of(information, places, sd_m).information

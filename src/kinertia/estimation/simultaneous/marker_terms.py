@@ -13,59 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
-from kinertia.estimation.simultaneous.marker_errors import LATER, ErrorInformation, ErrorProcess
+from kinertia.estimation.simultaneous.marker_errors import LATER
+from kinertia.estimation.simultaneous.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import NormalEquations
-from kinertia.estimation.simultaneous.skin import SkinPatterns
+from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
+from kinertia.estimation.simultaneous.seen_markers import PlacedMarkers, SeenMarkers, place_markers
 from kinertia.estimation.simultaneous.stretches import Stretch
-from kinertia.model.compiled import compiled, part
-from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
-from kinertia.model.skeleton import Skeleton
+from kinertia.model.compiled import compiled, inlined, part
+from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner
-from kinertia.motion.marker_sums import add_force, add_marker, met_force, place_marker, swapped
-
-
-class _Markers(NamedTuple):
-    """Markers of a trial and the axes that move them.
-
-    Attributes:
-        tree: the skeleton.
-        column: (a,) place of each axis' coordinate among those that move, then those that do not.
-        at, slopes: (n, a) places of the axes, rad or m, and their derivatives by the coordinates.
-        carrier: (m,) the axis that carries each marker.
-        local: (n, m, 3) m, the markers in the frames of these axes, displaced with the skin.
-        turned: (m, 3, 3) the segments' axes in these frames.
-        measured: (n, m, 3) m; NaN where not seen.
-        own, next, second: as `ErrorInformation` has them.
-        patterns, first, last: as `SkinPatterns` has them.
-        columns: (m,) where the coefficients of each marker begin among the columns of S.
-    """
-
-    tree: KinematicTree
-    column: np.ndarray
-    at: np.ndarray
-    slopes: np.ndarray
-    carrier: np.ndarray
-    local: np.ndarray
-    turned: np.ndarray
-    measured: np.ndarray
-    own: np.ndarray
-    next: np.ndarray
-    second: np.ndarray
-    patterns: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
-    columns: np.ndarray
-
-
-class _Placed(NamedTuple):
-    """Five neighbouring frames, in turn: axes (5, a, 6), and of the markers the places (5, m, 3) m, the errors
-    (5, m, 3) m (zero where not seen) and the axes of their segments (5, m, 3, 3)."""
-
-    axes: np.ndarray
-    places: np.ndarray
-    errors: np.ndarray
-    turned: np.ndarray
+from kinertia.motion.marker_sums import add_force, add_marker, met_force, swapped
 
 
 class _Static(NamedTuple):
@@ -77,68 +34,32 @@ class _Static(NamedTuple):
 
 
 def add_markers(
-    normal: NormalEquations,
-    columns: slice,
-    basis: MotionBasis,
-    stretch: Stretch,
-    skeleton: Skeleton,
-    measured: np.ndarray,
-    q: np.ndarray,
-    deviation: tuple[np.ndarray, ErrorProcess],
-    skin: tuple[SkinPatterns, np.ndarray],
-    moving: np.ndarray,
-    still: np.ndarray,
+    into: Gradient, columns: slice, basis: MotionBasis, stretch: Stretch, markers: SeenMarkers, still: int
 ) -> None:
-    """Add the terms of the markers in one stretch of a trial, at the coordinates q, to its normal equations.
+    """Add the terms of the markers in one stretch of a trial.
 
     Args:
-        normal: zero, or with other terms.
+        into: zero, or with other terms.
         columns: of the static unknowns, those that markers depend on.
         basis: of the motion.
         stretch: of the trial.
-        skeleton: with static coordinates free.
-        measured: (n, m, 3) m, in the stretch with its neighbours; NaN where not seen.
-        q: (n, c) rad and m, in the same frames.
-        deviation: (m,) of each marker's errors, m, and how they go from frame to frame.
-        skin: its patterns in the same frames, and the coefficients (k,).
-        moving, still: columns of q that move in time, and that do not.
+        markers: in the stretch with its neighbours.
+        still: how many coordinates do not move in time.
     """
-    information = ErrorInformation.of(np.isfinite(measured).all(axis=-1), *deviation)
-    place = np.empty(q.shape[1], dtype=np.int64)
-    place[np.concatenate([moving, still])] = np.arange(q.shape[1])
-    at, slopes = skeleton.map.places_and_slopes(q)
-    carrier, local = skeleton.carried_markers
-    turned = skeleton.tree.segment_rotation[skeleton.marker_segments]
-    patterns, coefficients = skin
-    markers = _Markers(
-        skeleton.tree,
-        place[skeleton.map.owner],
-        at,
-        slopes,
-        carrier,
-        local + (turned @ patterns.displaced(coefficients)[..., None])[..., 0],
-        np.ascontiguousarray(turned),
-        np.ascontiguousarray(measured),
-        information.own,
-        information.next,
-        information.second,
-        np.ascontiguousarray(patterns.values),
-        patterns.first,
-        patterns.last,
-        len(still) + 3 * len(carrier) + patterns.begin[:-1],
-    )
-    border = normal.border[..., columns]
-    static = _Static(normal.static[columns, columns], normal.static_right[columns], np.zeros(1))
     near = stretch.with_neighbours
     own = (stretch.frames.start - near.start, stretch.frames.stop - near.start)
     first, values = basis.first[near] - stretch.splines.start, basis.values[0][near]
-    _add(markers, first, values, own, len(still), normal.band, border, normal.right, static)
-    normal.cost += 0.5 * float(static.cost[0])
+    if not isinstance(into, NormalEquations):
+        into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.right, into.static_right[columns])
+        return
+    static = _Static(into.static[columns, columns], into.static_right[columns], np.zeros(1))
+    _add(markers, first, values, own, still, into.band, into.border[..., columns], into.right, static)
+    into.cost += 0.5 * float(static.cost[0])
 
 
 @compiled
 def _add(
-    markers: _Markers,
+    markers: SeenMarkers,
     first: np.ndarray,
     values: np.ndarray,
     own: tuple[int, int],
@@ -154,29 +75,25 @@ def _add(
     n, m = markers.own.shape
     start, stop = own
     c, a, s = band.shape[2], len(markers.column), border.shape[2]
-    placed = _Placed(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
+    reach, pairs = _reach(markers, c, still), _pairs(markers.tree.parent)
+    placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     most = longest_run(first)
     interval = Interval(np.empty(((1 + 2 * LATER) * most, c * c)), np.zeros((most + LATER, c, s)), np.empty((most, c)))
     for k in range(max(start - LATER, 0), min(start + LATER, n)):
-        _place(markers, k, placed)
+        place_markers(markers, k, placed)
     while start < stop:
         end = start + 1
         while end < stop and first[end] == first[start]:
             end += 1
         interval.squares[:] = 0.0
         interval.gradient[:] = 0.0
-        interval.across[LATER:] = 0.0
         for k in range(start, end):
             if k + LATER < n:
-                _place(markers, k + LATER, placed)
-            _frame(markers, k, k - start, still, placed, interval, static)
+                place_markers(markers, k + LATER, placed)
+            _frame(markers, k, k - start, still, pairs, placed, interval, static)
             for later in range(1, min(LATER, n - 1 - k) + 1):
-                _pair(markers, k, later, k - start, placed, interval, static)
-        to_splines(first, values, start, end, interval, band, border, right)
-        for row in range(LATER):
-            for j in range(c):
-                for i in range(s):
-                    interval.across[row, j, i] = interval.across[end - start + row, j, i]
+                _pair(markers, k, later, k - start, pairs, placed, interval, static)
+        to_splines(first, values, start, end, interval, reach, band, border, right)
         start = end
     for row in range(min(LATER, n - stop)):
         # of the frames after them, only what these have in common with the last
@@ -184,26 +101,15 @@ def _add(
 
 
 @part
-def _place(markers: _Markers, k: int, placed: _Placed) -> None:
-    """Axes and markers of frame k."""
-    a, here = len(markers.column), k % 5
-    rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
-    place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])
-    places, errors, turned = placed.places[here], placed.errors[here], placed.turned[here]
-    for m in range(len(markers.carrier)):
-        j = markers.carrier[m]
-        place_marker(rotation[j], translation[j], markers.local[k, m], places[m])
-        for r in range(3):
-            errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.own[k, m] > 0.0 else 0.0
-            for i in range(3):
-                turned[m, r, i] = 0.0
-                for h in range(3):
-                    turned[m, r, i] += rotation[j, r, h] * markers.turned[m, h, i]
-
-
-@part
 def _frame(
-    markers: _Markers, k: int, row: int, still: int, placed: _Placed, interval: Interval, static: _Static
+    markers: SeenMarkers,
+    k: int,
+    row: int,
+    still: int,
+    pairs: np.ndarray,
+    placed: PlacedMarkers,
+    interval: Interval,
+    static: _Static,
 ) -> None:
     """J^T W J of frame k with itself; J^T W S of places and skin and J^T W r, W r being of five frames."""
     a, m, here = len(markers.column), len(markers.carrier), k % 5
@@ -223,7 +129,7 @@ def _frame(
     hand_down(markers.tree.parent, forces)
     parent, column, slopes, axes = markers.tree.parent, markers.column, markers.slopes, placed.axes[here]
     c, gradient = interval.gradient.shape[1], interval.gradient[row]
-    product = np.zeros((a, a))
+    product = np.empty((a, a))
     for j in range(a):
         force = slopes[k, j] * inner(axes, j, forces, j)
         if column[j] < c:
@@ -237,12 +143,12 @@ def _frame(
             product[i, j] = value
             product[j, i] = value
             i = parent[i]
-    _sort(column, product, interval.squares[row], interval.across[row], static.square)
+    _sort(column, pairs, product, interval.squares[row], interval.across[row], static.square)
 
 
 @part
 def _informed(
-    markers: _Markers, k: int, offset: int, placed: _Placed, pull: np.ndarray, directions: np.ndarray
+    markers: SeenMarkers, k: int, offset: int, placed: PlacedMarkers, pull: np.ndarray, directions: np.ndarray
 ) -> None:
     """Add what the frame at this offset from k gives of W r (m, 3), and of W times the segments' axes (m, 3, 3 g): as
     they are, then times each pattern of the skin.
@@ -269,11 +175,11 @@ def _informed(
 
 @part
 def _by_place(
-    markers: _Markers,
+    markers: SeenMarkers,
     k: int,
     row: int,
     still: int,
-    placed: _Placed,
+    placed: PlacedMarkers,
     pull: np.ndarray,
     directions: np.ndarray,
     interval: Interval,
@@ -328,7 +234,14 @@ def _by_place(
 
 @part
 def _pair(
-    markers: _Markers, k: int, later: int, row: int, placed: _Placed, interval: Interval, static: _Static
+    markers: SeenMarkers,
+    k: int,
+    later: int,
+    row: int,
+    pairs: np.ndarray,
+    placed: PlacedMarkers,
+    interval: Interval,
+    static: _Static,
 ) -> None:
     """J^T W J of frame k with the one so many frames later."""
     a, here, there = len(markers.column), k % 5, (k + later) % 5
@@ -340,7 +253,7 @@ def _pair(
     back = swapped(sums)
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
     axes, after = placed.axes[here], placed.axes[there]
-    product = np.zeros((a, a))
+    product = np.empty((a, a))
     for j in range(a):
         # what axis j carries meets it, and all axes before it, in the other frame
         met_force(sums, j, after, j, met)
@@ -354,30 +267,85 @@ def _pair(
             product[j, i] = slopes[k, j] * slopes[k + later, i] * inner(after, i, met, j)
             i = parent[i]
     squares, across, most = interval.squares, interval.across, len(interval.gradient)
-    _sort(column, product, squares[(2 * later - 1) * most + row], across[row], static.square)
-    _sort(column, product.T, squares[2 * later * most + row], across[row + later], static.square)
+    _sort(column, pairs, product, squares[(2 * later - 1) * most + row], across[row], static.square)
+    _sort(column, pairs, product.T, squares[2 * later * most + row], across[row + later], static.square)
 
 
 @part
-def _sort(column: np.ndarray, product: np.ndarray, squares: np.ndarray, across: np.ndarray, square: np.ndarray) -> None:
+def _sort(
+    column: np.ndarray,
+    pairs: np.ndarray,
+    product: np.ndarray,
+    squares: np.ndarray,
+    across: np.ndarray,
+    square: np.ndarray,
+) -> None:
     """Add products (a, a) of axes to where their coordinates belong: the first in a frame, the second in any.
 
     Args:
-        column: (a,) as `_Markers` has it.
+        column: (a,) as `SeenMarkers` has it.
+        pairs: (p, 2) of axes that may have a product.
         product: of the first's axes (rows) with the second's.
         squares: (c c,) where both coordinates move.
         across: (c, s) of the first's frame, where the second does not move.
         square: (s, s) where neither does.
     """
-    a, c = len(column), len(across)
-    for i in range(a):
-        for j in range(a):
-            value = product[i, j]
-            if value != 0.0:
-                if column[i] < c:
-                    if column[j] < c:
-                        squares[column[i] * c + column[j]] += value
-                    else:
-                        across[column[i], column[j] - c] += value
-                elif column[j] >= c:
-                    square[column[i] - c, column[j] - c] += value
+    c = len(across)
+    for n in range(len(pairs)):
+        i, j = pairs[n, 0], pairs[n, 1]
+        if column[i] < c:
+            if column[j] < c:
+                squares[column[i] * c + column[j]] += product[i, j]
+            else:
+                across[column[i], column[j] - c] += product[i, j]
+        elif column[j] >= c:
+            square[column[i] - c, column[j] - c] += product[i, j]
+
+
+@part
+def _pairs(parent: np.ndarray) -> np.ndarray:
+    """(p, 2) axes of which one carries the other, or that are the same, both ways round."""
+    count = 0
+    for j in range(len(parent)):
+        i = j
+        while i >= 0:
+            count += 1 if i == j else 2
+            i = parent[i]
+    pairs, n = np.empty((count, 2), dtype=np.int64), 0
+    for j in range(len(parent)):
+        i = j
+        while i >= 0:
+            pairs[n, 0], pairs[n, 1] = i, j
+            n += 1
+            if i != j:
+                pairs[n, 0], pairs[n, 1] = j, i
+                n += 1
+            i = parent[i]
+    return pairs
+
+
+@part
+def _reach(markers: SeenMarkers, c: int, still: int) -> np.ndarray:
+    """(c, 3, 2) the columns of S that each coordinate may meet, from and to: static coordinates, and places and skin of
+    the markers that it moves.
+    """
+    reach = np.zeros((c, 3, 2), dtype=np.int64)
+    reach[:, 0, 1] = still
+    for m in range(len(markers.carrier)):
+        place, skin = still + 3 * m, markers.columns[m]
+        wide = 3 * (markers.last[m] - markers.first[m])
+        j = markers.carrier[m]
+        while j >= 0:
+            if markers.column[j] < c:
+                _widen(reach[markers.column[j], 1], place, place + 3)
+                _widen(reach[markers.column[j], 2], skin, skin + wide)
+            j = markers.tree.parent[j]
+    return reach
+
+
+@inlined
+def _widen(run: np.ndarray, begin: int, end: int) -> None:
+    """Let a run of columns, empty or not, hold these, too."""
+    if begin < end:
+        run[0] = min(run[0], begin) if run[0] < run[1] else begin
+        run[1] = max(run[1], end)

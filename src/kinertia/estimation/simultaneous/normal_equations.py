@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
@@ -35,28 +35,47 @@ class RootTerms:
 
 
 @dataclass
-class NormalEquations:
-    """Normal equations of a trial or of a stretch of it: band (size, 7, c, c), border (size, c, S), static (S, S),
-    right-hand sides, and half the sum of squares. Row i of the band has the blocks of splines i and i, i + 1, ...
+class Gradient:
+    """Half the sum of squares of a trial or of a stretch of it, and where it falls: minus its derivatives by the motion
+    (size, c) and by the static unknowns (S,).
     """
 
-    band: np.ndarray
-    border: np.ndarray
-    static: np.ndarray
     right: np.ndarray
     static_right: np.ndarray
     cost: float
 
     @classmethod
-    def zero(cls, size: int, coordinates: int, static: int) -> NormalEquations:
+    def zero(cls, size: int, coordinates: int, static: int) -> Self:
+        """For so many splines, coordinates and static unknowns."""
+        return cls(np.zeros((size, coordinates)), np.zeros(static), 0.0)
+
+    def add(self, part: Gradient, splines: slice) -> None:
+        """Add that of a stretch, whose frames touch these splines."""
+        self.right[splines] += part.right
+        self.static_right += part.static_right
+        self.cost += part.cost
+
+
+@dataclass
+class NormalEquations(Gradient):
+    """With the second derivatives of Gauss and Newton: band (size, 7, c, c), border (size, c, S), static (S, S). Row i
+    of the band has the blocks of splines i and i, i + 1, ...
+    """
+
+    band: np.ndarray
+    border: np.ndarray
+    static: np.ndarray
+
+    @classmethod
+    def zero(cls, size: int, coordinates: int, static: int) -> Self:
         """For so many splines, coordinates and static unknowns."""
         return cls(
-            np.zeros((size, SPLINES_PER_BLOCK + 1, coordinates, coordinates)),
-            np.zeros((size, coordinates, static)),
-            np.zeros((static, static)),
             np.zeros((size, coordinates)),
             np.zeros(static),
             0.0,
+            np.zeros((size, SPLINES_PER_BLOCK + 1, coordinates, coordinates)),
+            np.zeros((size, coordinates, static)),
+            np.zeros((static, static)),
         )
 
     @classmethod
@@ -66,11 +85,11 @@ class NormalEquations:
         return one.band.nbytes + one.border.nbytes
 
 
-def add_root(normal: NormalEquations, columns: slice, basis: MotionBasis, start: int, root: RootTerms) -> None:
+def add_root(into: Gradient, columns: slice, basis: MotionBasis, start: int, root: RootTerms) -> None:
     """Add the terms of the root equations at some frames, one knot interval at a time.
 
     Args:
-        normal: zero, or with other terms.
+        into: zero, or with other terms.
         columns: of the static unknowns, those that the root equations depend on.
         basis: of the motion.
         start: the spline with which the normal equations begin.
@@ -79,19 +98,42 @@ def add_root(normal: NormalEquations, columns: slice, basis: MotionBasis, start:
     left, knots = root.left, basis.first[root.frames]
     (_, _, c), wide = root.q.shape, root.static.shape[2]
     flat = root.static.reshape(-1, wide)
-    normal.static[columns, columns] += flat.T @ flat
-    normal.static_right[columns] -= flat.T @ left.ravel()
-    normal.cost += 0.5 * float(np.square(left).sum())
-    rows = by_splines(np.ascontiguousarray(basis.values[:, root.frames]), root.q, root.qd, root.qdd)
-    intervals = np.unique(knots)
-    ends = np.searchsorted(knots, intervals, side="right")
-    for first, (begin, end) in zip(intervals - start, pairwise([0, *ends]), strict=True):
-        x = rows[begin:end].reshape(-1, 6 * c)
-        square = (x.T @ x).reshape(6, c, 6, c)
-        for a in range(6):
-            normal.band[first + a, : 6 - a] += square[a, :, a:].transpose(1, 0, 2)
-        normal.border[first : first + 6, :, columns] += (x.T @ flat[6 * begin : 6 * end]).reshape(6, c, wide)
-        normal.right[first : first + 6] -= (x.T @ left[begin:end].ravel()).reshape(6, c)
+    into.static_right[columns] -= flat.T @ left.ravel()
+    into.cost += 0.5 * float(np.square(left).sum())
+    intervals, begins = np.unique(knots, return_index=True)
+    values = np.ascontiguousarray(basis.values[:, root.frames])
+    pulls = [(left[:, None] @ by)[:, 0] for by in (root.q, root.qd, root.qdd)]
+    for i in range(6):
+        each = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
+        into.right[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
+    if not isinstance(into, NormalEquations):
+        return
+    into.static[columns, columns] += flat.T @ flat
+    rows = by_splines(values, root.q, root.qd, root.qdd)
+    border = into.border[..., columns]
+    _add_intervals(
+        rows.reshape(-1, 6 * c), flat, intervals - start, 6 * np.append(begins, len(knots)), into.band, border
+    )
+
+
+@compiled
+def _add_intervals(
+    rows: np.ndarray, static: np.ndarray, first: np.ndarray, ends: np.ndarray, band: np.ndarray, border: np.ndarray
+) -> None:
+    """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
+    unknowns (6 d, s), of intervals whose rows begin and end at `ends`, and whose splines begin at `first`.
+    """
+    c = band.shape[2]
+    for k in range(len(first)):
+        own, at = rows[ends[k] : ends[k + 1]], first[k]
+        square, across = np.dot(own.T, own), np.dot(own.T, static[ends[k] : ends[k + 1]])
+        for i in range(6):
+            for row in range(c):
+                for j in range(i, 6):
+                    for column in range(c):
+                        band[at + i, j - i, row, column] += square[i * c + row, j * c + column]
+                for s in range(across.shape[1]):
+                    border[at + i, row, s] += across[i * c + row, s]
 
 
 @compiled

@@ -14,30 +14,30 @@ from functools import partial
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.elimination import TrialNormal, summed
+from kinertia.estimation.simultaneous.elimination import Eliminated
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.layout import Layout
+from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import NormalEquations, RootTerms, add_root
+from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, RootTerms, add_root
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.range_terms import add_ranges
+from kinertia.estimation.simultaneous.root_terms import columns_of, root_terms
+from kinertia.estimation.simultaneous.seen_markers import seen_markers
 from kinertia.estimation.simultaneous.skin import SkinPatterns
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.start_terms import add_start
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
-    by_body,
-    dynamic_jacobian,
     from_log_cholesky,
     nearest_consistent,
     table_jacobian,
     to_log_cholesky,
 )
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion, residual_terms, root_regressor
+from kinertia.motion.dynamics import Motion
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
 
@@ -125,44 +125,6 @@ class CalibrationPrior:
     instruments: InstrumentPrior
 
 
-@dataclass(frozen=True)
-class Point:
-    """Values of all unknowns.
-
-    Attributes:
-        coefficients: per trial those of its motion.
-        static: (S,) what does not move.
-        displaced: per trial (3 m,) displacements of its markers (`displacement`), in prior deviations.
-    """
-
-    coefficients: tuple[np.ndarray, ...]
-    static: np.ndarray
-    displaced: tuple[np.ndarray, ...]
-
-
-@dataclass(frozen=True)
-class Linearised:
-    """Normal equations of all trials at a point, information and right-hand side of the priors, and half the sum of
-    squares of everything. Each trial's are those of the static unknowns as they are in it.
-
-    The priors of the instruments are none of a Gaussian: they count only after `under`.
-    """
-
-    point: Point
-    normals: tuple[TrialNormal, ...]
-    information: np.ndarray
-    right: np.ndarray
-    cost: float
-
-    def under(self, instruments: GaussianPrior, places: slice) -> Linearised:
-        """The same with this Gaussian for the instruments, which stand at these places of the static unknowns."""
-        values = self.point.static[places]
-        information, right = self.information.copy(), self.right.copy()
-        information[places, places] += instruments.precision
-        right[places] += instruments.pull - instruments.precision @ values
-        return replace(self, information=information, right=right, cost=self.cost + instruments.cost(values))
-
-
 class MapProblem:
     """Residuals and normal equations at a point."""
 
@@ -192,6 +154,7 @@ class MapProblem:
         plates_of_trials = list(map(len, self.own_plates))
         unknowns = (len(self.still), count, len(self.plates), n_delays, plates_of_trials, self.skin[0].size)
         self.layout = Layout.of(10 * len(self.segments), *unknowns)
+        self.columns = columns_of(self.free, self.segments, self.moving, self.still, self.layout)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
         self.start_static = np.zeros(self.layout.size)
@@ -221,10 +184,10 @@ class MapProblem:
         """The freed skeleton with markers where the static unknowns put them."""
         return self.free.with_places(static[self.layout.locals].reshape(-1, 3))
 
-    def shortened(self, step: np.ndarray) -> np.ndarray:
-        """The step with no logarithm (mass, second moments) changing by more than one."""
-        step = step.copy()
-        step[self.logs] = np.clip(step[self.logs], -1.0, 1.0)
+    def shortened(self, point: Point, step: np.ndarray) -> np.ndarray:
+        """A step of all unknowns from a point with no logarithm (mass, second moments) changing by more than one."""
+        at, step = self.logs + sum(part.size for part in point.coefficients), step.copy()
+        step[at] = np.clip(step[at], -1.0, 1.0)
         return step
 
     @property
@@ -235,15 +198,16 @@ class MapProblem:
         result: np.ndarray = np.arange(10 * len(self.segments)).reshape(-1, 10)[:, [0, 4, 5, 6]].ravel()
         return result
 
-    def bends(self, here: Linearised) -> np.ndarray:
-        """(S,) what Gauss-Newton leaves out of second derivatives by the logarithms, where the cost falls with them.
+    def bends(self, right: np.ndarray) -> np.ndarray:
+        """(S,) what Gauss-Newton leaves out of second derivatives by the logarithms, where the cost falls with them;
+        from the right-hand side (S,).
 
         The data may ask for a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
         them what holds a Gauss-Newton step back: it would promise much and keep nothing, again and again. A cost F of
         exp(x) has the second derivative F'' exp(2 x) + F' exp(x), and the last term is the slope by x; by the logarithm
         of a square root it is twice the slope.
         """
-        slope = -(here.right + sum(normal.static_right for normal in here.normals))[self.logs].reshape(-1, 4)
+        slope = -right[self.logs].reshape(-1, 4)
         result = np.zeros(self.layout.size)
         result[self.logs] = (np.maximum(slope, 0.0) * [1.0, 2.0, 2.0, 2.0]).ravel()
         return result
@@ -284,13 +248,32 @@ class MapProblem:
         right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
         return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
 
-    def at(self, point: Point, damping: float = 0.0) -> Linearised:
-        """Cost and normal equations at a point; it saves time to tell with which damping they will be solved."""
+    def at(self, point: Point, damping: float = 0.0, at_ends: bool = True) -> Linearised:
+        """Normal equations at a point, motions eliminated with their diagonal raised by this share; `at_ends` as
+        `RangeTerms` has it.
+        """
         rows = enumerate(point.coefficients)
-        normals = tuple(self.trial_normal(k, part, self.in_trial(k, point), damping) for k, part in rows)
+        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping, at_ends) for k, part in rows)
+        slope, information = self._slope(point, [trial.gradient for trial in trials])
+        return Linearised(slope, trials, information)
+
+    def slope(self, point: Point) -> Slope:
+        """Cost and where it falls: what `at` has, in a tenth of the time."""
+        rows = enumerate(point.coefficients)
+        return self._slope(point, [self.gradient(k, part, self.in_trial(k, point)) for k, part in rows])[0]
+
+    def _slope(self, point: Point, gradients: Sequence[Gradient]) -> tuple[Slope, np.ndarray]:
+        """With the priors, and their information (S, S)."""
         information, right, cost = self.prior_terms(point.static)
-        cost += sum(0.5 * float(own @ own) for own in point.displaced)
-        return Linearised(point, normals, information, right, cost + sum(normal.cost for normal in normals))
+        rows, motions, displaced = zip(gradients, self.displacement_sd_m, point.displaced, strict=True), [], []
+        for gradient, sd, own in rows:
+            right = right + gradient.static_right
+            cost += gradient.cost + 0.5 * float(own @ own)
+            motions.append(gradient.right)
+            displaced.append(sd * gradient.static_right[self.layout.locals] - own)
+        before, places = sum(motion.size for motion in motions), self.layout.instruments
+        instruments = slice(before + places.start, before + places.stop)
+        return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, instruments), information
 
     def in_trial(self, k: int, point: Point) -> np.ndarray:
         """(S,) static unknowns as they are in trial k: its markers displaced."""
@@ -338,63 +321,83 @@ class MapProblem:
         """By how much the forces of trial k are late."""
         return float(static[self.layout.late(k)].sum())
 
-    def trial_normal(self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0) -> TrialNormal:
-        """Normal equations of trial k, to be solved with this damping."""
-        return summed(self.stretches[k], partial(self.normal, k, coefficients, static), damping)
+    def eliminated(
+        self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0, at_ends: bool = True
+    ) -> Eliminated:
+        """Trial k with its motion eliminated."""
+        of = partial(self.normal, k, coefficients, static, at_ends=at_ends)
+        return Eliminated.of(self.stretches[k], of, damping)
+
+    def motion_eliminated(
+        self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float, at_ends: bool
+    ) -> Eliminated:
+        """The same with all that does not move held: without information on it."""
+
+        def of(stretch: Stretch) -> NormalEquations:
+            normal = self.normal(k, coefficients, static, stretch, at_ends)
+            return replace(normal, border=normal.border[..., :0], static=normal.static[:0, :0])
+
+        return Eliminated.of(self.stretches[k], of, damping)
 
     def normal(
-        self, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch | None = None
+        self,
+        k: int,
+        coefficients: np.ndarray,
+        static: np.ndarray,
+        stretch: Stretch | None = None,
+        at_ends: bool = True,
     ) -> NormalEquations:
         """Normal equations of a stretch of trial k, or of all of it."""
+        stretch = stretch or Stretch.whole(self.bases[k])
+        result = NormalEquations.zero(stretch.size, len(self.moving), self.layout.size)
+        self._add(result, k, coefficients, static, stretch, at_ends)
+        return result
+
+    def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
+        """Cost of trial k and where it falls."""
+        result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
+        for stretch in self.stretches[k]:
+            part = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
+            self._add(part, k, coefficients, static, stretch)
+            result.add(part, stretch.touched)
+        return result
+
+    def _add(
+        self,
+        into: Gradient,
+        k: int,
+        coefficients: np.ndarray,
+        static: np.ndarray,
+        stretch: Stretch,
+        at_ends: bool = True,
+    ) -> None:
+        """Add all terms of a stretch of trial k."""
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
-        stretch = stretch or Stretch.whole(basis)
         near, start = stretch.with_neighbours, stretch.splines.start
         skeleton = self.placed(static)
-        normal = NormalEquations.zero(stretch.size, len(self.moving), layout.size)
         noise, skin = trial.marker_process, (self.skin[k].cut(near), static[layout.skin])
         q = self.full(basis.evaluate(coefficients, near), static)[0]
-        add_markers(
-            normal,
-            layout.in_markers,
-            basis,
-            stretch,
-            skeleton,
-            trial.markers[near],
-            q,
-            noise,
-            skin,
-            self.moving,
-            self.still,
-        )
+        markers = seen_markers(skeleton, trial.markers[near], q, noise, skin, self.moving, self.still)
+        add_markers(into, layout.in_markers, basis, stretch, markers, len(self.still))
         inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
-        add_ranges(normal, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving])
+        add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving], at_ends)
         dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
         for piece in pieces(len(dynamic)):
             terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])
-            add_root(normal, layout.in_root, basis, start, terms)
-        add_start(normal, stretch, coefficients - self.start[k])
-        return normal
+            add_root(into, layout.in_root, basis, start, terms)
+        add_start(into, stretch, coefficients - self.start[k])
 
     def _root_terms(
         self, k: int, skeleton: Skeleton, coefficients: np.ndarray, static: np.ndarray, frames: np.ndarray
     ) -> RootTerms:
         """The root equations at some of the dynamic frames."""
-        trial, layout = self.trials[k], self.layout
-        q, qd, qdd = self.full(self.bases[k].evaluate(coefficients, frames), static)
-        motion = Motion(q, qd, qdd)
+        trial, layout, ground = self.trials[k], self.layout, self.grounds[k]
+        motion = Motion(*self.full(self.bases[k].evaluate(coefficients, frames), static))
         loads = self.foot_loads(k, static, 0, frames)
-        left, by = residual_terms(skeleton, self.bsp(static), motion, loads.sum(axis=1))
-        by_static = np.zeros((len(q), 6, layout.in_root.stop))
-        shown = root_regressor(skeleton, self.segments, motion)
-        by_static[:, :, layout.theta] = by_body(shown, dynamic_jacobian(static[layout.theta]))
-        by_static[:, :, layout.coordinates] = by.q[:, :, self.still]
-        ground = self.grounds[k]
+        by_ground = np.zeros((len(frames), 6, layout.in_root.stop))
         loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
         by_plate = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
-        self.add_by_plates(k, by_static, -by_plate)
-        by_static[:, :, layout.late(k)] = -self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
-        by_instrument = by_static[:, :, layout.instruments]
-        by_instrument[:, 3:] -= np.cross(skeleton.root.centre(q)[:, :, None], by_instrument[:, :3], axis=1)
-        sd = trial.root_sd(frames)[..., None]
-        by_q, by_qd, by_qdd = (part[..., self.moving] / sd for part in (by.q, by.qd, by.qdd))
-        return RootTerms(frames, by_q, by_qd, by_qdd, by_static / sd, left / sd[..., 0])
+        self.add_by_plates(k, by_ground, by_plate)
+        by_ground[:, :, layout.late(k)] = self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
+        bsp, theta, sd = self.bsp(static), static[layout.theta], trial.root_sd(frames)
+        return root_terms(skeleton, bsp, theta, motion, loads.sum(axis=1), by_ground, sd, self.columns, frames)

@@ -6,9 +6,9 @@ how far they are from these in each of several trials (`marker_offsets`), what i
 and in each (`plates.PLATE_ERRORS`, `ZERO_UNKNOWNS`), the time offset of the forces, and by how much more they are late
 in each of several trials. Minimised is the sum of squares, each over its deviation, of: marker errors, root residuals,
 and departures from the priors. Those of the instruments are Gaussians that change with what the data say of them
-(`sound_or_faulty`). Gauss-Newton with Levenberg damping, all derivatives analytic. The normal matrix is block
-tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur complement is the information on
-them, and its inverse their covariance.
+(`sound_or_faulty`). Steps are those of Gauss and Newton (`gauss_newton`), corrected by the gradients along the way
+(`quasi_newton`), all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static
+unknowns (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their covariance.
 
 Frames in which forces change faster than the motion can follow say less of all that does not move (`impacts`). When
 that is settled, the motion alone is made to follow the forces there, too.
@@ -24,11 +24,13 @@ import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
-from kinertia.estimation.simultaneous.elimination import Reduced, reduced
+from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
-from kinertia.estimation.simultaneous.marker_offsets import Displaced, as_displaced
-from kinertia.estimation.simultaneous.problem import CalibrationPrior, Linearised, MapProblem, Observation, Point
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
+from kinertia.estimation.simultaneous.marker_offsets import as_displaced
+from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
@@ -82,23 +84,40 @@ class SimultaneousResult:
     cost: tuple[float, float]
 
 
-CONVERGED_SD = 0.1
-"""Stop after a step that moves body and calibration by less, in posterior deviations of all of them together, ..."""
-CONVERGED = 1.0
-"""... and promises to lower half the sum of squares by less: what is left to the motion is below its own deviations."""
+CONVERGED = 3e-3
+"""Promised decrease of half the sum of squares below which a step is the last of the search: with the one at the end of
+it, from a quadratic of its own, no quantity is then further from the optimum than some hundredths of its deviation."""
+_ENDED = 0.05
+"""What that one may promise; else the search goes on."""
+_NEAR = 8.0
+"""Promised decrease from which on gradients alone are followed: above it a new quadratic is worth its time."""
+_MOST_GRADIENTS = 10
+"""With one quadratic."""
+_BLOCKED = 0.5
+"""Share of a step: where no more of it can be taken, coordinates meet the ends of their ranges."""
 _FIRST_DAMPING = 1e-5
 """Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
 information: 1e-3 would hold the first steps back."""
 _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which no step lowers the cost any more."""
-_MAX_ITERATIONS = 100
-"""Most trials take 5 to 20; impacts, and arms that reach the ends of their ranges, some 50."""
+_MAX_ITERATIONS = 60
+"""Quadratics; most trials take 5 to 7."""
+_MOST_TRIES = 5
+"""Steps along one direction, each shorter."""
+_LEAST_KEPT = 1e-3
+"""Share of the promised decrease that a step must bring."""
+_ALIKE_SD = 0.02
+"""Instruments are judged again when what is said of them has moved by more, in deviations of all of them together..."""
+_ALIKE_SHARE = 0.3
+"""... and by more than this share of how far everything is from the optimum."""
 _NO_IMPACT = 1.05
 """Of `Observation.impact`: below it the motion follows the forces as it is."""
+_MOTION_CONVERGED = 3e-4
+"""As CONVERGED, of the motion alone."""
 _MOST_THROUGH_IMPACTS = 5
-"""Steps of the motion alone; two or three are usual."""
-_USUAL_ITERATIONS = 10
+"""Quadratics for the motion alone; one or two are usual."""
+_USUAL_ITERATIONS = 5
 _LEFT_ITERATIONS = 2
 """What progress counts with: the usual number, and when these are done always so many more."""
 
@@ -116,73 +135,163 @@ def estimate_simultaneous(
     """
     problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem, progress)
-    covariance, of_curves = _deviations(problem, ended.under)
-    motions = _through_impacts(problem, ended.under.point)
+    covariance, of_curves = _deviations(problem, ended)
+    motions = _through_impacts(problem, ended.point)
     return _result(problem, ended, motions, covariance, of_curves)
 
 
 class _Ended(NamedTuple):
-    """Where the search ended, under the instruments' last Gaussian; whether short of its limit, after how many steps,
-    and from which cost.
+    """Where the search ended, the quadratic there and the instruments' last Gaussian; whether short of its limit, after
+    how many quadratics, from which cost and at which.
     """
 
-    under: Linearised
+    point: Point
+    here: Linearised
     instruments: GaussianPrior
     converged: bool
     iterations: int
-    begin: float
+    cost: tuple[float, float]
 
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> _Ended:
-    """Gauss-Newton steps from the beginning until one is short."""
-    state = _State(problem.at(problem.beginning, _FIRST_DAMPING), GaussianPrior.of(problem.instruments))
-    begin, iterations = state.here.cost, 0
-    while iterations < _MAX_ITERATIONS and not state.converged and state.damping < _STUCK:
+    """Quasi-Newton steps with one quadratic after another until a step is short; then one with one of its own."""
+    at = _Place(problem.slope(problem.beginning), _Judged.at_first(problem))
+    begin, damping, scale, iterations = at.slope.cost, _FIRST_DAMPING, np.zeros(problem.layout.size), 0
+    while True:
         iterations += 1
-        state = _iterated(problem, state, iterations > 1)
+        last = at.converged or damping > _STUCK or iterations == _MAX_ITERATIONS
+        at_ends = last or not at.slow
+        damping = _LEAST_DAMPING if last else damping
+        here = problem.at(at.slope.point, damping, at_ends)
+        scale = np.maximum(scale, np.diag(here.information) + sum(trial.static_diagonal for trial in here.trials))
+        static = here.point.like(here.slope.right).static
+        model = GaussNewton.of(problem, here, damping * scale + problem.bends(static))
         progress(iterations / (iterations + max(_USUAL_ITERATIONS - iterations, _LEFT_ITERATIONS)))
-    under = state.here.under(state.instruments, problem.layout.instruments)
-    return _Ended(under, state.instruments, state.converged, iterations, begin)
+        if last:
+            end = _last_step(problem, model, at)
+            if end.converged or not at.converged or iterations >= _MAX_ITERATIONS:
+                cost = begin, end.slope.under(end.judged.gaussian)[0]
+                return _Ended(end.slope.point, here, end.judged.gaussian, end.converged, iterations, cost)
+        at = _descended(problem, model, at._replace(slope=here.slope), at_ends, iterations > 1, CONVERGED)
+        stuck = at.slope.point is here.point
+        damping = max(100.0 * damping, 1e-4) if stuck else max(0.01 * damping, _LEAST_DAMPING)
 
 
-class _State(NamedTuple):
-    """What one iteration leaves to the next: the point, the instruments' Gaussian, the damping, the largest diagonal of
-    the information so far (S,), and whether the step was short. All else that it made, which is large, is gone by then.
+class _Judged(NamedTuple):
+    """The instruments' Gaussian, and the mean that it gave them (k,) when it was made."""
+
+    gaussian: GaussianPrior
+    mean: np.ndarray
+
+    @classmethod
+    def at_first(cls, problem: MapProblem) -> _Judged:
+        """Before the data have said anything."""
+        return cls(GaussianPrior.of(problem.instruments), np.full(len(problem.instruments.own), np.inf))
+
+    def again(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray, far: float) -> _Judged:
+        """From the posterior mean and covariance under this one; the same where the mean has hardly moved beside how
+        far everything is from the optimum, in half the square of deviations.
+        """
+        information, away = np.linalg.inv(covariance), mean - self.mean
+        alike = max(_ALIKE_SD**2, _ALIKE_SHARE**2 * 2.0 * far)
+        if np.isfinite(away).all() and away @ information @ away < alike:
+            return self
+        gaussian = self.gaussian.updated(priors, mean, covariance)
+        right = information @ mean - self.gaussian.pull + gaussian.pull
+        return _Judged(gaussian, np.linalg.solve(information - self.gaussian.precision + gaussian.precision, right))
+
+
+class _Place(NamedTuple):
+    """Where the search is, whether the last step was short, and whether gradients with the last quadratic all brought
+    something, to the last of them: what it takes for held at the ends of ranges may then keep the search back.
     """
 
-    here: Linearised
-    instruments: GaussianPrior
-    damping: float = _FIRST_DAMPING
-    scale: np.ndarray | float = 0.0
+    slope: Slope
+    judged: _Judged
     converged: bool = False
+    slow: bool = False
 
 
-def _iterated(problem: MapProblem, state: _State, judging: bool) -> _State:
-    """After one Gauss-Newton step; the instruments' Gaussian is made anew if `judging`, and if the damping is small."""
-    here, instruments, damping, scale, _ = state
-    places = problem.layout.instruments
-    eliminated = _eliminated(problem, here, damping)
-    if judging and damping <= _FIRST_DAMPING:
-        instruments = _judged(problem, here, eliminated, instruments)
-    under = here.under(instruments, places)
-    scale = np.maximum(scale, np.diag(under.information) + sum(np.diag(normal.static) for normal in here.normals))
-    held = damping * scale + problem.bends(under)
-    there, promised, moved_sd = _step(problem, under, eliminated, damping, held)
-    kept = (under.cost - there.under(instruments, places).cost) / promised
-    converged = damping <= 1e-3 and promised < CONVERGED and moved_sd < CONVERGED_SD
-    return _State(there if kept > 0.0 else here, instruments, _next_damping(damping, kept), scale, converged)
+def _descended(
+    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, at_ends: bool, judging: bool, tolerance: float
+) -> _Place:
+    """Quasi-Newton steps with one quadratic, as long as they are worth it."""
+    slope, judged = at.slope, at.judged
+    pairs, places = SecantPairs.none(len(slope.right)), slope.instruments
+    for count in range(_MOST_GRADIENTS):
+        step, promised = _answer(slope, model, pairs, judged)
+        if judging and isinstance(model, GaussNewton):
+            again = _judged_again(problem, model, slope.point, step, judged, max(promised, 0.0))
+            if again is not judged:
+                pairs = pairs.stiffer(places, again.gaussian.precision - judged.gaussian.precision)
+                judged = again
+                step, promised = _answer(slope, model, pairs, judged)
+        if 0.0 <= promised < tolerance:
+            return _Place(_moved(problem, slope, step), judged, True)
+        if (count and promised > _NEAR) or not promised > 0.0:
+            break
+        there = _lower(problem, slope, judged.gaussian, step, promised)
+        if there is None:
+            break
+        taken = there.point.vector - slope.point.vector
+        if not at_ends and np.linalg.norm(taken) < _BLOCKED * np.linalg.norm(step):
+            return _Place(there, judged)
+        change = slope.right - there.right
+        change[places] += judged.gaussian.precision @ taken[places]
+        expected = 2.0 * promised * float(taken @ step) / float(step @ step)
+        slope, pairs = there, pairs.with_pair(taken, change, expected)
+    else:
+        return _Place(slope, judged, slow=True)
+    return _Place(slope, judged)
 
 
-def _judged(problem: MapProblem, here: Linearised, eliminated: Eliminated, instruments: GaussianPrior) -> GaussianPrior:
-    """The Gaussian for the instruments that fits what the data say of them at this point."""
-    places = problem.layout.instruments
-    under = here.under(instruments, places)
-    information = under.information + sum(each.information for each in eliminated.displaced)
-    right = under.right + sum(each.right for each in eliminated.displaced)
-    static_information = StaticInformation.of(information, problem.layout.in_root.stop)
-    covariance = np.linalg.inv(static_information.first)
-    mean = here.point.static[places] + (covariance @ static_information.first_of(right))[places]
-    return instruments.updated(problem.instruments, mean, covariance[places, places])
+def _answer(
+    slope: Slope, model: GaussNewton | MotionAlone, pairs: SecantPairs, judged: _Judged
+) -> tuple[np.ndarray, float]:
+    """The step of all unknowns, and by how much it promises to lower the cost."""
+    right = slope.under(judged.gaussian)[1]
+    step = pairs.step(right, model.under(judged.gaussian).step)
+    return step, 0.5 * float(right @ step)
+
+
+def _judged_again(
+    problem: MapProblem, model: GaussNewton, point: Point, step: np.ndarray, judged: _Judged, far: float
+) -> _Judged:
+    """The instruments, if this step leads from a point to the optimum."""
+    mean, covariance = model.under(judged.gaussian).of_instruments(point, step)
+    return judged.again(problem.instruments, mean, covariance, far)
+
+
+def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
+    """After a step too short to ask for cost and gradient again."""
+    return replace(slope, point=slope.point.like(slope.point.vector + problem.shortened(slope.point, step)))
+
+
+def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
+    """After a step with the last quadratic, if the search has converged and the step is short."""
+    slope, judged, pairs = model.here.slope, at.judged, SecantPairs.none(len(model.here.slope.right))
+    if not at.converged:
+        return _Place(slope, judged)
+    step, _ = _answer(slope, model, pairs, judged)
+    judged = _judged_again(problem, model, slope.point, step, judged, 0.0)
+    step, promised = _answer(slope, model, pairs, judged)
+    return _Place(_moved(problem, slope, step), judged, True) if 0.0 <= promised < _ENDED else _Place(slope, judged)
+
+
+def _lower(
+    problem: MapProblem, slope: Slope, instruments: GaussianPrior, step: np.ndarray, promised: float
+) -> Slope | None:
+    """A point along a step at which the cost is lower by a fair share of what was promised; None if there is none."""
+    cost, share, start = slope.under(instruments)[0], 1.0, slope.point.vector
+    for _ in range(_MOST_TRIES):
+        there = problem.slope(slope.point.like(start + problem.shortened(slope.point, share * step)))
+        kept = (cost - there.under(instruments)[0]) / promised
+        if kept > _LEAST_KEPT * share:
+            return there
+        # where the parabola of cost and slope at the start, and of this cost, is lowest
+        best = share**2 / (2.0 * share - kept) if np.isfinite(kept) else 0.0
+        share = min(max(best, 0.1 * share), 0.6 * share)
+    return None
 
 
 def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...]:
@@ -195,83 +304,31 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
         return point.coefficients
     sure = [replace(trial, impact=1.0) for trial in problem.trials]
     following = MapProblem(problem.skeleton, problem.prior, problem.calibration, sure)
-    still, result = np.zeros(problem.layout.size), []
-    for k, coefficients in enumerate(point.coefficients):
-        static = problem.in_trial(k, point)
-        for _ in range(_MOST_THROUGH_IMPACTS):
-            normal = following.trial_normal(k, coefficients, static, _LEAST_DAMPING)
-            move = reduced(normal, _LEAST_DAMPING).motion_step(still)
-            coefficients = coefficients + move
-            if (normal.right * move).sum() < 2.0 * CONVERGED:
-                break
-        result.append(coefficients)
-    return tuple(result)
+    at = _Place(following.slope(point), _Judged.at_first(following))
+    for _ in range(_MOST_THROUGH_IMPACTS):
+        at_ends = not at.slow
+        alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING, at_ends)
+        at = _descended(following, alone, at, at_ends, judging=False, tolerance=_MOTION_CONVERGED)
+        if at.converged:
+            break
+    return at.slope.point.coefficients
 
 
-def _deviations(problem: MapProblem, here: Linearised) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
+def _deviations(problem: MapProblem, ended: _Ended) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
     """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
-    parts, displaced = _eliminated(problem, here, 0.0)
-    by_trial = [each.information for each in displaced]
-    first = problem.layout.in_root.stop
-    root = StaticInformation.of(here.information + sum(by_trial), first).root_of_covariance()
+    here, point, layout = ended.here, ended.point, problem.layout
+    model = GaussNewton.of(problem, here).under(ended.instruments)
+    root, first = model.static.root_of_covariance(), layout.in_root.stop
     of_curves = []
-    for k, (motion, part) in enumerate(zip(here.point.coefficients, parts, strict=True)):
+    for k, (motion, trial) in enumerate(zip(point.coefficients, here.trials, strict=True)):
         in_trial, sd = root, problem.displacement_sd_m[k]
         if sd.any():
-            elsewhere = here.information + sum(by_trial[:k] + by_trial[k + 1 :])
-            elsewhere = as_displaced(elsewhere, problem.layout.locals, sd)
-            in_trial = StaticInformation.of(part.information + elsewhere, first).root_of_covariance()
-        static = problem.in_trial(k, here.point)
-        of_curves.append(curve_deviations(problem, k, motion, static, part, in_trial))
+            elsewhere = here.information + sum(each.information for j, each in enumerate(model.displaced) if j != k)
+            elsewhere[layout.instruments, layout.instruments] += ended.instruments.precision
+            elsewhere = as_displaced(elsewhere, layout.locals, sd)
+            in_trial = StaticInformation.of(trial.information + elsewhere, first).root_of_covariance()
+        of_curves.append(curve_deviations(problem, k, motion, problem.in_trial(k, point), trial, in_trial))
     return root @ root.T, tuple(of_curves)
-
-
-class Eliminated(NamedTuple):
-    """Normal equations of all trials without motion, and without motion and displacements."""
-
-    parts: list[Reduced]
-    displaced: list[Displaced]
-
-
-def _eliminated(problem: MapProblem, here: Linearised, damping: float) -> Eliminated:
-    parts = [reduced(normal, damping) for normal in here.normals]
-    rows = zip(parts, problem.displacement_sd_m, here.point.displaced, strict=True)
-    places = problem.layout.locals
-    return Eliminated(parts, [Displaced.of(part.information, part.right, places, sd, own) for part, sd, own in rows])
-
-
-def _next_damping(damping: float, kept: float) -> float:
-    """The damping after a step that lowered the cost by this share of what it promised."""
-    factor = 0.1 if kept > 0.75 else 1.0 if kept > 0.25 else 10.0
-    return max(damping * factor, _LEAST_DAMPING)
-
-
-def _step(
-    problem: MapProblem, here: Linearised, eliminated: Eliminated, damping: float, held: np.ndarray
-) -> tuple[Linearised, float, float]:
-    """Where a step leads that is held back by so much (S,) on the diagonal of the information, by how much it promises
-    to lower the cost, and how far body and calibration move, in deviations of all of them together.
-    """
-    parts, displaced = eliminated
-    information = here.information + sum(each.information for each in displaced)
-    right = here.right + sum(each.right for each in displaced)
-    information[np.diag_indices_from(information)] += held
-    step = StaticInformation.of(information, problem.layout.in_root.stop).solution(right)
-    moved_squared = float(step @ information @ step)
-    # rounding may leave an information that is not positive definite; then nothing has converged
-    moved_sd = float(np.sqrt(moved_squared)) if moved_squared >= 0.0 else np.inf
-    coefficients, moved = [], []
-    promised = 0.5 * float(here.right @ step)
-    for k, (part, normal) in enumerate(zip(parts, here.normals, strict=True)):
-        old, own = here.point.displaced[k], displaced[k].step(step)
-        in_trial = step.copy()
-        in_trial[problem.layout.locals] += problem.displacement_sd_m[k] * own
-        move = part.motion_step(in_trial)
-        coefficients.append(here.point.coefficients[k] + move)
-        moved.append(old + own)
-        promised += 0.5 * float(normal.static_right @ in_trial + (normal.right * move).sum() - old @ own)
-    point = Point(tuple(coefficients), here.point.static + problem.shortened(step), tuple(moved))
-    return problem.at(point, _next_damping(damping, 1.0)), promised, moved_sd
 
 
 def _result(
@@ -281,10 +338,11 @@ def _result(
     covariance: np.ndarray,
     of_curves: tuple[CurveDeviations, ...],
 ) -> SimultaneousResult:
-    point, layout = ended.under.point, problem.layout
+    point, layout = ended.point, problem.layout
     values = point.static
     bsp = problem.bsp(values)
-    chain = block_diagonal(table_jacobian(values[layout.theta]))
+    # of the point at which the covariance is
+    chain = block_diagonal(table_jacobian(ended.here.point.static[layout.theta]))
     sd = np.sqrt(np.diag(covariance))
     names = list(problem.calibration.coordinates)
     coordinates = {
@@ -314,7 +372,7 @@ def _result(
         ),
         ended.converged,
         ended.iterations,
-        (ended.begin, ended.under.cost),
+        ended.cost,
     )
 
 

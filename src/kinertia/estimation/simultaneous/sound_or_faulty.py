@@ -23,7 +23,7 @@ _MOST_WAYS = 1024
 _MOST_NUMBERS = 2**21
 """In the covariances of these ways: of a hundred instruments and more, fewer ways are looked at."""
 _FEWEST_WAYS = 32
-_UNLIKELY = -20.0
+_UNLIKELY = -15.0
 """Logarithm of a way's chance over that of the likeliest: where none with as many faults has more, the search ends."""
 
 

@@ -11,30 +11,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.normal_equations import NormalEquations
+from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
 
 CHANGE_SD, AWAY_SD = 1.0, 30.0
 """Rad or m: of the change from one coefficient to the next, and of each by itself."""
 
 
-def add_start(normal: NormalEquations, stretch: Stretch, moved: np.ndarray) -> None:
+def add_start(into: Gradient, stretch: Stretch, moved: np.ndarray) -> None:
     """Add the terms of a stretch's own splines.
 
     Args:
-        normal: zero, or with other terms.
+        into: zero, or with other terms.
         stretch: of the trial.
         moved: (splines, c) how far all coefficients of the trial are from their start.
     """
     own, following = moved[stretch.splines], moved[stretch.splines.start + 1 : stretch.splines.stop + 1]
     count, pairs = len(own), min(len(following), stretch.size - 1)
     change = following[:pairs] - own[:pairs]
-    each = np.arange(moved.shape[1])
-    normal.band[:count, 0, each, each] += 1.0 / AWAY_SD**2
-    normal.right[:count] -= own / AWAY_SD**2
-    normal.band[:pairs, 0, each, each] += 1.0 / CHANGE_SD**2
-    normal.band[1 : pairs + 1, 0, each, each] += 1.0 / CHANGE_SD**2
-    normal.band[:pairs, 1, each, each] -= 1.0 / CHANGE_SD**2
-    normal.right[:pairs] += change / CHANGE_SD**2
-    normal.right[1 : pairs + 1] -= change / CHANGE_SD**2
-    normal.cost += 0.5 * float(np.square(own / AWAY_SD).sum() + np.square(change / CHANGE_SD).sum())
+    into.right[:count] -= own / AWAY_SD**2
+    into.right[:pairs] += change / CHANGE_SD**2
+    into.right[1 : pairs + 1] -= change / CHANGE_SD**2
+    into.cost += 0.5 * float(np.square(own / AWAY_SD).sum() + np.square(change / CHANGE_SD).sum())
+    if isinstance(into, NormalEquations):
+        each = np.arange(moved.shape[1])
+        into.band[:count, 0, each, each] += 1.0 / AWAY_SD**2
+        into.band[:pairs, 0, each, each] += 1.0 / CHANGE_SD**2
+        into.band[1 : pairs + 1, 0, each, each] += 1.0 / CHANGE_SD**2
+        into.band[:pairs, 1, each, each] -= 1.0 / CHANGE_SD**2

@@ -1,0 +1,109 @@
+"""The quadratic that Gauss and Newton put in place of the cost, at one point: which step answers a gradient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.elimination import Eliminated
+from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.marker_offsets import Displaced
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.static_information import StaticInformation
+
+
+@dataclass(frozen=True, eq=False)
+class GaussNewton:
+    """Information on all unknowns at a point, eliminated from motions to displacements to what does not move.
+
+    Attributes:
+        problem: of the estimate.
+        here: the point.
+        displaced: per trial what it says of the static unknowns, displacements eliminated.
+        rest: (S, S) information on the static unknowns, all else eliminated, without the instruments' priors.
+        static: the same, eliminated to those that root equations depend on; with these priors.
+    """
+
+    problem: MapProblem
+    here: Linearised
+    displaced: tuple[Displaced, ...]
+    rest: StaticInformation
+    static: StaticInformation
+
+    @classmethod
+    def of(cls, problem: MapProblem, here: Linearised, held: np.ndarray | float = 0.0) -> GaussNewton:
+        """At a point, with the diagonal of the information on the static unknowns raised by this much (S,)."""
+        places, information = problem.layout.locals, here.information.copy()
+        trials = zip(here.trials, problem.displacement_sd_m, strict=True)
+        displaced = tuple(Displaced.of(trial.information, places, sd) for trial, sd in trials)
+        for each in displaced:
+            information += each.information
+        information[np.diag_indices_from(information)] += held
+        rest = StaticInformation.of(information, problem.layout.in_root.stop)
+        return cls(problem, here, displaced, rest, rest)
+
+    def under(self, instruments: GaussianPrior) -> GaussNewton:
+        """With this Gaussian for the instruments."""
+        places, first = self.problem.layout.instruments, self.rest.first.copy()
+        first[places, places] += instruments.precision
+        return replace(self, static=replace(self.rest, first=first))
+
+    def step(self, right: np.ndarray) -> np.ndarray:
+        """The step of all unknowns for a right-hand side, both as `Point.vector` has them."""
+        pull = self.here.point.like(right)
+        static, solved, rests = pull.static.copy(), [], []
+        places, sds = self.problem.layout.locals, self.problem.displacement_sd_m
+        for k, (trial, displaced) in enumerate(zip(self.here.trials, self.displaced, strict=True)):
+            forward, lost = trial.forward(pull.coefficients[k])
+            own = pull.displaced[k] - sds[k] * lost[places]
+            static -= lost + own @ displaced.gain
+            solved.append(forward)
+            rests.append(displaced.rest(own))
+        step, motions, moved = self.static.solution(static), [], []
+        for k, (trial, displaced) in enumerate(zip(self.here.trials, self.displaced, strict=True)):
+            own = rests[k] - displaced.gain @ step
+            in_trial = step.copy()
+            in_trial[places] += sds[k] * own
+            motions.append(trial.motion_step(solved[k], in_trial))
+            moved.append(own)
+        return np.concatenate([*(motion.ravel() for motion in motions), step, *moved])
+
+    def of_instruments(self, point: Point, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Posterior mean (k,) and covariance (k, k) of the instruments, if a step leads from a point to the optimum."""
+        places = self.problem.layout.instruments
+        mean = (point.static + point.like(step).static)[places]
+        return mean, np.linalg.inv(self.static.first)[places, places]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionAlone:
+    """The same with all that does not move held.
+
+    Attributes:
+        point: where.
+        trials: with their motions eliminated, without information on anything else.
+    """
+
+    point: Point
+    trials: tuple[Eliminated, ...]
+
+    @classmethod
+    def of(cls, problem: MapProblem, point: Point, damping: float, at_ends: bool) -> MotionAlone:
+        """At a point, with the diagonal of the information on the motions raised by this share; `at_ends` as
+        `RangeTerms` has it.
+        """
+        rows = [(k, part, problem.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
+        return cls(point, tuple(problem.motion_eliminated(*row, damping, at_ends) for row in rows))
+
+    def under(self, instruments: GaussianPrior) -> MotionAlone:
+        """With this Gaussian for the instruments: the motion does not know of it."""
+        return self
+
+    def step(self, right: np.ndarray) -> np.ndarray:
+        """The step of all unknowns for a right-hand side; of the motions alone."""
+        pull = self.point.like(right)
+        trials = zip(self.trials, pull.coefficients, strict=True)
+        motions = [trial.motion_step(trial.forward(own)[0], np.zeros(0)).ravel() for trial, own in trials]
+        return np.concatenate([*motions, np.zeros(len(right) - sum(motion.size for motion in motions))])

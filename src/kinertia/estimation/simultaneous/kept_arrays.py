@@ -1,0 +1,41 @@
+"""Arrays kept in a temporary file, for what a long trial needs again and has no room for in memory."""
+
+from __future__ import annotations
+
+import tempfile
+from typing import IO
+
+import numpy as np
+
+
+class KeptArrays:
+    """Groups of arrays in a temporary file, which is made with the first group and goes with this object.
+
+    >>> kept = KeptArrays()
+    >>> kept.add(np.arange(3.0), np.ones((2, 2), np.float32))
+    >>> [array.tolist() for array in kept.get(0)]
+    [[0.0, 1.0, 2.0], [[1.0, 1.0], [1.0, 1.0]]]
+    """
+
+    def __init__(self) -> None:
+        self._file: IO[bytes] | None = None
+        self._groups: list[tuple[int, list[tuple[tuple[int, ...], np.dtype[np.generic]]]]] = []
+
+    def add(self, *arrays: np.ndarray) -> None:
+        """Write a group behind those before it."""
+        if self._file is None:
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115  # it lives as long as this object
+        begin = self._file.seek(0, 2)
+        for array in arrays:
+            self._file.write(np.ascontiguousarray(array).data)
+        self._groups.append((begin, [(array.shape, array.dtype) for array in arrays]))
+
+    def get(self, k: int) -> list[np.ndarray]:
+        """Read group k."""
+        assert self._file is not None
+        begin, kinds = self._groups[k]
+        self._file.seek(begin)
+        arrays = [np.empty(shape, dtype) for shape, dtype in kinds]
+        for array in arrays:
+            self._file.readinto(array.data)  # type: ignore[attr-defined]
+        return arrays

@@ -1,0 +1,68 @@
+"""Steps of a quasi-Newton search: what gradients along the way show beyond a quadratic that is known (L-BFGS).
+
+Gauss and Newton leave out second derivatives of the residuals. Along a few nearly flat directions these are as large as
+what is left in: there their steps are up to twice too long, or half as long as they should be, again and again. A pair
+of a step and of the change of the gradient along it corrects the quadratic in that direction (Liu and Nocedal 1989,
+Math Program 45:503), and a gradient takes a tenth of the time of a new quadratic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+_MOST_PAIRS = 12
+_LEAST_CURVATURE = 0.02
+"""Along a step, over what was expected: the change of a gradient with less says nothing to go by."""
+
+
+@dataclass(frozen=True, eq=False)
+class SecantPairs:
+    """Steps taken, and how much less the gradient was after each.
+
+    Attributes:
+        steps: (k, n).
+        changes: (k, n).
+
+    >>> pairs = SecantPairs.none(2).with_pair(np.array([1.0, 0.0]), np.array([2.0, 0.0]), expected=1.0)
+    >>> pairs.step(np.array([4.0, 3.0]), lambda right: right)
+    array([2., 3.])
+    """
+
+    steps: np.ndarray
+    changes: np.ndarray
+
+    @classmethod
+    def none(cls, n: int) -> SecantPairs:
+        """Before the first step, of n unknowns."""
+        return cls(np.zeros((0, n)), np.zeros((0, n)))
+
+    def with_pair(self, step: np.ndarray, change: np.ndarray, expected: float) -> SecantPairs:
+        """One more, in place of the oldest of many, if along the step there is a fair share of the curvature that was
+        expected.
+        """
+        if not step @ change > _LEAST_CURVATURE * expected:
+            return self
+        return SecantPairs(
+            np.vstack([self.steps, step])[-_MOST_PAIRS:], np.vstack([self.changes, change])[-_MOST_PAIRS:]
+        )
+
+    def stiffer(self, places: slice, more: np.ndarray) -> SecantPairs:
+        """The same where the cost has gained this information (m, m) on some of the unknowns."""
+        changes = self.changes.copy()
+        changes[:, places] += self.steps[:, places] @ more
+        return SecantPairs(self.steps, changes)
+
+    def step(self, right: np.ndarray, known: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """The step (n,) for a right-hand side, of which `known` gives the one without these pairs."""
+        left, shares = right.copy(), np.zeros(len(self.steps))
+        inverse = 1.0 / np.einsum("kn,kn->k", self.steps, self.changes)
+        for k in range(len(shares) - 1, -1, -1):
+            shares[k] = inverse[k] * (self.steps[k] @ left)
+            left -= shares[k] * self.changes[k]
+        result = known(left)
+        for k in range(len(shares)):
+            result = result + (shares[k] - inverse[k] * (self.changes[k] @ result)) * self.steps[k]
+        return result

@@ -1,0 +1,120 @@
+"""Markers of a trial as compiled functions take them, and where they are in a frame."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.marker_errors import ErrorInformation, ErrorProcess
+from kinertia.estimation.simultaneous.skin import SkinPatterns
+from kinertia.model.compiled import part
+from kinertia.model.kinematic_tree import KinematicTree, place_axes
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.marker_sums import place_marker
+
+
+class SeenMarkers(NamedTuple):
+    """Markers of a trial and the axes that move them.
+
+    Attributes:
+        tree: the skeleton.
+        column: (a,) place of each axis' coordinate among those that move, then those that do not.
+        at, slopes: (n, a) places of the axes, rad or m, and their derivatives by the coordinates.
+        carrier: (m,) the axis that carries each marker.
+        local: (n, m, 3) m, the markers in the frames of these axes, displaced with the skin.
+        turned: (m, 3, 3) the segments' axes in these frames.
+        measured: (n, m, 3) m; NaN where not seen.
+        own, next, second: as `ErrorInformation` has them.
+        patterns, first, last: as `SkinPatterns` has them.
+        columns: (m,) where the coefficients of each marker begin among the columns of S.
+    """
+
+    tree: KinematicTree
+    column: np.ndarray
+    at: np.ndarray
+    slopes: np.ndarray
+    carrier: np.ndarray
+    local: np.ndarray
+    turned: np.ndarray
+    measured: np.ndarray
+    own: np.ndarray
+    next: np.ndarray
+    second: np.ndarray
+    patterns: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    columns: np.ndarray
+
+
+class PlacedMarkers(NamedTuple):
+    """Five neighbouring frames, in turn: axes (5, a, 6), and of the markers the places (5, m, 3) m, the errors
+    (5, m, 3) m (zero where not seen) and the axes of their segments (5, m, 3, 3)."""
+
+    axes: np.ndarray
+    places: np.ndarray
+    errors: np.ndarray
+    turned: np.ndarray
+
+
+def seen_markers(
+    skeleton: Skeleton,
+    measured: np.ndarray,
+    q: np.ndarray,
+    deviation: tuple[np.ndarray, ErrorProcess],
+    skin: tuple[SkinPatterns, np.ndarray],
+    moving: np.ndarray,
+    still: np.ndarray,
+) -> SeenMarkers:
+    """Markers at the coordinates q, with the information on their errors.
+
+    Args:
+        skeleton: with static coordinates free.
+        measured: (n, m, 3) m; NaN where not seen.
+        q: (n, c) rad and m.
+        deviation: (m,) of each marker's errors, m, and how they go from frame to frame.
+        skin: its patterns in the same frames, and the coefficients (k,).
+        moving, still: columns of q that move in time, and that do not.
+    """
+    information = ErrorInformation.of(np.isfinite(measured).all(axis=-1), *deviation)
+    place = np.empty(q.shape[1], dtype=np.int64)
+    place[np.concatenate([moving, still])] = np.arange(q.shape[1])
+    at, slopes = skeleton.map.places_and_slopes(q)
+    carrier, local = skeleton.carried_markers
+    turned = skeleton.tree.segment_rotation[skeleton.marker_segments]
+    patterns, coefficients = skin
+    return SeenMarkers(
+        skeleton.tree,
+        place[skeleton.map.owner],
+        at,
+        slopes,
+        carrier,
+        local + (turned @ patterns.displaced(coefficients)[..., None])[..., 0],
+        np.ascontiguousarray(turned),
+        np.ascontiguousarray(measured),
+        information.own,
+        information.next,
+        information.second,
+        np.ascontiguousarray(patterns.values),
+        patterns.first,
+        patterns.last,
+        len(still) + 3 * len(carrier) + patterns.begin[:-1],
+    )
+
+
+@part
+def place_markers(markers: SeenMarkers, k: int, placed: PlacedMarkers) -> None:
+    """Axes and markers of frame k."""
+    a, here = len(markers.column), k % 5
+    rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
+    place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])
+    places, errors, turned = placed.places[here], placed.errors[here], placed.turned[here]
+    for m in range(len(markers.carrier)):
+        j = markers.carrier[m]
+        place_marker(rotation[j], translation[j], markers.local[k, m], places[m])
+        for r in range(3):
+            errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.own[k, m] > 0.0 else 0.0
+            for i in range(3):
+                turned[m, r, i] = 0.0
+                for h in range(3):
+                    turned[m, r, i] += rotation[j, r, h] * markers.turned[m, h, i]
