@@ -1,10 +1,15 @@
 """Arrays in a temporary file."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from kinertia.errors import KinertiaError
 from kinertia.estimation.simultaneous.kept_arrays import KeptArrays
 
 ARRAY = arrays.arrays(
@@ -36,3 +41,16 @@ def test_arrays_of_any_layout_are_kept():
     kept, array = KeptArrays(), np.arange(6.0).reshape(2, 3)
     kept.add(array.T)
     np.testing.assert_array_equal(kept.get(0)[0], array.T)
+
+
+def test_without_room_the_folder_is_named(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(KinertiaError, match="gone"):
+        KeptArrays().add(np.zeros(3))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_disk_is_an_error_that_says_so(monkeypatch):
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda: open("/dev/full", "wb"))  # noqa: SIM115
+    with pytest.raises(KinertiaError, match="No space left"):
+        KeptArrays().add(np.zeros(10_000))

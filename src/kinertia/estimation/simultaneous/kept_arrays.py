@@ -7,6 +7,8 @@ from typing import IO
 
 import numpy as np
 
+from kinertia.errors import KinertiaError
+
 
 class KeptArrays:
     """Groups of arrays in a temporary file, which is made with the first group and goes with this object.
@@ -22,12 +24,23 @@ class KeptArrays:
         self._groups: list[tuple[int, list[tuple[tuple[int, ...], np.dtype[np.generic]]]]] = []
 
     def add(self, *arrays: np.ndarray) -> None:
-        """Write a group behind those before it."""
-        if self._file is None:
-            self._file = tempfile.TemporaryFile()  # noqa: SIM115  # it lives as long as this object
-        begin = self._file.seek(0, 2)
-        for array in arrays:
-            self._file.write(np.ascontiguousarray(array).data)
+        """Write a group behind those before it.
+
+        Raises:
+            KinertiaError: there is no room for it.
+        """
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115  # it lives as long as this object
+            begin = self._file.seek(0, 2)
+            for array in arrays:
+                self._file.write(np.ascontiguousarray(array).data)
+            self._file.flush()
+        except OSError as error:
+            raise KinertiaError(
+                f"a long trial needs some 150 MB a minute in the folder for temporary files, {tempfile.gettempdir()}, "
+                f"which cannot be written ({error.strerror}): make room there, or set TMPDIR (Windows: TEMP) to another"
+            ) from error
         self._groups.append((begin, [(array.shape, array.dtype) for array in arrays]))
 
     def get(self, k: int) -> list[np.ndarray]:
