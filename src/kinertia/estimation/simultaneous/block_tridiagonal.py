@@ -48,9 +48,12 @@ class BlockBand:
         return cls(factors, carried)
 
     @cached_property
-    def single(self) -> BlockBand:
-        """In single precision."""
+    def _single(self) -> BlockBand:
         return BlockBand(self.diagonal.astype(np.float32), self.below.astype(np.float32))
+
+    def as_precise(self, precision: np.dtype[np.floating] | type[np.floating]) -> BlockBand:
+        """The same in single precision, where that is asked for."""
+        return self._single if precision == np.float32 else self
 
     def forward(self, right: np.ndarray, in_place: bool = False) -> np.ndarray:
         """Solve L x = right; right is (b, k, m), of the factor's precision, and may be written to."""

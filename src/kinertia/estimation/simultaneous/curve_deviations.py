@@ -152,8 +152,7 @@ class _MotionSpread:
     def of(cls, part: Factored, c: int, root: np.ndarray, after: _MotionSpread | None) -> _MotionSpread:
         """Of a stretch, with this root (S, S) of the static unknowns' covariance; `after` is the next stretch's."""
         start, size, precision = part.stretch.splines.start, len(root), part.border.dtype
-        band = part.band.single if precision == np.float32 else part.band
-        blocks = part.border @ root.astype(precision)
+        band, blocks = part.band.as_precise(precision), part.border @ root.astype(precision)
         if after is None:
             carried = band.backward(blocks, in_place=True)
             return cls(start, *part.band.inverse_blocks(), carried.reshape(-1, c, size))

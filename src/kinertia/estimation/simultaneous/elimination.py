@@ -179,7 +179,7 @@ def factored(
     stretch: Stretch,
     damping: float,
     carried: Carried | None,
-    precision: type[np.floating] = np.float64,
+    precision: type[np.floating],
 ) -> Factored:
     """Eliminate the splines of a stretch, with their diagonal raised by this share.
 
@@ -200,7 +200,7 @@ def factored(
         border[0] += carried.border
     own = count if stretch.is_last else count - 1
     band = BlockBand.factor(diagonal[:own], below, in_place=True)
-    same = band.single if precision == np.float32 else band
+    same = band.as_precise(precision)
     solved, left = border[:own], None
     if s:
         same.forward(solved, in_place=True)
