@@ -157,8 +157,8 @@ edit it by hand.
 {table(headings, rows)}
 
 Time is linear. Up to about a minute, counted over all trials of a fit, the normal equations are in memory as a whole.
-Those of longer walks are summed and eliminated in stretches of some seconds; what is needed again waits in a temporary
-file, some 1.5 GB for ten minutes. The results are the same to rounding. Memory grows by what there is of every frame:
+Longer walks are processed in stretches of a few seconds; intermediate results go to a temporary file, about 1.5 GB
+for ten minutes. The results are the same to rounding. Memory grows by what there is of every frame:
 markers, coordinates, loads. Of the loads, at the plates' rate, the estimate holds several copies (as measured, without
 impacts, put right, smooth): with fast plates they are most of it.
 """

@@ -25,8 +25,8 @@ _RANDOM_STATES = 60
 _ROUNDING = 1e-8
 """Share of the largest singular value below which one counts as zero."""
 _ENOUGH_FRAMES = 6000
-"""Longer motions are told by so many frames or somewhat fewer, one drawn from each few neighbours and counted for all
-of them: gains of a walk of ten minutes are the same within a tenth of a percent, and words within rounding."""
+"""Longer motions are sampled at about this many frames: one of every few neighbours, weighted for all of them. Gains
+of synthetic walks of up to ten minutes change by less than 1 %."""
 _LISTED = 6
 _NAMED_SHARE = 0.85
 _MOST_NAMES = 4

@@ -1,8 +1,8 @@
 """The motion of a trial eliminated from its normal equations, stretch by stretch.
 
-Each stretch is made, summed and eliminated in turn, and leaves to the next what it says of its first block. What is
-needed of it again, to answer gradients with steps and for the covariance of the motion, is kept: in memory of the last
-stretch, in a temporary file of those before it.
+Stretches are assembled and eliminated in turn; each passes its contribution to the first block of the next one on.
+Steps and the covariance of the motion need the factors again: those of the last stretch stay in memory, those of the
+others go to a temporary file.
 
 The border, which is most of the work, is in single precision. Gradients and the motion's own factor are in double, so
 that the optimum does not move; the information on what does not move loses nothing either, as long as eliminating the

@@ -50,7 +50,7 @@ class Gradient:
         return cls(np.zeros((size, coordinates)), np.zeros(static), 0.0)
 
     def add(self, part: Gradient, splines: slice) -> None:
-        """Add that of a stretch, whose frames touch these splines."""
+        """Add the gradient of a stretch whose frames involve these splines."""
         self.right[splines] += part.right
         self.static_right += part.static_right
         self.cost += part.cost

@@ -1,4 +1,4 @@
-"""Loads of plates put right, and their derivatives by what is wrong with the plates, frame by frame in compiled code.
+"""Plate loads corrected for the plates' errors, and their derivatives by these errors, in compiled code.
 
 A load that somebody adds to a plate is first freed of the plate's zeros, then turned about the vertical through the
 plate's middle, moved to where the plate stands, given the vertical moment that crosstalk took, and multiplied by the
@@ -24,7 +24,7 @@ def put_right(
     middles: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
-    """Loads on the feet (n, 2, 6), of plates put right.
+    """Loads on the feet (n, 2, 6), corrected for the plates' errors.
 
     Args:
         loads: (n, 2, 6) as the plates gave them: force (N), moment about the ground origin (N m).
@@ -32,7 +32,7 @@ def put_right(
         carrier: (n, 2) index of the plate under each foot.
         plates: (p, 7) what is wrong with them.
         middles: (p, 3) m, where they are turned about.
-        turn: (3, 3) from the laboratory's axes to those of the loads.
+        turn: (3, 3) rotation from the laboratory's axes to the axes of the loads.
     """
     result, own, push = np.empty(loads.shape), np.empty(6), np.empty(6)
     for i in range(loads.shape[0]):
@@ -63,7 +63,7 @@ def by_plate(
     """
     n, feet, _ = loads.shape
     result = np.zeros((n, feet, 6, len(plates), plates.shape[1]))
-    # a zero shows as a push at the plate's middle, put right like any load
+    # a zero offset acts as a force at the plate's middle, corrected like any load
     pushed, push = np.empty((len(plates), 2, 6)), np.empty(6)
     for plate in range(len(plates)):
         for k, axis in enumerate((0, 2)):
@@ -98,7 +98,7 @@ def _push(axis: int, middle: np.ndarray, turn: np.ndarray, out: np.ndarray) -> N
 
 @part
 def _put_right(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
-    """out = (6,) load of a plate put right, but for its zeros."""
+    """out = (6,) plate load, corrected for all errors except zero offsets."""
     x, y, z = middle[0], middle[1], middle[2]
     fx, fy, fz = load[0], load[1], load[2]
     # about the middle
@@ -118,7 +118,7 @@ def _put_right(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np
 
 @part
 def _by_place(load: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
-    """Write derivatives of a load (6,) put right by the plate's place to their columns of out (6, 7)."""
+    """Write the derivatives of a corrected load (6,) by the plate's position to their columns of out (6, 7)."""
     for place, axis in ((X, 0), (Z, 2)):
         x, y, z = turn[0, axis], turn[1, axis], turn[2, axis]
         out[3, place] = y * load[2] - z * load[1]
@@ -128,7 +128,7 @@ def _by_place(load: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
 
 @part
 def _by_turn(load: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
-    """Write the derivative of a load (6,) put right, of a plate at this place (3,), by its turn to out (6, 7)."""
+    """Write the derivative of a corrected load (6,) by its plate's rotation, at this position (3,), to out (6, 7)."""
     x, y, z = place[0], place[1], place[2]
     mx, mz = load[3] - (y * load[2] - z * load[1]), load[5] - (x * load[1] - y * load[0])
     # the loads are turned backwards: v becomes (-v_z, 0, v_x)

@@ -15,7 +15,7 @@ import numpy as np
 
 _MOST_PAIRS = 12
 _LEAST_CURVATURE = 0.02
-"""Along a step, over what was expected: the change of a gradient with less says nothing to go by."""
+"""Share of the expected curvature along a step; pairs with less are discarded."""
 
 
 @dataclass(frozen=True, eq=False)
