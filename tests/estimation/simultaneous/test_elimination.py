@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.estimation.simultaneous.stretches import stretches
+from kinertia.estimation.simultaneous.stretches import Stretch, stretches
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin
 from study_bound import dense_band
@@ -49,7 +49,9 @@ def longer_problem() -> MapProblem:
 
 @pytest.fixture(scope="module")
 def whole():
-    return longer_problem()
+    problem = longer_problem()
+    problem.stretches = [(Stretch.whole(basis),) for basis in problem.bases]
+    return problem
 
 
 @pytest.fixture(scope="module", params=[1, 2, 3])
@@ -117,12 +119,12 @@ def test_single_precision_loses_nothing_that_counts(cut, here, monkeypatch):
     """In units of each unknown's own information, and of how much of that with the motion known is left of it."""
     monkeypatch.setattr(elimination, "UNSAFE", np.inf)
     single = cut.eliminated(0, *here)
-    assert single.last.border.dtype == np.float32
+    assert single.middle.border.dtype == np.float32
     monkeypatch.setattr(elimination, "UNSAFE", 0.0)
     double = cut.eliminated(0, *here)
-    assert double.last.border.dtype == np.float64
+    assert double.middle.border.dtype == np.float64
     # zeros and plates of this problem are shown by next to nothing else
-    scale = np.sqrt(1.0 + np.diag(double.information) + np.diag(cut.prior_terms(here[1])[0]))
+    scale = np.sqrt(1.0 + np.diag(double.information) + np.diag(cut.prior_information(here[1])))
     left = (double.static_diagonal / scale**2).max()
     off = (single.information - double.information) / np.outer(scale, scale)
     assert np.abs(off).max() < 2e-6 * left

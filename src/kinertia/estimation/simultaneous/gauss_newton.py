@@ -95,7 +95,7 @@ class MotionAlone:
         `RangeTerms` has it.
         """
         rows = [(k, part, problem.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
-        return cls(point, tuple(problem.motion_eliminated(*row, damping, at_ends) for row in rows))
+        return cls(point, tuple(problem.eliminated(*row, damping, at_ends, bordered=False) for row in rows))
 
     def under(self, instruments: GaussianPrior) -> MotionAlone:
         """With this Gaussian for the instruments: the motion does not know of it."""

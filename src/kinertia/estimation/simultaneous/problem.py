@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -21,14 +21,14 @@ from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, RootTerms, add_root
+from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, UsedAgain, add_root
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, FootPlates, plates_with_floor
 from kinertia.estimation.simultaneous.range_terms import add_ranges
-from kinertia.estimation.simultaneous.root_terms import columns_of, root_terms
+from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.estimation.simultaneous.seen_markers import seen_markers
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import add_start
-from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
+from kinertia.estimation.simultaneous.stretches import Stretch, halves, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     from_log_cholesky,
@@ -40,6 +40,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.two_threads import side_by_side
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Observation:
     skin: SkinPatterns | None = None
     frame_products: np.ndarray | None = None
 
-    @property
+    @cached_property
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
         """(m,) deviations of the markers' errors, m, and how they go from frame to frame."""
         if self.frame_products is None:
@@ -161,6 +162,7 @@ class MapProblem:
         self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
         self.start_static[self.layout.coordinates] = [skeleton.locked[name] for name in calibration.coordinates]
         self.start_static[self.layout.locals] = skeleton.marker_locals.ravel()
+        self._room = UsedAgain()
         self.stretches = stretches_of_trials(self.bases, len(self.moving), self.layout.size)
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
@@ -223,30 +225,36 @@ class MapProblem:
             result.append(every)
         return result
 
-    def prior_terms(self, static: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Information (S, S), right-hand side (S,) and cost of all priors but the instruments'; of these, of what other
-        people of the session have shown.
-        """
-        bsp = self.bsp(static)
-        jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
-        gap = (bsp.table() - self.prior.mean.table()).ravel()
+    def prior_information(self, static: np.ndarray) -> np.ndarray:
+        """(S, S) of all priors but the instruments'; of these, of what other people of the session have shown."""
+        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
+        jacobian = block_diagonal(table_jacobian(static[theta]))
         mass_row = self.prior.on_scale @ jacobian[0::10] / self.prior.mass_sd_kg
+        result = np.diag(self.weight)
+        result[laboratory, laboratory] += self.session.information
+        result[skin, skin] += self.skin_information
+        result[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
+        return result
+
+    def prior_slope(self, static: np.ndarray) -> tuple[np.ndarray, float]:
+        """Minus the derivatives (S,) of half the sum of squares of the same priors, and that half."""
+        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
+        bsp, by_own = self.bsp(static), table_jacobian(static[theta])
+        gap = (bsp.table() - self.prior.mean.table()).ravel()
         mass_gap = (float(self.prior.on_scale @ bsp.mass_kg) - self.prior.mass_kg) / self.prior.mass_sd_kg
-        information = np.diag(self.weight)
+        pulls = (self.information @ gap).reshape(-1, 10)
+        pulls[:, 0] += mass_gap / self.prior.mass_sd_kg * self.prior.on_scale
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))
-        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
         by_session = self.session.information @ static[laboratory]
-        information[laboratory, laboratory] += self.session.information
         right[laboratory] += self.session.right - by_session
         cost += float(static[laboratory] @ (by_session - 2.0 * self.session.right))
-        information[skin, skin] += self.skin_information
-        pulled = self.skin_information @ static[skin]
-        right[skin] -= pulled
-        cost += float(static[skin] @ pulled)
-        information[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
-        right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
-        return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
+        by_skin = self.skin_information @ static[skin]
+        right[skin] -= by_skin
+        cost += float(static[skin] @ by_skin)
+        right[theta] -= np.einsum("bi,bij->bj", pulls, by_own).ravel()
+        cost += float(gap @ self.information @ gap) + mass_gap**2
+        return right, 0.5 * cost
 
     def at(self, point: Point, damping: float = 0.0, at_ends: bool = True) -> Linearised:
         """Normal equations at a point, motions eliminated with their diagonal raised by this share; `at_ends` as
@@ -254,17 +262,17 @@ class MapProblem:
         """
         rows = enumerate(point.coefficients)
         trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping, at_ends) for k, part in rows)
-        slope, information = self._slope(point, [trial.gradient for trial in trials])
-        return Linearised(slope, trials, information)
+        slope = self._slope(point, [trial.gradient for trial in trials])
+        return Linearised(slope, trials, self.prior_information(point.static))
 
     def slope(self, point: Point) -> Slope:
         """Cost and where it falls: what `at` has, in a tenth of the time."""
         rows = enumerate(point.coefficients)
-        return self._slope(point, [self.gradient(k, part, self.in_trial(k, point)) for k, part in rows])[0]
+        return self._slope(point, [self.gradient(k, part, self.in_trial(k, point)) for k, part in rows])
 
-    def _slope(self, point: Point, gradients: Sequence[Gradient]) -> tuple[Slope, np.ndarray]:
-        """With the priors, and their information (S, S)."""
-        information, right, cost = self.prior_terms(point.static)
+    def _slope(self, point: Point, gradients: Sequence[Gradient]) -> Slope:
+        """With the priors."""
+        right, cost = self.prior_slope(point.static)
         rows, motions, displaced = zip(gradients, self.displacement_sd_m, point.displaced, strict=True), [], []
         for gradient, sd, own in rows:
             right = right + gradient.static_right
@@ -273,7 +281,7 @@ class MapProblem:
             displaced.append(sd * gradient.static_right[self.layout.locals] - own)
         before, places = sum(motion.size for motion in motions), self.layout.instruments
         instruments = slice(before + places.start, before + places.stop)
-        return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, instruments), information
+        return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, instruments)
 
     def in_trial(self, k: int, point: Point) -> np.ndarray:
         """(S,) static unknowns as they are in trial k: its markers displaced."""
@@ -308,36 +316,22 @@ class MapProblem:
         zeros[self.own_plates[k]] = static[self.layout.zeros_of(k)]
         return np.hstack([self.plate_errors(static), zeros])
 
-    def add_by_plates(self, k: int, by_static: np.ndarray, by_plates: np.ndarray) -> None:
-        """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k to those by the static unknowns that
-        root equations depend on (n, r, s).
-        """
-        n, rows, *_ = by_plates.shape
-        errors = len(PLATE_ERRORS)
-        by_static[:, :, self.layout.plates] += by_plates[..., :errors].reshape(n, rows, -1) @ self.to_plates
-        by_static[:, :, self.layout.zeros_of(k)] += by_plates[:, :, self.own_plates[k], errors:]
-
     def late_s(self, k: int, static: np.ndarray) -> float:
         """By how much the forces of trial k are late."""
         return float(static[self.layout.late(k)].sum())
 
     def eliminated(
-        self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0, at_ends: bool = True
+        self,
+        k: int,
+        coefficients: np.ndarray,
+        static: np.ndarray,
+        damping: float = 0.0,
+        at_ends: bool = True,
+        bordered: bool = True,
     ) -> Eliminated:
-        """Trial k with its motion eliminated."""
-        of = partial(self.normal, k, coefficients, static, at_ends=at_ends)
-        return Eliminated.of(self.stretches[k], of, damping)
-
-    def motion_eliminated(
-        self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float, at_ends: bool
-    ) -> Eliminated:
-        """The same with all that does not move held: without information on it."""
-
-        def of(stretch: Stretch) -> NormalEquations:
-            normal = self.normal(k, coefficients, static, stretch, at_ends)
-            return replace(normal, border=normal.border[..., :0], static=normal.static[:0, :0])
-
-        return Eliminated.of(self.stretches[k], of, damping)
+        """Trial k with its motion eliminated; not `bordered`: of the motion alone, with all else held."""
+        of = partial(self.normal, k, coefficients, static, at_ends=at_ends, bordered=bordered)
+        return Eliminated.of(self.stretches[k], of, self._room.back, damping)
 
     def normal(
         self,
@@ -346,20 +340,31 @@ class MapProblem:
         static: np.ndarray,
         stretch: Stretch | None = None,
         at_ends: bool = True,
+        bordered: bool = True,
     ) -> NormalEquations:
         """Normal equations of a stretch of trial k, or of all of it."""
         stretch = stretch or Stretch.whole(self.bases[k])
-        result = NormalEquations.zero(stretch.size, len(self.moving), self.layout.size)
+        result = self._room.zero(stretch.size, len(self.moving), self.layout.size, bordered)
         self._add(result, k, coefficients, static, stretch, at_ends)
         return result
 
     def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
         """Cost of trial k and where it falls."""
-        result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
-        for stretch in self.stretches[k]:
-            part = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
-            self._add(part, k, coefficients, static, stretch)
-            result.add(part, stretch.touched)
+
+        def of_half(half: Sequence[Stretch]) -> Gradient:
+            result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
+            for stretch in half:
+                part = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
+                self._add(part, k, coefficients, static, stretch)
+                result.add(part, stretch.touched)
+            return result
+
+        parts = [half for half in halves(self.stretches[k]) if half]
+        if len(self.stretches[k]) <= 2:  # too short to gain from a second thread
+            parts = [(Stretch.whole(self.bases[k]),)]
+        result, *others = side_by_side(of_half, parts)
+        for other in others:
+            result.add(other, slice(None))
         return result
 
     def _add(
@@ -383,21 +388,46 @@ class MapProblem:
         add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving], at_ends)
         dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
         for piece in pieces(len(dynamic)):
-            terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])
-            add_root(into, layout.in_root, basis, start, terms)
+            root = self.root_frames(k, skeleton, coefficients, static, dynamic[piece])
+            if isinstance(into, NormalEquations):
+                add_root(into, layout.in_root, basis, start, root.terms(self.columns))
+            else:
+                root.add_gradient(into, self.columns, basis, start)
         add_start(into, stretch, coefficients - self.start[k])
 
-    def _root_terms(
+    def root_frames(
         self, k: int, skeleton: Skeleton, coefficients: np.ndarray, static: np.ndarray, frames: np.ndarray
-    ) -> RootTerms:
-        """The root equations at some of the dynamic frames."""
-        trial, layout, ground = self.trials[k], self.layout, self.grounds[k]
+    ) -> RootFrames:
+        """The root equations of trial k at some of its dynamic frames."""
+        trial, ground = self.trials[k], self.grounds[k]
         motion = Motion(*self.full(self.bases[k].evaluate(coefficients, frames), static))
         loads = self.foot_loads(k, static, 0, frames)
-        by_ground = np.zeros((len(frames), 6, layout.in_root.stop))
         loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
-        by_plate = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
-        self.add_by_plates(k, by_ground, by_plate)
-        by_ground[:, :, layout.late(k)] = self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
-        bsp, theta, sd = self.bsp(static), static[layout.theta], trial.root_sd(frames)
-        return root_terms(skeleton, bsp, theta, motion, loads.sum(axis=1), by_ground, sd, self.columns, frames)
+        by_plates = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
+        return RootFrames(
+            skeleton,
+            self.bsp(static),
+            static[self.layout.theta],
+            motion,
+            loads.sum(axis=1),
+            by_plates,
+            self.foot_loads(k, static, 1, frames).sum(axis=1),
+            partial(self.add_by_ground, k),
+            trial.root_sd(frames),
+            frames,
+            self.layout.in_root.stop,
+        )
+
+    def add_by_ground(self, k: int, by_static: np.ndarray, by_plates: np.ndarray, by_time: np.ndarray) -> None:
+        """`add_by_plates`, and those by the time by which the forces of trial k are late, (n, r)."""
+        self.add_by_plates(k, by_static, by_plates)
+        by_static[:, :, self.layout.late(k)] += by_time[:, :, None]
+
+    def add_by_plates(self, k: int, by_static: np.ndarray, by_plates: np.ndarray) -> None:
+        """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k to those by the static unknowns that
+        root equations depend on (n, r, s).
+        """
+        n, rows, *_ = by_plates.shape
+        errors = len(PLATE_ERRORS)
+        by_static[:, :, self.layout.plates] += by_plates[..., :errors].reshape(n, rows, -1) @ self.to_plates
+        by_static[:, :, self.layout.zeros_of(k)] += by_plates[:, :, self.own_plates[k], errors:]

@@ -7,7 +7,6 @@ once per knot interval. Where the model clamps a range the deviation is so small
 
 from __future__ import annotations
 
-import os
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,6 @@ from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEq
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.coordinate_range import Bounds
 
-MARGIN = float(os.environ.get("MARGIN", "0.01"))
 CLAMPED_SD = 0.01
 """Rad or m beyond a range that the model clamps: half a degree."""
 SD = 0.35
