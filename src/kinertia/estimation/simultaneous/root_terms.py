@@ -18,7 +18,6 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.root_columns import Columns, root_columns
 
-
 _Moving = tuple[
     KinematicTree,
     float,
