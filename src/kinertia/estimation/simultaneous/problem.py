@@ -28,7 +28,7 @@ from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.estimation.simultaneous.seen_markers import seen_markers
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import add_start
-from kinertia.estimation.simultaneous.stretches import Stretch, halves, stretches_of_trials
+from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches_of_trials
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     from_log_cholesky,
@@ -359,9 +359,9 @@ class MapProblem:
                 result.add(part, stretch.touched)
             return result
 
-        parts = [half for half in halves(self.stretches[k]) if half]
-        if len(self.stretches[k]) <= 2:  # too short to gain from a second thread
-            parts = [(Stretch.whole(self.bases[k]),)]
+        parts = [joined(half) for half in halves(self.stretches[k]) if half]
+        if len(parts) == 2 and len(parts[0]) == len(parts[1]) == 1:  # too short to gain from a second thread
+            parts = [joined(self.stretches[k])]
         result, *others = side_by_side(of_half, parts)
         for other in others:
             result.add(other, slice(None))

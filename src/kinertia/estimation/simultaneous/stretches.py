@@ -19,8 +19,13 @@ from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK,
 TOGETHER_BYTES = 2**27
 """Trials whose normal equations are together no larger, a minute of gait, are two stretches each. Beyond it memory
 counts for more than time. What is made of them takes some four times as much in passing."""
-_SHARE = 32
+_SHARE = 8
 """Of it that a stretch of longer trials takes."""
+_FRAMES_OF_GRADIENT = 2000
+"""A stretch for gradients, which need less memory, has about so many frames: fewer would take longer."""
+
+
+_SLICES = ("splines", "touched", "frames")
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,21 @@ def halves(parts: Sequence[Stretch]) -> tuple[tuple[Stretch, ...], tuple[Stretch
     """The stretches of a trial from its beginning to its middle, and from its end to its middle."""
     middle = (len(parts) + 1) // 2
     return tuple(parts[:middle]), tuple(reversed(parts[middle:]))
+
+
+def joined(half: Sequence[Stretch]) -> list[Stretch]:
+    """Neighbouring stretches, in time or backwards, as fewer and longer ones for gradients."""
+    result: list[Stretch] = []
+    for stretch in half:
+        if result and result[-1].frames.stop - result[-1].frames.start < _FRAMES_OF_GRADIENT:
+            first, last = sorted((result.pop(), stretch), key=lambda each: each.frames.start)
+            stretch = Stretch(*(_both(getattr(first, name), getattr(last, name)) for name in _SLICES))
+        result.append(stretch)
+    return result
+
+
+def _both(first: slice, last: slice) -> slice:
+    return slice(first.start, last.stop)
 
 
 def stretches_of_trials(bases: Sequence[MotionBasis], coordinates: int, static: int) -> list[tuple[Stretch, ...]]:
