@@ -7,7 +7,7 @@ bordered by what does not move.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -124,6 +124,10 @@ class CalibrationPrior:
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
     instruments: InstrumentPrior
+
+
+_Add = Callable[[Gradient, int, np.ndarray, np.ndarray, Stretch, bool], None]
+"""Adds terms of a stretch of a trial, given its coefficients and the static unknowns; then `at_ends`."""
 
 
 class MapProblem:
@@ -345,55 +349,62 @@ class MapProblem:
         """Normal equations of a stretch of trial k, or of all of it."""
         stretch = stretch or Stretch.whole(self.bases[k])
         result = self._room.zero(stretch.size, len(self.moving), self.layout.size, bordered)
-        self._add(result, k, coefficients, static, stretch, at_ends)
+        for add in self._terms:
+            add(result, k, coefficients, static, stretch, at_ends)
         return result
 
     def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
         """Cost of trial k and where it falls."""
 
-        def of_half(half: Sequence[Stretch]) -> Gradient:
+        def of_part(part: tuple[Sequence[Stretch], Sequence[_Add]]) -> Gradient:
             result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
-            for stretch in half:
-                part = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
-                self._add(part, k, coefficients, static, stretch)
-                result.add(part, stretch.touched)
+            for stretch in part[0]:
+                own = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
+                for add in part[1]:
+                    add(own, k, coefficients, static, stretch, True)
+                result.add(own, stretch.touched)
             return result
 
-        parts = [joined(half) for half in halves(self.stretches[k]) if half]
-        if len(parts) == 2 and len(parts[0]) == len(parts[1]) == 1:  # too short to gain from a second thread
-            parts = [joined(self.stretches[k])]
-        result, *others = side_by_side(of_half, parts)
+        (of_markers, of_root), longer = self._terms, [joined(half) for half in halves(self.stretches[k]) if half]
+        parts: list[tuple[Sequence[Stretch], Sequence[_Add]]] = [(half, self._terms) for half in longer]
+        if sum(map(len, longer)) <= 2:  # too short for halves
+            parts = [(joined(self.stretches[k]), [add]) for add in (of_markers, of_root)]
+        result, *others = side_by_side(of_part, parts)
         for other in others:
             result.add(other, slice(None))
         return result
 
-    def _add(
-        self,
-        into: Gradient,
-        k: int,
-        coefficients: np.ndarray,
-        static: np.ndarray,
-        stretch: Stretch,
-        at_ends: bool = True,
+    @property
+    def _terms(self) -> tuple[_Add, _Add]:
+        """What adds the terms of a stretch of trial k."""
+        return self._add_to_markers, self._add_to_root
+
+    def _add_to_markers(
+        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch, at_ends: bool
     ) -> None:
-        """Add all terms of a stretch of trial k."""
+        """Add those of markers, ranges and the start."""
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
-        near, start = stretch.with_neighbours, stretch.splines.start
-        skeleton = self.placed(static)
+        near = stretch.with_neighbours
         noise, skin = trial.marker_process, (self.skin[k].cut(near), static[layout.skin])
         q = self.full(basis.evaluate(coefficients, near), static)[0]
-        markers = seen_markers(skeleton, trial.markers[near], q, noise, skin, self.moving, self.still)
+        markers = seen_markers(self.placed(static), trial.markers[near], q, noise, skin, self.moving, self.still)
         add_markers(into, layout.in_markers, basis, stretch, markers, len(self.still))
         inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
         add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving], at_ends)
-        dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
+        add_start(into, stretch, coefficients - self.start[k])
+
+    def _add_to_root(
+        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch, at_ends: bool
+    ) -> None:
+        """Add those of the root equations."""
+        basis, start, skeleton = self.bases[k], stretch.splines.start, self.placed(static)
+        dynamic = stretch.frames.start + np.flatnonzero(self.trials[k].dynamic[stretch.frames])
         for piece in pieces(len(dynamic)):
             root = self.root_frames(k, skeleton, coefficients, static, dynamic[piece])
             if isinstance(into, NormalEquations):
-                add_root(into, layout.in_root, basis, start, root.terms(self.columns))
+                add_root(into, self.layout.in_root, basis, start, root.terms(self.columns))
             else:
                 root.add_gradient(into, self.columns, basis, start)
-        add_start(into, stretch, coefficients - self.start[k])
 
     def root_frames(
         self, k: int, skeleton: Skeleton, coefficients: np.ndarray, static: np.ndarray, frames: np.ndarray
