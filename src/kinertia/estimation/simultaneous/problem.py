@@ -126,8 +126,8 @@ class CalibrationPrior:
     instruments: InstrumentPrior
 
 
-_Add = Callable[[Gradient, int, np.ndarray, np.ndarray, Stretch, bool], None]
-"""Adds terms of a stretch of a trial, given its coefficients and the static unknowns; then `at_ends`."""
+_Add = Callable[[Gradient, int, np.ndarray, np.ndarray, Stretch], None]
+"""Adds terms of a stretch of a trial, given its coefficients and the static unknowns."""
 
 
 class MapProblem:
@@ -260,12 +260,10 @@ class MapProblem:
         cost += float(gap @ self.information @ gap) + mass_gap**2
         return right, 0.5 * cost
 
-    def at(self, point: Point, damping: float = 0.0, at_ends: bool = True) -> Linearised:
-        """Normal equations at a point, motions eliminated with their diagonal raised by this share; `at_ends` as
-        `RangeTerms` has it.
-        """
+    def at(self, point: Point, damping: float = 0.0) -> Linearised:
+        """Normal equations at a point, motions eliminated with their diagonal raised by this share."""
         rows = enumerate(point.coefficients)
-        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping, at_ends) for k, part in rows)
+        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping) for k, part in rows)
         slope = self._slope(point, [trial.gradient for trial in trials])
         return Linearised(slope, trials, self.prior_information(point.static))
 
@@ -330,11 +328,10 @@ class MapProblem:
         coefficients: np.ndarray,
         static: np.ndarray,
         damping: float = 0.0,
-        at_ends: bool = True,
         bordered: bool = True,
     ) -> Eliminated:
         """Trial k with its motion eliminated; not `bordered`: of the motion alone, with all else held."""
-        of = partial(self.normal, k, coefficients, static, at_ends=at_ends, bordered=bordered)
+        of = partial(self.normal, k, coefficients, static, bordered=bordered)
         return Eliminated.of(self.stretches[k], of, self._room.back, damping)
 
     def normal(
@@ -343,14 +340,13 @@ class MapProblem:
         coefficients: np.ndarray,
         static: np.ndarray,
         stretch: Stretch | None = None,
-        at_ends: bool = True,
         bordered: bool = True,
     ) -> NormalEquations:
         """Normal equations of a stretch of trial k, or of all of it."""
         stretch = stretch or Stretch.whole(self.bases[k])
         result = self._room.zero(stretch.size, len(self.moving), self.layout.size, bordered)
         for add in self._terms:
-            add(result, k, coefficients, static, stretch, at_ends)
+            add(result, k, coefficients, static, stretch)
         return result
 
     def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
@@ -361,7 +357,7 @@ class MapProblem:
             for stretch in part[0]:
                 own = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
                 for add in part[1]:
-                    add(own, k, coefficients, static, stretch, True)
+                    add(own, k, coefficients, static, stretch)
                 result.add(own, stretch.touched)
             return result
 
@@ -380,7 +376,7 @@ class MapProblem:
         return self._add_to_markers, self._add_to_root
 
     def _add_to_markers(
-        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch, at_ends: bool
+        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch
     ) -> None:
         """Add those of markers, ranges and the start."""
         trial, basis, layout = self.trials[k], self.bases[k], self.layout
@@ -390,11 +386,11 @@ class MapProblem:
         markers = seen_markers(self.placed(static), trial.markers[near], q, noise, skin, self.moving, self.still)
         add_markers(into, layout.in_markers, basis, stretch, markers, len(self.still))
         inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
-        add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving], at_ends)
+        add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving])
         add_start(into, stretch, coefficients - self.start[k])
 
     def _add_to_root(
-        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch, at_ends: bool
+        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch
     ) -> None:
         """Add those of the root equations."""
         basis, start, skeleton = self.bases[k], stretch.splines.start, self.placed(static)

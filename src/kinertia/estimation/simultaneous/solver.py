@@ -84,17 +84,16 @@ class SimultaneousResult:
     cost: tuple[float, float]
 
 
-CONVERGED = 3e-3
+CONVERGED = 1e-3
 """Promised decrease of half the sum of squares below which a step is the last of the search: with the one at the end of
 it, from a quadratic of its own, no quantity is then further from the optimum than some hundredths of its deviation."""
-_ENDED = 0.05
-"""What that one may promise; else the search goes on."""
+_ENDED = 0.02
+"""What a step with that quadratic may promise where it was made; else the search goes on. A quadratic made as near as
+this that has led to the last step is the last one, too."""
 _NEAR = 8.0
 """Promised decrease from which on gradients alone are followed: above it a new quadratic is worth its time."""
 _MOST_GRADIENTS = 10
 """With one quadratic."""
-_BLOCKED = 0.5
-"""Share of a step: where no more of it can be taken, coordinates meet the ends of their ranges."""
 _FIRST_DAMPING = 1e-5
 """Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
 information: 1e-3 would hold the first steps back."""
@@ -160,9 +159,8 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> _Ended:
     while True:
         iterations += 1
         last = at.converged or damping > _STUCK or iterations == _MAX_ITERATIONS
-        at_ends = last or not at.slow
         damping = _LEAST_DAMPING if last else damping
-        here = problem.at(at.slope.point, damping, at_ends)
+        here = problem.at(at.slope.point, damping)
         scale = np.maximum(scale, np.diag(here.information) + sum(trial.static_diagonal for trial in here.trials))
         static = here.point.like(here.slope.right).static
         model = GaussNewton.of(problem, here, damping * scale + problem.bends(static))
@@ -170,11 +168,17 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> _Ended:
         if last:
             end = _last_step(problem, model, at)
             if end.converged or not at.converged or iterations >= _MAX_ITERATIONS:
-                cost = begin, end.slope.under(end.judged.gaussian)[0]
-                return _Ended(end.slope.point, here, end.judged.gaussian, end.converged, iterations, cost)
-        at = _descended(problem, model, at._replace(slope=here.slope), at_ends, iterations > 1, CONVERGED)
+                return _ended(begin, end, here, iterations)
+        at = _descended(problem, model, at._replace(slope=here.slope), iterations > 1, CONVERGED)
+        if at.converged and at.began < _ENDED and damping == _LEAST_DAMPING:
+            return _ended(begin, at, here, iterations)
         stuck = at.slope.point is here.point
         damping = max(100.0 * damping, 1e-4) if stuck else max(0.01 * damping, _LEAST_DAMPING)
+
+
+def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> _Ended:
+    cost = begin, at.slope.under(at.judged.gaussian)[0]
+    return _Ended(at.slope.point, here, at.judged.gaussian, at.converged, iterations, cost)
 
 
 class _Judged(NamedTuple):
@@ -202,22 +206,20 @@ class _Judged(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Where the search is, whether the last step was short, and whether gradients with the last quadratic all brought
-    something, to the last of them: what it takes for held at the ends of ranges may then keep the search back.
-    """
+    """Where the search is, whether the last step was short, and what the first one with the last quadratic promised."""
 
     slope: Slope
     judged: _Judged
     converged: bool = False
-    slow: bool = False
+    began: float = np.inf
 
 
 def _descended(
-    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, at_ends: bool, judging: bool, tolerance: float
+    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, judging: bool, tolerance: float
 ) -> _Place:
     """Quasi-Newton steps with one quadratic, as long as they are worth it."""
     slope, judged = at.slope, at.judged
-    pairs, places = SecantPairs.none(len(slope.right)), slope.instruments
+    pairs, places, began = SecantPairs.none(len(slope.right)), slope.instruments, np.inf
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, judged)
         if judging and isinstance(model, GaussNewton):
@@ -226,22 +228,19 @@ def _descended(
                 pairs = pairs.stiffer(places, again.gaussian.precision - judged.gaussian.precision)
                 judged = again
                 step, promised = _answer(slope, model, pairs, judged)
+        began = began if count else promised
         if 0.0 <= promised < tolerance:
-            return _Place(_moved(problem, slope, step), judged, True)
+            return _Place(_moved(problem, slope, step), judged, True, began)
         if (count and promised > _NEAR) or not promised > 0.0:
             break
         there = _lower(problem, slope, judged.gaussian, step, promised)
         if there is None:
             break
         taken = there.point.vector - slope.point.vector
-        if not at_ends and np.linalg.norm(taken) < _BLOCKED * np.linalg.norm(step):
-            return _Place(there, judged)
         change = slope.right - there.right
         change[places] += judged.gaussian.precision @ taken[places]
         expected = 2.0 * promised * float(taken @ step) / float(step @ step)
         slope, pairs = there, pairs.with_pair(taken, change, expected)
-    else:
-        return _Place(slope, judged, slow=True)
     return _Place(slope, judged)
 
 
@@ -306,9 +305,8 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     following = MapProblem(problem.skeleton, problem.prior, problem.calibration, sure)
     at = _Place(following.slope(point), _Judged.at_first(following))
     for _ in range(_MOST_THROUGH_IMPACTS):
-        at_ends = not at.slow
-        alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING, at_ends)
-        at = _descended(following, alone, at, at_ends, judging=False, tolerance=_MOTION_CONVERGED)
+        alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING)
+        at = _descended(following, alone, at, judging=False, tolerance=_MOTION_CONVERGED)
         if at.converged:
             break
     return at.slope.point.coefficients
