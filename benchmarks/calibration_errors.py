@@ -10,8 +10,9 @@ import numpy as np
 from bsp_errors import errors
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.problem import CalibrationPrior
-from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
+from kinertia.estimation.simultaneous.outcome import SimultaneousResult
+from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.motion.smoothing import smooth
 from kinertia.studies.accuracy import held

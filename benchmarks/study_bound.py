@@ -12,7 +12,8 @@ import numpy as np
 
 from kinertia.estimation.calibration import marker_jacobian
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.problem import MapProblem, Observation
+from kinertia.estimation.simultaneous.observed_trial import Observation
+from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.studies.accuracy import at_truth, held

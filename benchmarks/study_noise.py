@@ -10,7 +10,7 @@ import numpy as np
 from bsp_errors import errors
 from kinertia.estimation.prior import BspPrior, with_symmetry
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.problem import Observation
+from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, estimate_two_level

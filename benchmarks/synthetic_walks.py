@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.observation import observe
-from kinertia.estimation.simultaneous.problem import Observation
+from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.studies.table1 import MARGIN_S, symmetric_truth
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,12 +14,14 @@ from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
-from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
 from kinertia.io.osim.reader import read_osim
+from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.ground_reactions import GroundReactions
@@ -160,6 +163,9 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     values = dict(zip(problem.plates, of_plates, strict=True))
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
     x, z, gain, free_moment = np.moveaxis(here, -1, 0)
+    gains = iter(static[layout.gains])
+    own_gains = [np.array([next(gains) for _ in each.ground.plates]) for each in problem.trials][k]
+    gain = gain + own_gains[trial.ground.carrier]
     zeros = iter(static[layout.zeros].reshape(-1, 2))
     own_zeros = [np.array([next(zeros) for _ in each.ground.plates]) for each in problem.trials][k]
     zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.carrier], -1, 0)
@@ -177,11 +183,30 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     loads *= 1.0 + gain[..., None]
     forces = axis_forces(rigid, skeleton.map.motion(q, qd, qdd))
     load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
+    for kappa in static[layout.trunks][k : k + 1]:
+        load += kappa * bending(problem, skeleton, (q, qd, qdd), loads[..., :3].sum(axis=1))
     left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
     moved = coefficients - _start(problem, k)
     tied = (moved / AWAY_SD).ravel(), (np.diff(moved, axis=0) / CHANGE_SD).ravel()
     return np.concatenate([errors, left[trial.dynamic].ravel(), *tied])
+
+
+def bending(problem: MapProblem, skeleton: Skeleton, motion: Sequence[np.ndarray], force: np.ndarray) -> np.ndarray:
+    """(n, 6) load at the ground origin per kg m that stays upright while the trunk leans, from places at five times."""
+    q, qd, qdd = motion
+    row = next(k for k, name in enumerate(problem.segments) if segment_of(name) == "torso")
+    number = skeleton.segments.index(problem.segments[row])
+    height = 1.5 * problem.prior.mean.com_m[row, 1]
+    steps = 2e-3 * np.arange(-2.0, 3.0)
+    poses = [skeleton.pose(q + t * qd + 0.5 * t**2 * qdd) for t in steps]
+    each = np.array([(p.rotation[:, number, :, 1], p.translation[:, number]) for p in poses])
+    weights = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0 / (steps[-1] - steps[-2]) ** 2
+    (along, place), (turned, moved) = each[2], np.tensordot(weights, each, 1)
+    specific = np.add(moved, [0.0, skeleton.gravity_m_s2, 0.0])
+    moment = np.cross(place, -turned) - np.cross(along, specific + 2.0 * height * turned)
+    moment += np.cross([0.0, 1.0, 0.0], force / problem.prior.mass_kg)
+    return np.hstack([-turned, moment])
 
 
 @lru_cache(maxsize=1)

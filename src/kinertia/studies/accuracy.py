@@ -20,8 +20,9 @@ from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.observation import observe
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.joint_names import JOINTS

@@ -9,8 +9,9 @@ from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
+from kinertia.estimation.simultaneous.outcome import Ended
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.solver import _deviations, _Ended
+from kinertia.estimation.simultaneous.solver import _deviations
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
@@ -188,7 +189,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     gaussian = GaussianPrior.of(pair.instruments)
     chains, information, right = dense_pair(pair, here, gaussian)
     covariance = inverse(information)
-    static_covariance, sds = _deviations(pair, _Ended(here.point, here, gaussian, True, 1, (0.0, 0.0)))
+    static_covariance, sds = _deviations(pair, Ended(here.point, here, gaussian, True, 1, (0.0, 0.0)))
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(

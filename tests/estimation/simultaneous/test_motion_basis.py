@@ -67,3 +67,17 @@ def test_last_frame_belongs_to_the_last_interval():
     basis = MotionBasis(np.linspace(0.0, 1.0, 11), 0.1)
     assert basis.first[-1] == basis.size - 6
     np.testing.assert_allclose(basis.values[0, -1].sum(), 1.0)
+
+
+@pytest.mark.parametrize("phase", [0.25, 0.5])
+def test_knots_moved_by_a_phase_make_splines_as_good(basis, phase):
+    moved = MotionBasis(TIME, 0.07, phase)
+    step = basis.knots[1] - basis.knots[0]
+    np.testing.assert_allclose(moved.knots[: len(basis.knots)], basis.knots - phase * step)
+    assert moved.size == basis.size + 1
+    np.testing.assert_allclose(moved.values[0].sum(axis=1), 1.0, atol=1e-12)
+    quintic = np.polynomial.Polynomial([0.1, -2.0, 3.0, 1.0, -4.0, 2.0], domain=[3.0, 4.0])
+    orders = moved.evaluate(moved.fit(quintic(TIME)[:, None]))
+    for order, values in enumerate(orders):
+        expected = quintic.deriv(order)(TIME) if order else quintic(TIME)
+        np.testing.assert_allclose(values[10:-10, 0], expected[10:-10], atol=2e-3 * np.abs(expected).max())

@@ -8,7 +8,8 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous import motion_noise as module
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
-from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from small_problem import INSTRUMENTS, small_ground
 

@@ -39,7 +39,9 @@ def sloped(function, size: float) -> float:
     return (function(size) - function(-size)) / (2 * size)
 
 
-@pytest.mark.parametrize("kind", ["theta", "coordinates", "locals", "skin", "plates", "clock", "zeros"])
+@pytest.mark.parametrize(
+    "kind", ["theta", "coordinates", "locals", "skin", "plates", "clock", "zeros", "gains", "trunks"]
+)
 def test_gradient_of_static_unknowns(problem, here, kind):
     coefficients, static = here
     part = getattr(problem.layout, kind)
@@ -217,8 +219,10 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     displaced = replace(trial, displacement_sd_m=sd)
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial])
     own = np.random.default_rng(0).normal(size=(len(sd), 3))
-    same_zeros = np.insert(static, problem.layout.zeros.stop, static[problem.layout.zeros])
-    on_time = np.insert(same_zeros, [pair.layout.delays.start] * 2, 0.0)
+    parts = problem.layout.zeros, problem.layout.gains, problem.layout.trunks
+    where = np.repeat([part.stop for part in parts], [part.stop - part.start for part in parts])
+    same = np.insert(static, where, static[parts[0].start : parts[-1].stop])
+    on_time = np.insert(same, [pair.layout.delays.start] * 2, 0.0)
     at = Point((coefficients, coefficients), on_time, (own.ravel(), np.zeros(own.size)))
     moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - on_time[pair.layout.locals].reshape(-1, 3)
     np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)

@@ -9,8 +9,8 @@ from calibration_errors import DISTURBANCES, calibrated
 from kinertia.estimation.prior import literature_prior, with_symmetry
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, FootPlates
-from kinertia.estimation.simultaneous.problem import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters

@@ -12,7 +12,7 @@ square: whether it acts on the joints or is spent on segments that slow down is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -48,6 +48,10 @@ class CurveDeviations:
     moments: np.ndarray
     powers: np.ndarray
     ground_forces: np.ndarray
+
+    def and_of(self, other: CurveDeviations) -> CurveDeviations:
+        """With what is independent of it."""
+        return CurveDeviations(*(np.hypot(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
 
     @classmethod
     def filled(cls, d: int, c: int, value: float) -> CurveDeviations:

@@ -16,9 +16,11 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
+from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
-from kinertia.estimation.simultaneous.problem import CalibrationPrior
-from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
@@ -35,6 +37,8 @@ TRUNK_PLACE_SD_M = 0.08
 """Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
 _VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
 _DISPLACED_M = 0.03
+BENDING_IN = "trunk bending in "
+"""Before the name of a trial, among what is calibrated."""
 CONTRADICTION_SD = 3.0
 """A parameter this many prior SDs from the prior's mean contradicts the model."""
 
@@ -142,7 +146,7 @@ def fit_simultaneous(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, uncertainty, result, [each.trial.name for each in trials]),
+        _calibration(used, uncertainty, result, [each.trial.name for each in trials], prior.mass_kg),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -201,7 +205,11 @@ def calibration_prior(
 
 
 def _calibration(
-    skeleton: Skeleton, uncertainty: ModelUncertainty, result: SimultaneousResult, trials: Sequence[str]
+    skeleton: Skeleton,
+    uncertainty: ModelUncertainty,
+    result: SimultaneousResult,
+    trials: Sequence[str],
+    mass_kg: float,
 ) -> dict[str, dict[str, float | str]]:
     calibration: dict[str, dict[str, float | str]] = {}
     known = uncertainty.instruments
@@ -228,6 +236,11 @@ def _calibration(
             name = _plate(plate if trials_of[plate] == 1 else plate_of_trial(plate, trial))
             for (unknown, unit), value, sd in zip(ZERO_UNKNOWNS.items(), values, sds, strict=True):
                 calibration[f"{name}: {unknown}"] = _entry(value, known.zero_n.sd, sd, unit)
+    for trial, gains in zip(trials, result.gains, strict=True):
+        for plate, (gain, sd) in gains.items():
+            calibration[f"{_plate(plate)}: gain in {trial}"] = _entry(gain, known.trial_gain.sd, sd, "1")
+    for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False):
+        calibration[f"{BENDING_IN}{trial}"] = _entry(kappa, mass_kg * BENDING_PRIOR_M.sd, sd, "kg m")
     return calibration
 
 

@@ -26,6 +26,7 @@ SHOWN_UNIT = {
     "N": (1.0, "N"),
     "rad": (180.0 / np.pi, "degrees"),
     "N m/N": (1e3, "N m/kN"),
+    "kg m": (1.0, "kg m"),
 }
 """Factor and unit in which people read a calibrated quantity."""
 

@@ -13,7 +13,8 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 @dataclass(frozen=True)
 class Layout:
     """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's. Of several
-    trials each has a delay of its own besides the clock's. Zeros are those of each trial's plates.
+    trials each has a delay of its own besides the clock's. Zeros and gains are those of each trial's plates, the gains
+    beside those of all trials, trunks how much bends in each trial (`trunk_bending`).
     """
 
     theta: slice
@@ -21,6 +22,8 @@ class Layout:
     clock: int
     delays: slice
     zeros: slice
+    gains: slice
+    trunks: slice
     coordinates: slice
     locals: slice
     skin: slice
@@ -36,16 +39,19 @@ class Layout:
         n_delays: int,
         plates_of_trials: Sequence[int],
         n_skin: int,
+        n_trunks: int = 0,
     ) -> Layout:
         """The layout for these numbers of unknowns; of trials, how many plates each has."""
         n_instruments = len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS)
         n_zeros = len(ZERO_UNKNOWNS) * sum(plates_of_trials)
-        counts = [n_bsp, n_instruments, 1, n_delays, n_zeros, n_coordinates, 3 * n_markers, n_skin]
+        own = [n_delays, n_zeros, sum(plates_of_trials), n_trunks]
+        counts = [n_bsp, n_instruments, 1, *own, n_coordinates, 3 * n_markers, n_skin]
         ends = np.cumsum(counts).tolist()
-        theta, plates, clock, delays, zeros, coordinates, places, skin = (
+        theta, plates, clock, delays, zeros, gains, trunks, coordinates, places, skin = (
             slice(end - count, end) for end, count in zip(ends, counts, strict=True)
         )
-        return cls(theta, plates, clock.start, delays, zeros, coordinates, places, skin, tuple(plates_of_trials))
+        of_trials = delays, zeros, gains, trunks
+        return cls(theta, plates, clock.start, *of_trials, coordinates, places, skin, tuple(plates_of_trials))
 
     @property
     def laboratory(self) -> slice:
@@ -54,8 +60,9 @@ class Layout:
 
     @property
     def instruments(self) -> slice:
-        """The same, and what each trial has of its own: a delay, and its plates' zeros."""
-        return slice(self.plates.start, self.zeros.stop)
+        """The same, and what each trial has of its own: a delay, its plates' zeros and gains, and how much
+        the trunk bends."""
+        return slice(self.plates.start, self.trunks.stop)
 
     def late(self, trial: int) -> list[int]:
         """Which unknowns add up to the time by which the forces of a trial are late."""
@@ -66,6 +73,11 @@ class Layout:
         each = len(ZERO_UNKNOWNS)
         first = self.zeros.start + each * sum(self.plates_of_trials[:trial])
         return np.arange(first, first + each * self.plates_of_trials[trial]).reshape(-1, each)
+
+    def gains_of(self, trial: int) -> np.ndarray:
+        """(q,) where the gains of the q plates of a trial stand."""
+        first = self.gains.start + sum(self.plates_of_trials[:trial])
+        return np.arange(first, first + self.plates_of_trials[trial])
 
     @property
     def in_root(self) -> slice:

@@ -21,6 +21,8 @@ _ROUNDING = 1e-9
 class MotionBasis:
     """Uniform quintic B-splines over a trial's time, with knots no closer than every second frame.
 
+    The first knot is at the first frame, or a `phase` of a knot interval (0 to 1) before it.
+
     Six splines are active at any time, and seven at a frame and the two after it.
 
     Attributes:
@@ -29,16 +31,17 @@ class MotionBasis:
         values: (3, n, 6) values of the active splines and their first two time derivatives.
     """
 
-    def __init__(self, time: np.ndarray, spacing_s: float) -> None:
+    def __init__(self, time: np.ndarray, spacing_s: float, phase: float = 0.0) -> None:
         intervals = (time[-1] - time[0]) / spacing_s * (1.0 - _ROUNDING)
         count = min(max(1, int(np.ceil(intervals))), (len(time) - 1) // 2)
         step = (time[-1] - time[0]) / count
-        knots = time[0] + step * np.arange(-_DEGREE, count + _ACTIVE)
+        begin, count = time[0] - phase * step, count + (phase > 0.0)
+        knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
-        self.first = np.minimum(((time - time[0]) / step + _ROUNDING).astype(int), count - 1)
+        self.first = np.minimum(((time - begin) / step + _ROUNDING).astype(int), count - 1)
         # on a uniform grid all splines are one, shifted
         shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
-        local = (time - time[0]) / step - self.first
+        local = (time - begin) / step - self.first
         at = local[:, None] + np.arange(_DEGREE, -1, -1)
         self.values = np.stack([shape.derivative(d)(at) / step**d if d else shape(at) for d in range(3)])
         self.active = self.first[:, None] + np.arange(_ACTIVE)

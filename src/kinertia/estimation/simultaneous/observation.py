@@ -22,11 +22,12 @@ from kinertia.estimation.simultaneous.marker_noise import (
     taken_by_chance,
     weighed,
 )
+from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.plates import FootPlates, plate_middles
-from kinertia.estimation.simultaneous.problem import Observation
 from kinertia.estimation.simultaneous.repetition import repeats
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
+from kinertia.estimation.simultaneous.soft_parts import swing_factors
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import ground_reactions
@@ -207,6 +208,9 @@ def _observed(
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     ground, dynamic = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force), kinematics.inside(time)
     force = ground.loads(time).reshape(-1, 2, 6)[..., :3].sum(axis=1)
+    weight_n = mass_kg * GRAVITY_M_S2
+    impact = impact_factors(time, force, dynamic, bandwidth.spacing_s, force_sd)
+    swing = swing_factors(time, force, dynamic, weight_n, FORCE_SD_OF_WEIGHT * weight_n)
     return (
         Observation(
             time=time,
@@ -219,7 +223,7 @@ def _observed(
             ground=ground,
             force_sd=force_sd,
             moment_sd=MOMENT_ARM_M * force_sd,
-            impact=impact_factors(time, force, dynamic, bandwidth.spacing_s, force_sd),
+            impact=np.sqrt(np.square(impact) + np.square(swing) - 1.0),
             skin=skin,
             frame_products=products,
         ),

@@ -7,28 +7,28 @@ bordered by what does not move.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.elimination import Eliminated
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
-from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, UsedAgain, add_root
-from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, FootPlates, plates_with_floor
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.plate_loads import GAIN
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.range_terms import add_ranges
 from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.estimation.simultaneous.seen_markers import seen_markers
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import add_start
 from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches_of_trials
+from kinertia.estimation.simultaneous.trunk_bending import TrunkBending
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     from_log_cholesky,
@@ -41,90 +41,6 @@ from kinertia.motion.dynamics import Motion
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.two_threads import side_by_side
-
-
-@dataclass(frozen=True)
-class Observation:
-    """One trial as the estimator sees it.
-
-    Attributes:
-        time: (n,) s, uniform.
-        markers: (n, m, 3) m in the order of the skeleton's markers; NaN where not seen.
-        marker_sd: (m,) effective deviation of each marker coordinate in one frame, m.
-        marker_frames: over how many neighbouring frames these errors are alike (`marker_errors`).
-        q: (n, c) start.
-        spacing_s: of the splines that its motion is made of (`bandwidth`).
-        dynamic: (n,) frames whose ground contacts are all measured.
-        ground: the loads on the feet, and the plates that measured them.
-        force_sd, moment_sd: effective deviations of the root residual, N and N m, ...
-        impact: (n,) ... and by how much they are larger in each frame (`impacts`).
-        displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
-        repeats: by how much errors that come back have raised all variances (`repeated`).
-        skin: what the skin may follow; None: it does not move with the joints.
-        frame_products: (k, 3, 3) of several kinds of errors, over their deviations, the mean products of a frame's and
-            of the two before it; None: of a process with a double pole.
-    """
-
-    time: np.ndarray
-    markers: np.ndarray
-    marker_sd: np.ndarray
-    marker_frames: float
-    q: np.ndarray
-    spacing_s: float
-    dynamic: np.ndarray
-    ground: FootPlates
-    force_sd: float
-    moment_sd: float
-    impact: np.ndarray | float = 1.0
-    displacement_sd_m: np.ndarray | float = 0.0
-    repeats: float = 1.0
-    skin: SkinPatterns | None = None
-    frame_products: np.ndarray | None = None
-
-    @cached_property
-    def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
-        """(m,) deviations of the markers' errors, m, and how they go from frame to frame."""
-        if self.frame_products is None:
-            return self.marker_sd, ErrorProcess.alike_over(self.marker_frames)
-        process, variance = ErrorProcess.read(self.marker_frames, self.frame_products)
-        return np.sqrt(variance) * self.marker_sd, process
-
-    def root_sd(self, frames: np.ndarray) -> np.ndarray:
-        """(d, 6) deviations of the root residual in these frames: N, N m."""
-        larger = np.broadcast_to(self.impact, len(self.time))[frames]
-        result: np.ndarray = np.outer(larger, np.repeat([self.force_sd, self.moment_sd], 3))
-        return result
-
-    def repeated(self, times: float) -> Observation:
-        """The same where its errors come back so many times in all that is estimated from.
-
-        Larger deviations leave more room for what is new in a frame, the cameras' noise: it does not come back.
-        """
-        more = np.sqrt(times)
-        return replace(
-            self,
-            marker_sd=more * self.marker_sd,
-            force_sd=more * self.force_sd,
-            moment_sd=more * self.moment_sd,
-            repeats=times * self.repeats,
-            frame_products=None if self.frame_products is None else self.frame_products / times,
-        )
-
-
-@dataclass(frozen=True)
-class CalibrationPrior:
-    """Prior deviations of the calibration; the skeleton as it stands is the mean.
-
-    Attributes:
-        coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
-        marker_sd_m: (m,) of each marker's position in its segment, each axis.
-        instruments: priors of plates and clock.
-    """
-
-    coordinates: Mapping[str, float]
-    marker_sd_m: np.ndarray
-    instruments: InstrumentPrior
-
 
 _Add = Callable[[Gradient, int, np.ndarray, np.ndarray, Stretch], None]
 """Adds terms of a stretch of a trial, given its coefficients and the static unknowns."""
@@ -139,6 +55,7 @@ class MapProblem:
         prior: BspPrior,
         calibration: CalibrationPrior,
         trials: Sequence[Observation],
+        phase: float = 0.0,
     ) -> None:
         self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
         self.free = skeleton.free(calibration.coordinates)
@@ -146,7 +63,7 @@ class MapProblem:
         self.moving = np.array([names.index(name) for name in skeleton.coordinates])
         self.still = np.array([names.index(name) for name in calibration.coordinates], dtype=int)
         self.segments = prior.mean.segments
-        self.bases = [MotionBasis(trial.time, trial.spacing_s) for trial in trials]
+        self.bases = [MotionBasis(trial.time, trial.spacing_s, phase) for trial in trials]
         self.start = [basis.fit(trial.q) for basis, trial in zip(self.bases, trials, strict=True)]
         self.plates = tuple(dict.fromkeys(name for trial in trials for name in trial.ground.plates))
         self.grounds = [trial.ground.among(self.plates) for trial in trials]
@@ -158,7 +75,9 @@ class MapProblem:
         n_delays = len(trials) if len(trials) > 1 or calibration.instruments.session else 0
         plates_of_trials = list(map(len, self.own_plates))
         unknowns = (len(self.still), count, len(self.plates), n_delays, plates_of_trials, self.skin[0].size)
-        self.layout = Layout.of(10 * len(self.segments), *unknowns)
+        self.trunk = TrunkBending.of(prior.mean, prior.mass_kg)
+        trunks = [self.trunk.prior] * len(trials) if self.trunk else []
+        self.layout = Layout.of(10 * len(self.segments), *unknowns, len(trunks))
         self.columns = columns_of(self.free, self.segments, self.moving, self.still, self.layout)
         self.displacement_sd_m = [np.repeat(np.broadcast_to(trial.displacement_sd_m, count), 3) for trial in trials]
         self.information = np.linalg.inv(prior.covariance)
@@ -172,10 +91,16 @@ class MapProblem:
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
         deviation[self.layout.locals] = np.repeat(calibration.marker_sd_m, 3)
         n_zeros = self.layout.zeros.stop - self.layout.zeros.start
-        self.instruments = calibration.instruments.of_unknowns(self.plates, n_delays, n_zeros)
+        self.instruments = calibration.instruments.of_unknowns(
+            self.plates, n_delays, n_zeros, sum(plates_of_trials), trunks
+        )
         self.session = calibration.instruments.of_session(self.plates)
         self.weight = 1.0 / np.square(deviation)
         self.skin_information = self.skin[0].information()
+
+    def with_knots_moved(self, phase: float) -> MapProblem:
+        """The same where splines have knots this share of an interval earlier."""
+        return MapProblem(self.skeleton, self.prior, self.calibration, self.trials, phase)
 
     @property
     def beginning(self) -> Point:
@@ -314,9 +239,10 @@ class MapProblem:
 
     def plates_in(self, k: int, static: np.ndarray) -> np.ndarray:
         """(p, 7) what is wrong with every plate in trial k: PLATE_ERRORS, ZERO_UNKNOWNS."""
-        zeros = np.zeros((len(self.plates), len(ZERO_UNKNOWNS)))
+        errors, zeros = self.plate_errors(static), np.zeros((len(self.plates), len(ZERO_UNKNOWNS)))
+        errors[self.own_plates[k], GAIN] += static[self.layout.gains_of(k)]
         zeros[self.own_plates[k]] = static[self.layout.zeros_of(k)]
-        return np.hstack([self.plate_errors(static), zeros])
+        return np.hstack([errors, zeros])
 
     def late_s(self, k: int, static: np.ndarray) -> float:
         """By how much the forces of trial k are late."""
@@ -423,6 +349,7 @@ class MapProblem:
             trial.root_sd(frames),
             frames,
             self.layout.in_root.stop,
+            self.trunk.at(static, self.layout.trunks.start + k) if self.trunk else None,
         )
 
     def add_by_ground(self, k: int, by_static: np.ndarray, by_plates: np.ndarray, by_time: np.ndarray) -> None:
@@ -438,3 +365,4 @@ class MapProblem:
         errors = len(PLATE_ERRORS)
         by_static[:, :, self.layout.plates] += by_plates[..., :errors].reshape(n, rows, -1) @ self.to_plates
         by_static[:, :, self.layout.zeros_of(k)] += by_plates[:, :, self.own_plates[k], errors:]
+        by_static[:, :, self.layout.gains_of(k)] += by_plates[:, :, self.own_plates[k], GAIN]

@@ -11,6 +11,7 @@ from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import Gradient, RootTerms
 from kinertia.estimation.simultaneous.root_gradient import add_root_gradient
+from kinertia.estimation.simultaneous.trunk_bending import BentTrunk
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.kinematic_tree import KinematicTree
 from kinertia.model.log_cholesky import dynamic_jacobian
@@ -44,6 +45,7 @@ class RootFrames:
         sd: (d, 6) deviations of the residuals.
         frames: (d,) indices.
         static: how many static unknowns they depend on.
+        trunk: how it bends; None if it is rigid.
     """
 
     skeleton: Skeleton
@@ -57,13 +59,18 @@ class RootFrames:
     sd: np.ndarray
     frames: np.ndarray
     static: int
+    trunk: BentTrunk | None = None
 
     def terms(self, columns: Columns) -> RootTerms:
         """Residuals and derivatives, each over its deviation; `columns` are `columns_of` the problem."""
-        by_static = np.zeros((len(self.frames), 6, self.static))
+        by_static, wrench = np.zeros((len(self.frames), 6, self.static)), self.wrench
         self.add_by_ground(by_static, self.by_plates, self.by_time)
+        if self.trunk:
+            wrench = self.trunk.upright(wrench, by_static)
         chain = dynamic_jacobian(self.theta)
-        left, (q, qd, qdd) = root_columns(*self._moving, self.wrench, chain, self.sd, columns, by_static)
+        left, (q, qd, qdd) = root_columns(*self._moving, wrench, chain, self.sd, columns, by_static)
+        if self.trunk:
+            self.trunk.add_by_parameters(by_static, self.theta)
         return RootTerms(self.frames, q, qd, qdd, by_static, left)
 
     def add_gradient(self, into: Gradient, columns: Columns, basis: MotionBasis, start: int) -> None:
@@ -71,12 +78,16 @@ class RootFrames:
         the gradient begins.
         """
         of_basis = basis.first[self.frames] - start, np.ascontiguousarray(basis.values[:, self.frames])
+        by_static, wrench = np.zeros((1, 1, self.static)), self.wrench
+        if self.trunk:
+            wrench = self.trunk.upright(wrench)
         cost, by_bodies, by_ground = add_root_gradient(
-            *self._moving, self.wrench, self.sd, columns, of_basis, into.right, into.static_right
+            *self._moving, wrench, self.sd, columns, of_basis, into.right, into.static_right
         )
+        if self.trunk:
+            by_ground = self.trunk.pulls(self.wrench, by_ground, by_bodies, by_static[0, 0])
         into.cost += cost
         into.static_right[: self.theta.size] -= np.einsum("bi,bij->bj", by_bodies, dynamic_jacobian(self.theta)).ravel()
-        by_static = np.zeros((1, 1, self.static))
         by_plates = np.einsum("nr,nrpe->pe", by_ground, self.by_plates)
         self.add_by_ground(by_static, by_plates[None, None], np.vdot(by_ground, self.by_time).reshape(1, 1))
         into.static_right[: self.static] += by_static[0, 0]
@@ -88,7 +99,7 @@ class RootFrames:
         return (
             skeleton.tree,
             skeleton.gravity_m_s2,
-            skeleton.bodies(self.bsp),
+            skeleton.bodies(self.trunk.bent(self.bsp) if self.trunk else self.bsp),
             axis_motion(skeleton, motion),
             skeleton.map.bends(motion.q, motion.qd, motion.qdd),
             (np.ascontiguousarray(skeleton.root.centre(motion.q)), skeleton.root.moves),

@@ -4,11 +4,13 @@ Unknowns: quintic spline coefficients of every coordinate (uniform knots; their 
 log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
 how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate in all trials
 and in each (`plates.PLATE_ERRORS`, `ZERO_UNKNOWNS`), the time offset of the forces, and by how much more they are late
-in each of several trials. Minimised is the sum of squares, each over its deviation, of: marker errors, root residuals,
-and departures from the priors. Those of the instruments are Gaussians that change with what the data say of them
-(`sound_or_faulty`). Steps are those of Gauss and Newton (`gauss_newton`), corrected by the gradients along the way
-(`quasi_newton`), all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static
-unknowns (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their covariance.
+in each of several trials; how much the trunk bends in each (`trunk_bending`). Minimised is the sum of squares, each
+over its deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are
+Gaussians that change with what the data say of them (`sound_or_faulty`). Steps are those of Gauss and Newton
+(`gauss_newton`), corrected by the gradients along the way (`quasi_newton`), all derivatives analytic. The normal matrix
+is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur complement is the
+information on them, and its inverse their covariance. Where the knots lie is averaged over (`knot_phases`), the clock's
+posterior comes from its profile (`clock_profile`), and thighs' masses are those of a task (`task_masses`).
 
 Frames in which forces change faster than the motion can follow say less of all that does not move (`impacts`). When
 that is settled, the motion alone is made to follow the forces there, too.
@@ -17,72 +19,28 @@ that is settled, the motion alone is made to follow the forces there, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.clock_profile import ClockProfile
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation
+from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
-from kinertia.estimation.simultaneous.problem import CalibrationPrior, MapProblem, Observation
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
+from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.model.bsp import BodySegmentParameters, block_diagonal
-from kinertia.model.log_cholesky import table_jacobian
+from kinertia.estimation.simultaneous.task_masses import task_covariance
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion
-from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.one_thread import one_blas_thread
-
-
-@dataclass(frozen=True)
-class SimultaneousResult:
-    """Outcome of `estimate_simultaneous`.
-
-    Attributes:
-        bsp: the estimate, physically consistent.
-        bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
-        skeleton: with the estimated marker positions and static coordinates.
-        coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
-        clock_s: the time offset and its posterior deviation, s.
-        delays_s: of several trials, how much later the forces of each are, and the posterior deviation, s.
-        zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
-            deviations (2,).
-        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
-        reactions: per trial the loads for the joint moments, of instruments put right.
-        motions: per trial q, qd, qdd at its frames.
-        displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
-        curve_deviations: per trial the posterior deviations of its curves at its dynamic frames.
-        instruments: what these trials say of plates and clock, to be added to what others say.
-        converged: the last step was short: CONVERGED_SD, CONVERGED.
-        iterations: Gauss-Newton steps taken.
-        cost: half the sum of squares, at the start and at the end.
-    """
-
-    bsp: BodySegmentParameters
-    bsp_covariance: np.ndarray
-    skeleton: Skeleton
-    coordinates: dict[str, tuple[float, float]]
-    plates: dict[str, tuple[np.ndarray, np.ndarray]]
-    clock_s: tuple[float, float]
-    delays_s: tuple[tuple[float, float], ...]
-    zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
-    foot_loads: tuple[np.ndarray, ...]
-    reactions: tuple[GroundReactions, ...]
-    motions: tuple[Motion, ...]
-    displacements_m: tuple[np.ndarray, ...]
-    curve_deviations: tuple[CurveDeviations, ...]
-    instruments: InstrumentInformation
-    converged: bool
-    iterations: int
-    cost: tuple[float, float]
-
 
 CONVERGED = 1e-3
 """Promised decrease of half the sum of squares below which a step is the last of the search: with the one at the end of
@@ -116,6 +74,8 @@ _MOTION_CONVERGED = 3e-4
 """As CONVERGED, of the motion alone."""
 _MOST_THROUGH_IMPACTS = 5
 """Quadratics for the motion alone; one or two are usual."""
+_MOST_CONTINUED = 3
+"""Quadratics from an optimum to that with other knots; one is usual."""
 _USUAL_ITERATIONS = 5
 _LEFT_ITERATIONS = 2
 """What progress counts with: the usual number, and when these are done always so many more."""
@@ -134,25 +94,22 @@ def estimate_simultaneous(
     """
     problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem, progress)
+    known = _Judged.known(ended.instruments)
+    phases = OfPhases.of(problem, ended.point, partial(_continued, judged=known))
+    clock = ClockProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
+    static = phases.static + clock.static - ended.point.static
+    point = followed(problem, clock.here, ended.point, static)
+    ended = ended._replace(here=clock.here, instruments=clock.instruments, point=point)
     covariance, of_curves = _deviations(problem, ended)
+    covariance = covariance + phases.covariance
+    theta = problem.layout.theta
+    covariance[theta, theta] += task_covariance(problem.segments, problem.bsp(static).mass_kg)
+    of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
     motions = _through_impacts(problem, ended.point)
-    return _result(problem, ended, motions, covariance, of_curves)
+    return result_of(problem, ended, motions, covariance, of_curves)
 
 
-class _Ended(NamedTuple):
-    """Where the search ended, the quadratic there and the instruments' last Gaussian; whether short of its limit, after
-    how many quadratics, from which cost and at which.
-    """
-
-    point: Point
-    here: Linearised
-    instruments: GaussianPrior
-    converged: bool
-    iterations: int
-    cost: tuple[float, float]
-
-
-def _searched(problem: MapProblem, progress: Callable[[float], None]) -> _Ended:
+def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
     """Quasi-Newton steps with one quadratic after another until a step is short; then one with one of its own."""
     at = _Place(problem.slope(problem.beginning), _Judged.at_first(problem))
     begin, damping, scale, iterations = at.slope.cost, _FIRST_DAMPING, np.zeros(problem.layout.size), 0
@@ -176,9 +133,9 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> _Ended:
         damping = max(100.0 * damping, 1e-4) if stuck else max(0.01 * damping, _LEAST_DAMPING)
 
 
-def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> _Ended:
+def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> Ended:
     cost = begin, at.slope.under(at.judged.gaussian)[0]
-    return _Ended(at.slope.point, here, at.judged.gaussian, at.converged, iterations, cost)
+    return Ended(at.slope.point, here, at.judged.gaussian, at.converged, iterations, cost)
 
 
 class _Judged(NamedTuple):
@@ -191,6 +148,11 @@ class _Judged(NamedTuple):
     def at_first(cls, problem: MapProblem) -> _Judged:
         """Before the data have said anything."""
         return cls(GaussianPrior.of(problem.instruments), np.full(len(problem.instruments.own), np.inf))
+
+    @classmethod
+    def known(cls, gaussian: GaussianPrior) -> _Judged:
+        """Of another estimate from the same data."""
+        return cls(gaussian, np.full(len(gaussian.pull), np.inf))
 
     def again(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray, far: float) -> _Judged:
         """From the posterior mean and covariance under this one; the same where the mean has hardly moved beside how
@@ -212,6 +174,24 @@ class _Place(NamedTuple):
     judged: _Judged
     converged: bool = False
     began: float = np.inf
+
+
+def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
+    """The optimum, from a point near it."""
+    at = _Place(problem.slope(point), judged)
+    for _ in range(_MOST_CONTINUED):
+        here = problem.at(at.slope.point, _LEAST_DAMPING)
+        model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.right).static))
+        at = _descended(problem, model, at._replace(slope=here.slope), True, CONVERGED)
+        if at.converged:
+            break
+    return at.slope.point
+
+
+def _held(problem: MapProblem, point: Point, model: GaussNewton, instruments: GaussianPrior) -> Point:
+    """The optimum with this Gaussian for the instruments, from that with another."""
+    at = _Place(problem.slope(point), _Judged.known(instruments))
+    return _descended(problem, model, at, False, CONVERGED).slope.point
 
 
 def _descended(
@@ -297,13 +277,16 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     """Coefficients of motions that follow the forces through impacts as elsewhere, with all that does not move held.
 
     What impacts say of body and instruments counts less (`impacts`); but a motion that did not follow the forces there
-    would leave residuals that OpenSim's next tools have to take.
+    would leave residuals that OpenSim's next tools have to take. These know rigid segments only: the motion is to
+    follow what a trunk that bends does to the forces, too.
     """
-    if all(np.max(trial.impact) < _NO_IMPACT for trial in problem.trials):
+    rigid = point.static.copy()
+    rigid[problem.layout.trunks] = 0.0
+    if all(np.max(trial.impact) < _NO_IMPACT for trial in problem.trials) and (rigid == point.static).all():
         return point.coefficients
     sure = [replace(trial, impact=1.0) for trial in problem.trials]
     following = MapProblem(problem.skeleton, problem.prior, problem.calibration, sure)
-    at = _Place(following.slope(point), _Judged.at_first(following))
+    at = _Place(following.slope(replace(point, static=rigid)), _Judged.at_first(following))
     for _ in range(_MOST_THROUGH_IMPACTS):
         alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING)
         at = _descended(following, alone, at, judging=False, tolerance=_MOTION_CONVERGED)
@@ -312,7 +295,7 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     return at.slope.point.coefficients
 
 
-def _deviations(problem: MapProblem, ended: _Ended) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
+def _deviations(problem: MapProblem, ended: Ended) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
     """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
     here, point, layout = ended.here, ended.point, problem.layout
     model = GaussNewton.of(problem, here).under(ended.instruments)
@@ -327,59 +310,3 @@ def _deviations(problem: MapProblem, ended: _Ended) -> tuple[np.ndarray, tuple[C
             in_trial = StaticInformation.of(trial.information + elsewhere, first).root_of_covariance()
         of_curves.append(curve_deviations(problem, k, motion, problem.in_trial(k, point), trial, in_trial))
     return root @ root.T, tuple(of_curves)
-
-
-def _result(
-    problem: MapProblem,
-    ended: _Ended,
-    motions: Sequence[np.ndarray],
-    covariance: np.ndarray,
-    of_curves: tuple[CurveDeviations, ...],
-) -> SimultaneousResult:
-    point, layout = ended.point, problem.layout
-    values = point.static
-    bsp = problem.bsp(values)
-    # of the point at which the covariance is
-    chain = block_diagonal(table_jacobian(ended.here.point.static[layout.theta]))
-    sd = np.sqrt(np.diag(covariance))
-    names = list(problem.calibration.coordinates)
-    coordinates = {
-        name: (float(value), float(dev))
-        for name, value, dev in zip(names, values[layout.coordinates], sd[layout.coordinates], strict=True)
-    }
-    markers = problem.placed(values).markers
-    skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in coordinates.items()})
-    plates = zip(problem.plate_errors(values), problem.plate_sd(covariance), strict=True)
-    zeros = [(layout.zeros_of(k), trial.ground.plates) for k, trial in enumerate(problem.trials)]
-    return SimultaneousResult(
-        bsp,
-        chain @ covariance[layout.theta, layout.theta] @ chain.T,
-        skeleton,
-        coordinates,
-        dict(zip(problem.plates, plates, strict=True)),
-        (float(values[layout.clock]), float(sd[layout.clock])),
-        tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
-        tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
-        tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
-        tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
-        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, motions, strict=True)),
-        tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
-        of_curves,
-        _shown(
-            problem, ended.instruments, values[layout.instruments], covariance[layout.instruments, layout.instruments]
-        ),
-        ended.converged,
-        ended.iterations,
-        ended.cost,
-    )
-
-
-def _shown(
-    problem: MapProblem, prior: GaussianPrior, mean: np.ndarray, covariance: np.ndarray
-) -> InstrumentInformation:
-    """What the trials say of the laboratory's instruments, without what was known before."""
-    session, own = problem.session, slice(problem.layout.laboratory.stop - problem.layout.laboratory.start, len(mean))
-    more = (0, own.stop - own.start)
-    before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.right, more)))
-    shown = InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)
-    return shown.without_own(prior.precision[own, own], prior.pull[own])

@@ -1,0 +1,84 @@
+"""What an estimate owes to where the knots of its splines lie, and its average over that.
+
+Knots are a choice of ours. A trial that begins a frame later has them elsewhere, and what is barely seen (the clock,
+plates, single segments) then comes out otherwise, by up to several deviations where the motion has hardly anything
+faster than the knots. From the estimate found, others are begun whose knots lie between; they are as good. What does
+not move is averaged over all, and how far they are apart is part of its covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.curves_apart import curves_apart
+from kinertia.estimation.simultaneous.elimination import Eliminated
+from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
+from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.problem import MapProblem
+
+PHASES = (0.5,)
+"""Shares of a knot interval by which knots are moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class OfPhases:
+    """An estimate averaged over where knots lie.
+
+    Attributes:
+        static: (S,) what does not move, averaged.
+        covariance: (S, S) of the average, for it is of few.
+        problems, points: of each phase, the first one's first.
+    """
+
+    static: np.ndarray
+    covariance: np.ndarray
+    problems: tuple[MapProblem, ...]
+    points: tuple[Point, ...]
+
+    @classmethod
+    def of(cls, problem: MapProblem, point: Point, search: Callable[[MapProblem, Point], Point]) -> OfPhases:
+        """From where a search has ended.
+
+        Args:
+            problem: of the estimate.
+            point: the end.
+            search: from a point of another problem to its optimum.
+        """
+        problems, points = [problem], [point]
+        for phase in PHASES:
+            other = problem.with_knots_moved(phase)
+            rows = zip(other.bases, problem.bases, point.coefficients, strict=True)
+            begin = tuple(new.fit(old.evaluate(part)[0]) for new, old, part in rows)
+            problems.append(other)
+            points.append(search(other, replace(point, coefficients=begin)))
+        every = np.array([each.static for each in points])
+        apart = (every - every.mean(axis=0)) / np.sqrt((len(every) - 1) * len(every))
+        return cls(every.mean(axis=0), apart.T @ apart, tuple(problems), tuple(points))
+
+    def curves_apart(self, k: int) -> CurveDeviations:
+        """Deviations between the phases of the curves of trial k."""
+        return curves_apart(self.problems, self.points, k)
+
+
+def followed(problem: MapProblem, here: Linearised, point: Point, static: np.ndarray) -> Point:
+    """The optimum with what does not move held elsewhere, by the quadratic there."""
+    model, motions, displaced = GaussNewton.of(problem, here), [], []
+    rows = zip(
+        here.trials, model.displaced, problem.displacement_sd_m, point.coefficients, point.displaced, strict=True
+    )
+    for trial, own, sd, part, place in rows:
+        step = static - point.static
+        moved = -own.gain @ step
+        step[problem.layout.locals] += sd * moved
+        motions.append(part + _motion(trial, part, step))
+        displaced.append(place + moved)
+    return Point(tuple(motions), static, tuple(displaced))
+
+
+def _motion(trial: Eliminated, part: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """(size, c) how the motion of a trial follows a step (S,) of what does not move."""
+    return trial.motion_step(trial.forward(np.zeros_like(part))[0], step)

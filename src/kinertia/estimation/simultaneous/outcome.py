@@ -1,0 +1,156 @@
+"""Outcome of the simultaneous estimate: where its search ended, in units and names of measured things."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation
+from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.model.bsp import BodySegmentParameters, block_diagonal
+from kinertia.model.log_cholesky import table_jacobian
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.ground_reactions import GroundReactions
+
+
+@dataclass(frozen=True)
+class SimultaneousResult:
+    """Outcome of `estimate_simultaneous`.
+
+    Attributes:
+        bsp: the estimate, physically consistent.
+        bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
+        skeleton: with the estimated marker positions and static coordinates.
+        coordinates: static coordinate -> (value, posterior deviation), rad or m.
+        plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
+        clock_s: the time offset and its posterior deviation, s.
+        delays_s: of several trials, how much later the forces of each are, and the posterior deviation, s.
+        zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
+            deviations (2,).
+        gains: per trial, per plate its gain in it besides that in all, and the posterior deviation.
+        trunks_kg_m: per trial how much the trunk bends (`trunk_bending`), and the posterior deviation; none without a
+            trunk.
+        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
+        reactions: per trial the loads for the joint moments, of instruments put right.
+        motions: per trial q, qd, qdd at its frames.
+        displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
+        curve_deviations: per trial the posterior deviations of its curves at its dynamic frames.
+        instruments: what these trials say of plates and clock, to be added to what others say.
+        converged: the last step was short: CONVERGED_SD, CONVERGED.
+        iterations: Gauss-Newton steps taken.
+        cost: half the sum of squares, at the start and at the end.
+    """
+
+    bsp: BodySegmentParameters
+    bsp_covariance: np.ndarray
+    skeleton: Skeleton
+    coordinates: dict[str, tuple[float, float]]
+    plates: dict[str, tuple[np.ndarray, np.ndarray]]
+    clock_s: tuple[float, float]
+    delays_s: tuple[tuple[float, float], ...]
+    zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
+    gains: tuple[dict[str, tuple[float, float]], ...]
+    trunks_kg_m: tuple[tuple[float, float], ...]
+    foot_loads: tuple[np.ndarray, ...]
+    reactions: tuple[GroundReactions, ...]
+    motions: tuple[Motion, ...]
+    displacements_m: tuple[np.ndarray, ...]
+    curve_deviations: tuple[CurveDeviations, ...]
+    instruments: InstrumentInformation
+    converged: bool
+    iterations: int
+    cost: tuple[float, float]
+
+
+class Ended(NamedTuple):
+    """Where the search ended, the quadratic there and the instruments' last Gaussian; whether short of its limit, after
+    how many quadratics, from which cost and at which.
+    """
+
+    point: Point
+    here: Linearised
+    instruments: GaussianPrior
+    converged: bool
+    iterations: int
+    cost: tuple[float, float]
+
+
+def result_of(
+    problem: MapProblem,
+    ended: Ended,
+    motions: Sequence[np.ndarray],
+    covariance: np.ndarray,
+    of_curves: tuple[CurveDeviations, ...],
+) -> SimultaneousResult:
+    """In the user's terms, with these motions, covariance (S, S) of all that does not move, and curves' deviations."""
+    point, layout = ended.point, problem.layout
+    values = point.static
+    bsp = problem.bsp(values)
+    # of the point at which the covariance is
+    chain = block_diagonal(table_jacobian(ended.here.point.static[layout.theta]))
+    sd = np.sqrt(np.diag(covariance))
+    names = list(problem.calibration.coordinates)
+    coordinates = {
+        name: (float(value), float(dev))
+        for name, value, dev in zip(names, values[layout.coordinates], sd[layout.coordinates], strict=True)
+    }
+    markers = problem.placed(values).markers
+    skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in coordinates.items()})
+    plates = zip(problem.plate_errors(values), problem.plate_sd(covariance), strict=True)
+    zeros = [(layout.zeros_of(k), trial.ground.plates) for k, trial in enumerate(problem.trials)]
+    return SimultaneousResult(
+        bsp,
+        _at_most(chain @ covariance[layout.theta, layout.theta] @ chain.T, problem.prior.sd.ravel()),
+        skeleton,
+        coordinates,
+        dict(zip(problem.plates, plates, strict=True)),
+        (float(values[layout.clock]), float(sd[layout.clock])),
+        tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
+        tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
+        tuple(_gains(problem, k, values, sd) for k in range(len(problem.trials))),
+        tuple(zip(values[layout.trunks].tolist(), sd[layout.trunks].tolist(), strict=True)),
+        tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
+        tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
+        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, motions, strict=True)),
+        tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
+        of_curves,
+        _shown(
+            problem, ended.instruments, values[layout.instruments], covariance[layout.instruments, layout.instruments]
+        ),
+        ended.converged,
+        ended.iterations,
+        ended.cost,
+    )
+
+
+def _at_most(covariance: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """The same with deviations no larger than these: nobody knows less than before."""
+    share = np.minimum(1.0, sd / np.sqrt(np.diag(covariance)))
+    result: np.ndarray = share[:, None] * covariance * share
+    return result
+
+
+def _gains(problem: MapProblem, k: int, values: np.ndarray, sd: np.ndarray) -> dict[str, tuple[float, float]]:
+    """Those of a trial, and their deviations."""
+    at = problem.layout.gains_of(k)
+    return dict(
+        zip(problem.trials[k].ground.plates, zip(values[at].tolist(), sd[at].tolist(), strict=True), strict=True)
+    )
+
+
+def _shown(
+    problem: MapProblem, prior: GaussianPrior, mean: np.ndarray, covariance: np.ndarray
+) -> InstrumentInformation:
+    """What the trials say of the laboratory's instruments, without what was known before."""
+    session, own = problem.session, slice(problem.layout.laboratory.stop - problem.layout.laboratory.start, len(mean))
+    more = (0, own.stop - own.start)
+    before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.right, more)))
+    shown = InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)
+    return shown.without_own(prior.precision[own, own], prior.pull[own])
