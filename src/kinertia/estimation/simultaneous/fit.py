@@ -15,7 +15,7 @@ from kinertia.estimation.simultaneous.instrument_warnings import CLOCK_OF, instr
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
-from kinertia.estimation.simultaneous.observation import Observations, observe
+from kinertia.estimation.simultaneous.observation import Observations, observe, reading
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
@@ -91,7 +91,7 @@ class SimultaneousFit:
         courses: per trial, (f, c) coordinates of all frames from the first to the last of these: markers show the
             motion between measured stretches, too.
         foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
-        warnings: one sentence each.
+        warnings, corrections: one sentence each.
     """
 
     result: SimultaneousResult
@@ -103,6 +103,7 @@ class SimultaneousFit:
     courses: tuple[np.ndarray, ...]
     foot_loads: tuple[np.ndarray, ...]
     warnings: tuple[str, ...]
+    corrections: tuple[str, ...] = ()
 
 
 @one_blas_thread
@@ -113,6 +114,7 @@ def fit_simultaneous(
     bandwidths: Sequence[Bandwidth] | None = None,
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
     progress: Callable[[float], None] = lambda share: None,
+    otherwise: Sequence[Kinematics] = (),
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -123,12 +125,16 @@ def fit_simultaneous(
         bandwidths: per trial, of motion and forces; found from the trials if None.
         uncertainty: what may move beside these segments.
         progress: told the share of the estimate that is done, roughly.
+        otherwise: the same trials with other ground reactions, of which it is asked how likely they are beside
+            (`SimultaneousResult.evidence`).
     """
     used = used_skeleton(skeleton, trials, uncertainty)
-    seen = observed(used, prior, trials, bandwidths or Bandwidth.of(trials), uncertainty)
+    bandwidths = bandwidths or Bandwidth.of(trials)
+    seen = observed(used, prior, trials, bandwidths, uncertainty)
     together = seen.together
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-    result = estimate_simultaneous(used, prior, calibration, together, progress)
+    others = [reading(*each) for each in zip(together, otherwise, bandwidths, strict=True)] if otherwise else []
+    result = estimate_simultaneous(used, prior, calibration, together, progress, others)
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:

@@ -24,6 +24,7 @@ import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
+from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
@@ -63,6 +64,7 @@ class SimultaneousResult:
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
+        evidence: how likely the trials are, and the same read otherwise.
     """
 
     bsp: BodySegmentParameters
@@ -82,6 +84,7 @@ class SimultaneousResult:
     converged: bool
     iterations: int
     cost: tuple[float, float]
+    evidence: Evidence
 
 
 CONVERGED = 3e-3
@@ -129,15 +132,19 @@ def estimate_simultaneous(
     calibration: CalibrationPrior,
     trials: Sequence[Observation],
     progress: Callable[[float], None] = lambda share: None,
+    otherwise: Sequence[Observation] = (),
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials; `progress` is told the
-    share done, guessed from the usual number of steps.
+    share done, guessed from the usual number of steps. `otherwise` are the same trials with other ground reactions, to
+    be told how likely these would be.
     """
     problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem, progress)
-    covariance, of_curves = _deviations(problem, ended)
+    model = GaussNewton.of(problem, ended.here).under(ended.instruments)
+    covariance, of_curves = _deviations(problem, ended, model)
     motions = _through_impacts(problem, ended.point)
-    return _result(problem, ended, motions, covariance, of_curves)
+    evidence = Evidence.of(model, ended.instruments, otherwise)
+    return _result(problem, ended, motions, covariance, of_curves, evidence)
 
 
 class _Ended(NamedTuple):
@@ -314,10 +321,11 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     return at.slope.point.coefficients
 
 
-def _deviations(problem: MapProblem, ended: _Ended) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
+def _deviations(
+    problem: MapProblem, ended: _Ended, model: GaussNewton
+) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
     """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
     here, point, layout = ended.here, ended.point, problem.layout
-    model = GaussNewton.of(problem, here).under(ended.instruments)
     root, first = model.static.root_of_covariance(), layout.in_root.stop
     of_curves = []
     for k, (motion, trial) in enumerate(zip(point.coefficients, here.trials, strict=True)):
@@ -337,6 +345,7 @@ def _result(
     motions: Sequence[np.ndarray],
     covariance: np.ndarray,
     of_curves: tuple[CurveDeviations, ...],
+    evidence: Evidence,
 ) -> SimultaneousResult:
     point, layout = ended.point, problem.layout
     values = point.static
@@ -373,6 +382,7 @@ def _result(
         ended.converged,
         ended.iterations,
         ended.cost,
+        evidence,
     )
 
 
