@@ -11,7 +11,11 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.instrument_warnings import CLOCK_OF, instrument_warnings
+from kinertia.estimation.simultaneous.instrument_warnings import (
+    CLOCK_OF,
+    instrument_corrections,
+    instrument_warnings,
+)
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -19,6 +23,7 @@ from kinertia.estimation.simultaneous.observation import Observations, observe, 
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.problem import CalibrationPrior
 from kinertia.estimation.simultaneous.solver import SimultaneousResult, estimate_simultaneous
+from kinertia.estimation.simultaneous.supported import directions, with_support
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
@@ -46,7 +51,8 @@ class Posterior:
     Attributes:
         prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
         covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
-        calibration: per quantity its value, prior and posterior deviation, and unit.
+        calibration: per quantity its value, prior and posterior deviation, and unit; of instruments what supports an
+            accusation (`instrument_warnings.Entry`).
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
         base: which combinations of parameters these motions show, and which none ever shows.
@@ -148,7 +154,11 @@ def fit_simultaneous(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, uncertainty, result, [each.trial.name for each in trials]),
+        with_support(
+            _calibration(used, uncertainty, result, [each.trial.name for each in trials]),
+            result,
+            uncertainty.instruments,
+        ),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -170,6 +180,7 @@ def fit_simultaneous(
         courses,
         loads,
         tuple(_warnings(prior, uncertainty, result, posterior, trials)),
+        tuple(instrument_corrections(posterior.calibration, directions([each.turned_deg for each in trials]))),
     )
 
 
@@ -257,8 +268,9 @@ def _warnings(
         warnings.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
-    warnings += instrument_warnings(posterior.calibration)
-    warnings += which_plate_warnings(posterior.calibration, result.instruments, uncertainty.instruments)
+    along = directions([each.turned_deg for each in trials])
+    warnings += instrument_warnings(posterior.calibration, along)
+    warnings += which_plate_warnings(posterior.calibration, result.instruments, uncertainty.instruments, along)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)

@@ -26,6 +26,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
+from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport, instrument_support
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
@@ -64,6 +65,7 @@ class SimultaneousResult:
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
+        support: what supports an accusation of each instrument.
         evidence: how likely the trials are, and the same read otherwise.
     """
 
@@ -84,6 +86,7 @@ class SimultaneousResult:
     converged: bool
     iterations: int
     cost: tuple[float, float]
+    support: InstrumentSupport
     evidence: Evidence
 
 
@@ -143,8 +146,9 @@ def estimate_simultaneous(
     model = GaussNewton.of(problem, ended.here).under(ended.instruments)
     covariance, of_curves = _deviations(problem, ended, model)
     motions = _through_impacts(problem, ended.point)
+    support = instrument_support(model, ended.point, ended.instruments, of_curves)
     evidence = Evidence.of(model, ended.instruments, otherwise)
-    return _result(problem, ended, motions, covariance, of_curves, evidence)
+    return _result(problem, ended, motions, covariance, of_curves, support, evidence)
 
 
 class _Ended(NamedTuple):
@@ -345,6 +349,7 @@ def _result(
     motions: Sequence[np.ndarray],
     covariance: np.ndarray,
     of_curves: tuple[CurveDeviations, ...],
+    support: InstrumentSupport,
     evidence: Evidence,
 ) -> SimultaneousResult:
     point, layout = ended.point, problem.layout
@@ -382,6 +387,7 @@ def _result(
         ended.converged,
         ended.iterations,
         ended.cost,
+        support,
         evidence,
     )
 
