@@ -19,13 +19,18 @@ def with_clock(prior: SoundOrFaulty) -> MapProblem:
     return MapProblem(one.skeleton, one.prior, calibration, one.trials)
 
 
-def lowest(problem: MapProblem, point: Point, gaussian: GaussianPrior, steps: int = 8) -> Point:
-    """Plain Gauss-Newton steps."""
+def lowest(problem: MapProblem, point: Point, gaussian: GaussianPrior, steps: int = 12) -> Point:
+    """Gauss-Newton steps, halved until they lower the cost."""
     for _ in range(steps):
         here = problem.at(point)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.right).static)).under(gaussian)
-        step = model.step(here.slope.under(gaussian)[1])
-        point = point.like(point.vector + problem.shortened(point, step))
+        cost, right = here.slope.under(gaussian)
+        step = model.step(right)
+        for share in 0.5 ** np.arange(8):
+            there = point.like(point.vector + problem.shortened(point, share * step))
+            if problem.slope(there).under(gaussian)[0] < cost:
+                point = there
+                break
     return point
 
 
@@ -38,7 +43,7 @@ def mixed():
 
 def profile(mixed, search=None):
     problem, gaussian, point = mixed
-    search = search or (lambda model, held: lowest(problem, point, held, 3))
+    search = search or (lambda model, held: lowest(problem, point, held, 6))
     return ClockProfile.of(problem, problem.at(point), gaussian, point, search)
 
 
@@ -54,7 +59,7 @@ def test_mean_and_deviation_are_those_of_profile_and_prior_together(mixed):
     for at in delays:
         precision, pull = gaussian.precision.copy(), gaussian.pull.copy()
         precision[own, own], pull[own] = 1e12, 1e12 * at
-        there = lowest(problem, point, GaussianPrior(precision, pull), 3)
+        there = lowest(problem, point, GaussianPrior(precision, pull), 6)
         values = there.static[problem.layout.instruments]
         others = gaussian.cost(values) - 0.5 * gaussian.precision[own, own] * at**2 + gaussian.pull[own] * at
         costs.append(problem.slope(there).cost + others)
