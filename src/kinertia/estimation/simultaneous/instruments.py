@@ -34,8 +34,8 @@ FLOOR_PRIOR: Mapping[str, SoundOrFaulty] = {
 half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.008, 0.3)
 """Apparent delay of the forces; soft parts may have a share. On time: half a sample of the plates. Off: published
-recordings show 7, 7, 7, 8.4, 13.5, -12 and 0.2 ms, and twelve children on one pair of plates 9 ms. It is rarer here than
-among these: where forces are on time, half and half costs ankle moments 5 %, this 1 to 2 %."""
+recordings show 7, 7, 7, 8.4, 13.5, -12 and 0.2 ms, and twelve children on one pair of plates 9 ms. It is rarer here
+than among these: where forces are on time, half and half costs ankle moments 5 %, this 1 to 2 %."""
 DELAY_PRIOR_S = SoundOrFaulty(0.00003, 0.010, 0.03)
 """Of one trial, besides the clock's: cameras and plates that start together do so in every trial; of two runs
 on one treadmill, forces of the first are 8.4 ms late and of the second 13.5. Who has tested the clock has not tested
