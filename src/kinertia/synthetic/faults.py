@@ -152,10 +152,12 @@ class _Instruments:
         return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), prior.floor["turn"].draw(rng))
 
     def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
-        """The same with what a trial has of its own: zeros, and of several trials a delay."""
+        """The same with what a trial has of its own: zeros, gains, and a delay if one of several or not checked."""
         zero = np.array([[prior.zero_n.draw(rng), 0.0, prior.zero_n.draw(rng)] for _ in range(2)])
-        later_s = prior.delay_s.draw(rng) if one_of_several else 0.0
-        return replace(self, zero_n=zero, late_s=self.late_s + later_s)
+        own = one_of_several or prior.clock_s.faulty_share > 0.0
+        later_s = prior.delay_s.draw(rng) if own else 0.0
+        gain = self.gain + [[prior.trial_gain.draw(rng)] for _ in range(2)]
+        return replace(self, zero_n=zero, late_s=self.late_s + later_s, gain=gain)
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:

@@ -1,98 +1,122 @@
-from dataclasses import replace
+"""On a body of one number that goes with the delay, whose linearisation believes in it twice as much as its cost."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous import clock_profile
 from kinertia.estimation.simultaneous.clock_profile import ClockProfile
-from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.linearised import Point
-from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, SoundOrFaulty
-from small_problem import small_problem
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty
 
-MIXED = SoundOrFaulty(0.002, 0.02, 0.3)
+CLOCK, OWN = SoundOrFaulty(0.0003, 0.008, 0.3), SoundOrFaulty(0.00003, 0.01, 0.05)
+SHOWN_S, SD_S = 0.004, 0.0015
+FOLLOWS, BODY_SD = 20.0, 0.1
 
 
-def with_clock(prior: SoundOrFaulty) -> MapProblem:
-    one = small_problem()
-    calibration = replace(one.calibration, instruments=replace(one.calibration.instruments, clock_s=prior))
-    return MapProblem(one.skeleton, one.prior, calibration, one.trials)
+@dataclass(frozen=True)
+class Place:
+    static: np.ndarray
 
 
-def lowest(problem: MapProblem, point: Point, gaussian: GaussianPrior, steps: int = 12) -> Point:
-    """Gauss-Newton steps, halved until they lower the cost."""
-    for _ in range(steps):
-        here = problem.at(point)
-        model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.right).static)).under(gaussian)
-        cost, right = here.slope.under(gaussian)
-        step = model.step(right)
-        for share in 0.5 ** np.arange(8):
-            there = point.like(point.vector + problem.shortened(point, share * step))
-            if problem.slope(there).under(gaussian)[0] < cost:
-                point = there
-                break
-    return point
+@dataclass(frozen=True)
+class Quadratic:
+    information: np.ndarray
 
 
-@pytest.fixture(scope="module")
-def mixed():
-    problem = with_clock(MIXED)
-    gaussian = GaussianPrior.of(problem.instruments)
-    return problem, gaussian, lowest(problem, problem.beginning, gaussian)
+def cost(static: np.ndarray, n: int) -> float:
+    delay = static[:n].sum()
+    return 0.5 * (((delay - SHOWN_S) / SD_S) ** 2 + ((static[n] - FOLLOWS * delay) / BODY_SD) ** 2)
 
 
-def profile(mixed, search=None):
-    problem, gaussian, point = mixed
-    search = search or (lambda model, held: lowest(problem, point, held, 6))
-    return ClockProfile.of(problem, problem.at(point), gaussian, point, search)
-
-
-def test_mean_and_deviation_are_those_of_profile_and_prior_together(mixed):
-    problem, gaussian, point = mixed
-    found, clock = profile(mixed), problem.layout.clock
-    own = clock - problem.layout.instruments.start
-    variance = covariance(problem, found)[clock, clock]
-
-    sd = np.sqrt(variance)
-    delays = point.static[clock] + sd * np.linspace(-3.5, 3.5, 15)
-    costs = []
-    for at in delays:
-        precision, pull = gaussian.precision.copy(), gaussian.pull.copy()
-        precision[own, own], pull[own] = 1e12, 1e12 * at
-        there = lowest(problem, point, GaussianPrior(precision, pull), 6)
-        values = there.static[problem.layout.instruments]
-        others = gaussian.cost(values) - 0.5 * gaussian.precision[own, own] * at**2 + gaussian.pull[own] * at
-        costs.append(problem.slope(there).cost + others)
-    fine = np.linspace(delays[0], delays[-1], 4001)
-    cost = np.polynomial.Polynomial.fit(delays, np.array(costs) - min(costs), 4)(fine)
-    weight = np.exp(-cost) * sum(
-        share / own_sd * np.exp(-0.5 * (fine / own_sd) ** 2)
-        for share, own_sd in ((1.0 - MIXED.faulty_share, MIXED.sound_sd), (MIXED.faulty_share, MIXED.faulty_sd))
+def problem(priors):
+    n = len(priors)
+    layout = SimpleNamespace(late=lambda k: list(range(n)), instruments=slice(0, n))
+    instruments = ErrorPriors(tuple(priors))
+    return SimpleNamespace(
+        trials=[None], layout=layout, instruments=instruments, slope=lambda at: SimpleNamespace(cost=cost(at.static, n))
     )
-    mean = np.average(fine, weights=weight)
-    assert found.static[clock] == pytest.approx(mean, abs=0.1 * sd)
-    assert sd == pytest.approx(np.sqrt(np.average(np.square(fine - mean), weights=weight)), rel=0.1)
 
 
-def covariance(problem: MapProblem, found: ClockProfile) -> np.ndarray:
-    root = GaussNewton.of(problem, found.here).under(found.instruments).static.root_of_covariance()
-    return root @ root.T
+def information(n: int, times: float) -> np.ndarray:
+    late, body = np.append(np.ones(n), 0.0), np.append(np.full(n, -FOLLOWS), 1.0)
+    return times * np.outer(late, late) / SD_S**2 + np.outer(body, body) / BODY_SD**2
 
 
-def test_the_others_follow_the_clock(mixed):
-    problem, gaussian, point = mixed
-    found, clock = profile(mixed), problem.layout.clock
-    root = GaussNewton.of(problem, problem.at(point)).under(gaussian).static.root_of_covariance()
-    gain = root @ root[clock] / (root[clock] @ root[clock])
-    moved = found.static - point.static
-    np.testing.assert_allclose(moved, gain * moved[clock], atol=1e-9)
+def model_of(here: Quadratic, n: int):
+    def under(gaussian: GaussianPrior):
+        whole = here.information.copy()
+        whole[:n, :n] += gaussian.precision
+        root = np.linalg.cholesky(np.linalg.inv(whole))
+        return SimpleNamespace(static=SimpleNamespace(root_of_covariance=lambda: root))
+
+    return SimpleNamespace(under=under)
 
 
-def test_a_clock_that_has_been_checked_is_left_as_it_is():
-    problem = with_clock(SoundOrFaulty.certain(0.01))
-    gaussian, point = GaussianPrior.of(problem.instruments), problem.beginning
-    here = problem.at(point)
-    found = ClockProfile.of(problem, here, gaussian, point, lambda model, held: pytest.fail("searched"))
-    assert found.here is here
-    assert found.instruments is gaussian
-    np.testing.assert_array_equal(found.static, point.static)
+def found(monkeypatch, priors) -> tuple[ClockProfile, np.ndarray]:
+    """And the posterior covariance of everything."""
+    one, n = problem(priors), len(priors)
+    monkeypatch.setattr(clock_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
+    gaussian, here = GaussianPrior.of(one.instruments), Quadratic(information(n, 2.0))
+
+    def search(model, held: GaussianPrior) -> Place:
+        whole, right = information(n, 1.0), np.append(np.full(n, SHOWN_S / SD_S**2), 0.0)
+        whole[:n, :n] += held.precision
+        right[:n] += held.pull
+        return Place(np.linalg.solve(whole, right))
+
+    profile = ClockProfile.of(one, here, gaussian, search(None, gaussian), search)
+    root = model_of(profile.here, n).under(profile.instruments).static.root_of_covariance()
+    return profile, root @ root.T
+
+
+def parts_of(prior: SoundOrFaulty) -> list[tuple[float, float]]:
+    return [(1.0 - prior.faulty_share, prior.sound_sd), (prior.faulty_share, prior.faulty_sd)]
+
+
+def integrated(parts) -> tuple[float, float]:
+    """Mean and variance of the delay with a prior that is a sum of Gaussians: shares and deviations."""
+    delay = np.linspace(-0.01, 0.02, 60001)
+    prior = sum(share / sd * np.exp(-0.5 * (delay / sd) ** 2) for share, sd in parts)
+    weight = prior * np.exp(-0.5 * ((delay - SHOWN_S) / SD_S) ** 2)
+    mean = np.average(delay, weights=weight)
+    return mean, np.average(np.square(delay - mean), weights=weight)
+
+
+def test_mean_and_deviation_are_those_of_profile_and_prior_together(monkeypatch):
+    profile, covariance = found(monkeypatch, [CLOCK])
+    mean, variance = integrated(parts_of(CLOCK))
+    assert profile.static[0] == pytest.approx(mean, rel=1e-4)
+    assert covariance[0, 0] == pytest.approx(variance, rel=1e-3)
+
+
+def test_the_others_follow(monkeypatch):
+    profile, covariance = found(monkeypatch, [CLOCK])
+    assert profile.static[1] == pytest.approx(FOLLOWS * profile.static[0], rel=1e-4)
+    assert covariance[1, 1] == pytest.approx(BODY_SD**2 + FOLLOWS**2 * covariance[0, 0], rel=1e-3)
+
+
+def test_what_one_trial_shows_may_be_the_clock_s_or_its_own(monkeypatch):
+    profile, covariance = found(monkeypatch, [CLOCK, OWN])
+    both = [(a * b, np.hypot(c, d)) for a, c in parts_of(CLOCK) for b, d in parts_of(OWN)]
+    mean, variance = integrated(both)
+    assert profile.static[:2].sum() == pytest.approx(mean, rel=1e-4)
+    assert covariance[:2, :2].sum() == pytest.approx(variance, rel=1e-3)
+    assert 0.0 < profile.static[1] < 0.3 * profile.static[0]
+
+
+def test_a_clock_that_has_been_checked_is_left_as_it_is(monkeypatch):
+    checked = SoundOrFaulty.certain(0.01)
+    _, covariance = found(monkeypatch, [checked])
+    linear = 1.0 / (2.0 / SD_S**2 + checked.sd**-2)
+    assert covariance[0, 0] == pytest.approx(linear)
+
+
+def test_several_trials_are_left_as_they_are():
+    one = problem([CLOCK])
+    several = SimpleNamespace(**{**vars(one), "trials": [None, None]})
+    gaussian, here, place = GaussianPrior.of(one.instruments), Quadratic(information(1, 2.0)), Place(np.zeros(2))
+    profile = ClockProfile.of(several, here, gaussian, place, lambda model, held: pytest.fail("searched"))
+    assert profile.here is here
+    assert profile.static is place.static

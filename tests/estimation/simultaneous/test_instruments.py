@@ -5,7 +5,7 @@ import pytest
 from tests.small_problem import INSTRUMENTS, small_problem
 
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS
 from kinertia.settings import Instruments
 
 PRIOR = InstrumentPrior()
@@ -73,7 +73,7 @@ def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own(clock_
     prior = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
     clock, *delays = prior.of_unknowns(("plate 1",), 3).own[-4:]
     assert clock.sound_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
-    assert all((one.sound_sd, one.faulty_sd, one.faulty_share) == (0.00003, 0.010, 0.05) for one in delays)
+    assert all((one.sound_sd, one.faulty_sd, one.faulty_share) == (0.00003, 0.010, 0.03) for one in delays)
 
 
 def test_what_is_left_without_the_trials_own_says_nothing_negative():
@@ -134,3 +134,26 @@ def test_the_session_counts_in_the_normal_equations():
         h[i] = 1e-4
         slope = (extra(static[places] + h) - extra(static[places] - h)) / 2e-4
         assert slope == pytest.approx(-(right - right_before)[places][i], rel=1e-6, abs=1e-3)
+
+
+def test_who_has_checked_the_gain_has_checked_that_of_the_trial():
+    assert InstrumentPrior().trial_gain.faulty_share > 0.0
+    checked = InstrumentPrior.stated(Instruments(gain_sd_percent=0.5)).trial_gain
+    assert checked.sd < 0.002
+
+
+@pytest.mark.parametrize(("clock_sd_ms", "expected"), [(None, 1), (0.5, 0)])
+def test_a_single_trial_may_be_late_by_itself_unless_its_clock_has_been_checked(clock_sd_ms, expected):
+    one = small_problem()
+    known = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
+    problem = type(one)(one.skeleton, one.prior, replace(one.calibration, instruments=known), one.trials)
+    assert problem.layout.delays.stop - problem.layout.delays.start == expected
+
+
+def test_a_gain_of_a_trial_is_that_of_its_plates_in_it_only():
+    pair = small_problem(2)
+    static = pair.start_static.copy()
+    static[pair.layout.gains_of(1)] = [0.01, 0.02, 0.03]
+    gains = list(PLATE_ERRORS).index("gain")
+    np.testing.assert_allclose(pair.plates_in(1, static)[:, gains], [0.01, 0.02, 0.03])
+    assert not pair.plates_in(0, static).any()

@@ -1,9 +1,9 @@
-"""The clock's posterior from the profile of the cost, with everything else at its best for each delay.
+"""The posterior of a trial's delay from the profile of the cost: everything else at its best for each delay.
 
 One linearisation says too much of the delay: how forces change over milliseconds goes with motion and body, and the
 second derivatives that Gauss and Newton leave out make the profile wider than they expect, by a fifth to a quarter in
 walks. What is likelier, forces on time or off, depends on it exponentially. The profile is therefore taken at three
-delays, its parabola joined with the prior's two components, and the mean and deviation of that are the clock's.
+delays, and its parabola joined with the priors of the clock and of the trial's own delay, each with two components.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 
 _HELD = 1e6
-"""Information that holds the clock where the profile is taken, over what is known of it."""
+"""Information that holds the delay where the profile is taken, over what is known of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClockProfile:
-    """An estimate with the clock's posterior from its profile.
+    """An estimate with the delay's posterior from its profile; of several trials as it was.
 
     Attributes:
-        here: the quadratic, with as much information on the clock as the profile has.
-        instruments: the Gaussian that gives the clock its mean and deviation.
-        static: (S,) the unknowns, the others following the clock.
+        here: the quadratic, with as much information on the delay as the profile has.
+        instruments: the Gaussian that gives clock and delay their means and deviations.
+        static: (S,) the unknowns, the others following these.
     """
 
     here: Linearised
@@ -54,59 +54,51 @@ class ClockProfile:
             point: the end.
             search: the optimum with this quadratic and another Gaussian.
         """
-        layout, prior = problem.layout, problem.instruments.own[problem.layout.clock - problem.layout.instruments.start]
+        late, first = np.array(problem.layout.late(0)), problem.layout.instruments.start
+        priors = [problem.instruments.own[k] for k in late - first]
         unchanged = cls(here, instruments, point.static)
-        if not 0.0 < prior.faulty_share < 1.0:
+        if len(problem.trials) > 1 or not any(0.0 < prior.faulty_share < 1.0 for prior in priors):
             return unchanged
         model = GaussNewton.of(problem, here)
         root = model.under(instruments).static.root_of_covariance()
-        gain = root @ root[layout.clock]
-        variance, mean = gain[layout.clock], point.static[layout.clock]
-        own, sd = layout.clock - layout.instruments.start, np.sqrt(variance)
-        places, costs = [], []
-        for at in (mean - sd, mean, mean + sd):
-            held = _held(instruments, own, at, _HELD / variance)
-            there = problem.slope(search(model, held))
-            values = there.point.static[layout.instruments]
-            places.append(values[own])
-            costs.append(there.cost + instruments.cost(values) - _alone(instruments, own).cost(values))
-        curve, slope, _ = np.polyfit(np.array(places) - mean, costs, 2)
+        across, own, values = root @ root[late].T, late - first, point.static[late]
+        known = np.linalg.inv(across[late])
+        sd = float(np.sqrt(across[late].sum()))
+        delays = np.array([-sd, 0.0, sd])
+        held = [_held(instruments, own, values + away / len(own), _HELD / sd**2) for away in delays]
+        costs = [_cost(problem, search(model, each), instruments, own) for each in held]
+        curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
-        information = 2.0 * curve
-        site = GaussianPrior(np.zeros((1, 1)), np.zeros(1)).updated(
-            ErrorPriors((prior,)), np.array([mean - slope / information]), np.array([[1.0 / information]])
-        )
-        precision, pull = float(site.precision[0, 0]), float(site.pull[0])
-        total = information + precision
-        moved = (information * mean - slope + pull) / total
+        shown = np.full((len(own), len(own)), 2.0 * curve)
+        right = np.full(len(own), 2.0 * curve * values.sum() - slope)
+        gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, right)
+        found = np.linalg.solve(shown + gaussian.precision, right + gaussian.pull)
+        linear = (known - instruments.precision[np.ix_(own, own)]).mean()
+        information = here.information.copy()
+        information[np.ix_(late, late)] += shown - linear
         return cls(
-            _with_information(here, layout.clock, information - (1.0 / variance - instruments.precision[own, own])),
-            _with(instruments, own, precision, pull),
-            point.static + gain * (moved - mean) / variance,
+            replace(here, information=information),
+            _with(instruments, own, gaussian.precision, gaussian.pull),
+            point.static + across @ known @ (found - values),
         )
 
 
-def _held(gaussian: GaussianPrior, own: int, at: float, information: float) -> GaussianPrior:
-    """The same with one of the quantities held at a value by this much information."""
-    return _with(gaussian, own, information, information * at)
+def _cost(problem: MapProblem, there: Point, instruments: GaussianPrior, own: np.ndarray) -> float:
+    """Of everything but what the Gaussian says of some quantities alone."""
+    values = there.static[problem.layout.instruments]
+    nothing = GaussianPrior(np.zeros_like(instruments.precision), np.zeros_like(instruments.pull))
+    alone = _with(nothing, own, instruments.precision[np.ix_(own, own)], instruments.pull[own])
+    return problem.slope(there).cost + instruments.cost(values) - alone.cost(values)
 
 
-def _alone(gaussian: GaussianPrior, own: int) -> GaussianPrior:
-    """What it says of one of the quantities alone."""
-    nothing = GaussianPrior(np.zeros_like(gaussian.precision), np.zeros_like(gaussian.pull))
-    return _with(nothing, own, gaussian.precision[own, own], gaussian.pull[own])
+def _held(gaussian: GaussianPrior, own: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:
+    """The same with some of the quantities held at these values by this much information on each."""
+    return _with(gaussian, own, information * np.eye(len(own)), information * values)
 
 
-def _with(gaussian: GaussianPrior, own: int, precision: float, pull: float) -> GaussianPrior:
-    """The same with this for one of the quantities alone."""
+def _with(gaussian: GaussianPrior, own: np.ndarray, precision: np.ndarray, pull: np.ndarray) -> GaussianPrior:
+    """The same with this for some of the quantities alone."""
     every, pulls = gaussian.precision.copy(), gaussian.pull.copy()
-    every[own, own], pulls[own] = precision, pull
+    every[np.ix_(own, own)], pulls[own] = precision, pull
     return GaussianPrior(every, pulls)
-
-
-def _with_information(here: Linearised, place: int, more: float) -> Linearised:
-    """A quadratic with more information on one of the static unknowns, or less."""
-    information = here.information.copy()
-    information[place, place] += more
-    return replace(here, information=information)

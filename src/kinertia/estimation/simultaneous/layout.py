@@ -13,8 +13,9 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 @dataclass(frozen=True)
 class Layout:
     """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's. Of several
-    trials each has a delay of its own besides the clock's. Zeros and gains are those of each trial's plates, the gains
-    beside those of all trials, trunks how much bends in each trial (`trunk_bending`).
+    trials each has a delay of its own besides the clock's, and so has one whose clock has not been checked. Zeros and
+    gains are those of each trial's plates, the gains beside those of all trials, trunks how much bends in each trial
+    (`trunk_bending`).
     """
 
     theta: slice

@@ -33,7 +33,8 @@ class SimultaneousResult:
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
         plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
         clock_s: the time offset and its posterior deviation, s.
-        delays_s: of several trials, how much later the forces of each are, and the posterior deviation, s.
+        delays_s: per trial how much later its forces are than by the clock of all, and the posterior deviation, s; none
+            of a single trial whose clock has been checked.
         zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
             deviations (2,).
         gains: per trial, per plate its gain in it besides that in all, and the posterior deviation.

@@ -71,8 +71,9 @@ class MapProblem:
         count = len(skeleton.markers)
         self.skin = [trial.skin or SkinPatterns.none(len(trial.time), count) for trial in trials]
         self.own_plates = [[self.plates.index(name) for name in trial.ground.plates] for trial in trials]
-        # one trial of a session is one of several
-        n_delays = len(trials) if len(trials) > 1 or calibration.instruments.session else 0
+        known = calibration.instruments
+        # one trial of a session is one of several, and so may be one whose clock nobody has checked
+        n_delays = len(trials) if len(trials) > 1 or known.session or known.clock_s.faulty_share > 0.0 else 0
         plates_of_trials = list(map(len, self.own_plates))
         unknowns = (len(self.still), count, len(self.plates), n_delays, plates_of_trials, self.skin[0].size)
         self.trunk = TrunkBending.of(prior.mean, prior.mass_kg)

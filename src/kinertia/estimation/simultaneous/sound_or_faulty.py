@@ -139,11 +139,15 @@ class GaussianPrior:
         posterior (k,), (k, k) that was found with the present one.
         """
         information = np.linalg.inv(covariance)
-        data, right = information - self.precision, information @ mean - self.pull
+        return GaussianPrior.given(priors, information - self.precision, information @ mean - self.pull)
+
+    @classmethod
+    def given(cls, priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> GaussianPrior:
+        """The same where data have this information (k, k) and right-hand side (k,)."""
         parts = priors.of_parts
         middle, whole = _posterior(priors.parts, parts.T @ data @ parts, parts.T @ right)
         middle, information = parts @ middle, np.linalg.inv(parts @ whole @ parts.T)
-        return GaussianPrior(information - data, information @ middle - right)
+        return cls(information - data, information @ middle - right)
 
 
 def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
