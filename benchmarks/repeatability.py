@@ -18,6 +18,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
+from kinertia.estimation.simultaneous.instrument_warnings import accuses
+
 APART = 1.96
 """Deviations beyond which two values, or a value and none, differ (95 %)."""
 _BEYOND = 0.99
@@ -42,12 +44,19 @@ _PRODUCTS = ("ixy", "ixz", "iyz")
 
 @dataclass(frozen=True)
 class Estimate:
-    """What one trial says of an unknown, SI."""
+    """What one trial says of an unknown, SI.
+
+    Attributes:
+        trial: name.
+        value, sd, prior_sd: of the unknown.
+        warned: whether the fit itself says to check the instrument.
+    """
 
     trial: str
     value: float
     sd: float
     prior_sd: float
+    warned: bool = False
 
     @property
     def accuses(self) -> bool:
@@ -171,7 +180,8 @@ def _calibrated(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]
         if entry["sd"]:
             group = next((group for part, group in _INSTRUMENTS.items() if part in name), "joint")
             numbers = (float(entry[key]) for key in ("value", "sd", "prior_sd"))
-            yield (name, group, entry["unit"]), Estimate(folder.name, *numbers)
+            warned = group in INSTRUMENT_GROUPS and accuses(entry)
+            yield (name, group, entry["unit"]), Estimate(folder.name, *numbers, warned)
 
 
 def _body(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]:

@@ -165,7 +165,9 @@ def compared(unknowns: Sequence[Shared]) -> str:
         if wrong
     ]
     said = f"Values that are beyond 1.96 of their prior and of their own deviation: {len(accused)}; "
-    said += f"contradicted by the other trials: {len(contradicted)}."
+    said += f"contradicted by the other trials: {len(contradicted)}. "
+    warned = [wrong for _, estimate, wrong in accused if estimate.warned]
+    said += f"Of them the fits say to check the instrument: {len(warned)}; contradicted: {sum(warned)}."
     return "\n\n".join([table(heads, rows), said, *(["\n".join(contradicted)] if contradicted else [])])
 
 

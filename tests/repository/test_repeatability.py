@@ -59,6 +59,7 @@ def test_folders_of_results(tmp_path):
     assert set(group_sums(shared(folders, instruments_only=True))) == {"delay"}
     page = sessions.compared(shared(folders))
     assert "deviation: 1; contradicted by the other trials: 1." in page
+    assert "the fits say to check the instrument: 1; contradicted: 1." in page
 
 
 def test_results_that_are_there_are_used_again(tmp_path):

@@ -59,14 +59,14 @@ def instrument_support(
 
 def moved_moments(problem: MapProblem, k: int, point: Point, curves: CurveDeviations) -> np.ndarray:
     """(k,) `InstrumentSupport.moved` in one trial, by the derivatives of its joint moments while the motion stays."""
-    dynamic = np.flatnonzero(problem.trials[k].dynamic)
+    dynamic, instruments = np.flatnonzero(problem.trials[k].dynamic), problem.layout.instruments
     if not len(dynamic):
-        return np.zeros(problem.layout.instruments.stop - problem.layout.instruments.start)
+        return np.zeros(instruments.stop - instruments.start)
     some = np.unique(np.linspace(0, len(dynamic) - 1, min(_MOST_FRAMES, len(dynamic))).astype(int))
     frames, static = dynamic[some], problem.in_trial(k, point)
     motion = problem.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
     by = moment_derivatives(problem, k, motion, static, problem.reactions(k, static), frames)
-    change = np.abs(by.static[:, _ROOT:, problem.layout.instruments])
+    change = np.abs(by.static[:, _ROOT:, instruments])
     result: np.ndarray = (change / (INTERVAL_SD * curves.moments[some][:, _ROOT:, None])).max(axis=(0, 1))
     return result
 
