@@ -19,7 +19,7 @@ def gaussian_mean(values: FloatArray, deviation: float) -> FloatArray:
 
     Examples:
         >>> gaussian_mean(np.array([0.0, 0.0, 1.0, 0.0, 0.0]), 0.5).round(3).tolist()
-        [0.0, 0.107, 0.787, 0.107, 0.0]
+        [0.0, 0.106, 0.787, 0.106, 0.0]
     """
     radius = int(_DEVIATIONS * deviation + 0.5)
     weights = np.exp(-0.5 / (deviation * deviation) * np.arange(-radius, radius + 1) ** 2)
