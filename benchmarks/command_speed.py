@@ -1,10 +1,12 @@
 """Times whole processes, `kinertia --version` and `kinertia fit`, next to the import of what they stand on.
 
-    python benchmarks/command_speed.py
+    python benchmarks/command_speed.py [--before FOLDER]
 
-The yardstick is `python -c "import numpy, scipy.optimize, pandas"` in the same run; by turns, so that all meet the same
-load of the machine, and the best of a few runs counts. Compiled modules are kept, as pip keeps them. Processor time is
-told beside the time on the clock: on a busy machine it is the steadier of the two.
+FOLDER is another checkout of the repository, as `git worktree add FOLDER COMMIT` makes it: its commands run by turns
+with those of this one, and the last columns compare both. The yardstick is `python -c "import numpy, scipy.optimize,
+pandas"` in the same run; by turns, so that all meet the same load of the machine, and the best of a few runs counts.
+Compiled modules are kept, as pip keeps them. Processor time is told beside the time on the clock: on a busy machine it
+is the steadier of the two.
 """
 
 from __future__ import annotations
@@ -24,53 +26,81 @@ from measured_trials import table
 from walks import WALKS, fit_arguments
 
 YARDSTICK = "import numpy, scipy.optimize, pandas"
+FITTED = ("rajagopal", "gait2354")
+"""Of WALKS."""
 
 
 def commands(results: Path) -> dict[str, list[str]]:
     """Command lines by what the table calls them."""
     kinertia = [sys.executable, "-m", "kinertia"]
-    fit = ["fit", *fit_arguments(data_folder(), "rajagopal"), "-o", str(results), "--quiet"]
+    fits = {
+        f"`kinertia fit`, {WALKS[walk]}, with its report": [
+            *kinertia,
+            "fit",
+            *fit_arguments(data_folder(), walk),
+            "-o",
+            str(results / walk),
+            "--quiet",
+        ]
+        for walk in FITTED
+    }
     return {
         f"`{YARDSTICK}`": [sys.executable, "-c", YARDSTICK],
         "`kinertia --version`": [*kinertia, "--version"],
-        f"`kinertia fit`, {WALKS['rajagopal']}, with its report": [*kinertia, *fit],
+        **fits,
     }
 
 
-def spent(command: Sequence[str]) -> tuple[float, float]:
+def spent(command: Sequence[str], before: Path | None = None) -> tuple[float, float]:
     """Seconds on the clock and of the processor that a process takes from its start to its end.
+
+    Args:
+        command: the command line.
+        before: checkout whose package it runs; the one that Python finds if None.
 
     Raises:
         subprocess.CalledProcessError: it fails; a fit of which a check fails (status 1) is done all the same.
     """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    if before is not None:
+        environment["PYTHONPATH"] = str(before / "src")
+    used, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     status = subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False).returncode
     clock, after = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
     if status not in ((0, 1) if "fit" in command else (0,)):
         raise subprocess.CalledProcessError(status, command)
-    return clock, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return clock, after.ru_utime + after.ru_stime - used.ru_utime - used.ru_stime
 
 
-def measured(runs: int) -> tuple[dict[str, tuple[float, float]], int]:
-    """Best seconds (clock, processor) of every command after one run that fills the caches; bytes of the report."""
+def measured(runs: int, before: Path | None = None) -> tuple[dict[str, list[float]], int]:
+    """Best seconds (clock, processor) of every command after one run that fills the caches, followed by those of the
+    checkout `before`, if any; bytes of the first fit's report.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        results = Path(folder) / "out"
+        results = Path(folder)
+        trees = [None] if before is None else [None, before.resolve(strict=True)]
         lines = commands(results)
-        times = [{name: spent(line) for name, line in lines.items()} for _ in range(runs + 1)][1:]
-        size = (results / "report.html").stat().st_size
-    return {name: (min(one[name][0] for one in times), min(one[name][1] for one in times)) for name in lines}, size
+        times = [
+            {name: [one for tree in trees for one in spent(line, tree)] for name, line in lines.items()}
+            for _ in range(runs + 1)
+        ][1:]
+        size = (results / FITTED[0] / "report.html").stat().st_size
+    return {name: [min(column) for column in zip(*(one[name] for one in times), strict=True)] for name in lines}, size
 
 
-def command_section(runs: int) -> str:
+def command_section(runs: int, before: Path | None = None) -> str:
     """Seconds of every command on the clock and of the processor, over those of the yardstick; the report's size."""
-    seconds, size = measured(runs)
-    clock, processor = next(iter(seconds.values()))
-    rows = [
-        [name, f"{one[0]:.2f}", f"{one[0] / clock:.2f}", f"{one[1]:.2f}", f"{one[1] / processor:.2f}"]
-        for name, one in seconds.items()
-    ]
+    seconds, size = measured(runs, before)
+    yardstick = next(iter(seconds.values()))
     heading = ["process", "clock (s)", "ratio", "processor (s)", "ratio"]
+    if before is not None:
+        heading += ["clock before (s)", "now / before", "processor before (s)", "now / before"]
+    rows = []
+    for name, (clock, processor, *earlier) in seconds.items():
+        cells = [clock, clock / yardstick[0], processor, processor / yardstick[1]]
+        for now, then in zip((clock, processor), earlier, strict=False):
+            cells += [then, now / then]
+        rows.append([name, *(f"{cell:.2f}" for cell in cells)])
     return f"{table(heading, rows)}\n\nThe fit's report has {size / 1e6:.2f} MB."
 
 
@@ -78,7 +108,9 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
     parser.add_argument("--runs", type=int, default=5, help="the best of so many runs counts")
-    print(command_section(parser.parse_args().runs))
+    parser.add_argument("--before", type=Path, metavar="FOLDER", help="checkout of the repository to compare with")
+    given = parser.parse_args()
+    print(command_section(given.runs, given.before))
 
 
 if __name__ == "__main__":

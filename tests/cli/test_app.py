@@ -100,7 +100,7 @@ def test_progress_is_plain_lines_in_a_log(fit_of):
 
 def test_progress_is_a_bar_on_a_terminal(monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(terminal, "err", Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(terminal.err, "console", Console(file=screen, force_terminal=True, width=80))
     with terminal.shown_progress() as progress:
         progress("inverse kinematics", 0.5)
     assert "inverse kinematics" in screen.getvalue()
@@ -109,7 +109,7 @@ def test_progress_is_a_bar_on_a_terminal(monkeypatch):
 
 def test_progress_tells_the_time_left_of_the_stage(monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(terminal, "err", Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(terminal.err, "console", Console(file=screen, force_terminal=True, width=80))
     with terminal.shown_progress() as progress:
         progress("reading", 0.9)
         progress("estimate", 0.0)
@@ -217,7 +217,7 @@ def test_quiet_fit_says_nothing(fit_at_once, tmp_path):
 
 def test_quiet_progress(monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(terminal, "err", Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(terminal.err, "console", Console(file=screen, force_terminal=True, width=80))
     monkeypatch.setattr(terminal.out, "quiet", True)
     with terminal.shown_progress() as progress:
         progress("reading", 0.9)

@@ -37,7 +37,7 @@ def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(c3d_lab, tmp_pat
 def test_a_fit_of_text_files_does_not_load_the_reader_of_c3d(demo_run, tmp_path):
     loaded = loaded_by("fit", demo_run[1] / "lab" / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "bsp.csv").is_file()
-    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, *C3D, *SELDOM_NAMED, "pandas"}
+    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, *C3D, *SELDOM_NAMED, "pandas", "rich"}
 
 
 @pytest.mark.slow

@@ -81,3 +81,15 @@ def test_a_whole_fit(encoding, c3d_lab, tmp_path):
     assert done.status == 0, done.err
     assert "results in" in done.out
     assert (tmp_path / NAME / "report.html").is_file()
+
+
+def test_a_process_ends_in_order():
+    """All is written, and what is to be done at the end of a process is done."""
+    program = (
+        "import atexit, sys; from kinertia.cli.start import program; "
+        "atexit.register(lambda: print('at its end')); sys.argv = ['kinertia', 'fit', 'none.toml']; "
+        "print('before'); program()"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout.split("\n")) == (2, ["before", "at its end", ""])
+    assert "none.toml" in ended.stderr

@@ -5,9 +5,11 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+from numba.core.registry import CPUDispatcher
 
 import kinertia
 from kinertia.model import compiled
@@ -37,7 +39,7 @@ def test_all_files_with_compiled_functions_are_among_the_sources():
         for path in PACKAGE.rglob("*.py")
         if re.search(r"^@(compiled|part|inlined)$", path.read_text(encoding="utf-8"), re.MULTILINE)
     }
-    assert users | {"model/compiled.py"} == set(compiled.SOURCES)
+    assert users | {"model/compiled.py", "model/kept_code.py"} == set(compiled.SOURCES)
 
 
 def test_a_change_of_any_source_leads_to_another_folder(installation):
@@ -76,6 +78,46 @@ def test_folders_of_older_states_go_when_all_is_compiled(monkeypatch, tmp_path):
     compiled.set_compiled()
     assert compiled.is_compiled()
     assert not other.exists()
+
+
+def compiled_functions() -> list[CPUDispatcher]:
+    """All of the package."""
+    names = [name.removesuffix(".py").replace("/", ".") for name in compiled.SOURCES]
+    everything = [value for name in names for value in vars(import_module(f"kinertia.{name}")).values()]
+    return list({value.py_func: value for value in everything if isinstance(value, CPUDispatcher)}.values())
+
+
+def test_only_python_calls_what_is_kept():
+    """What another compiled function would need of it is not kept."""
+    functions = compiled_functions()
+    for function in functions:
+        python = function.py_func
+        called = [python.__globals__.get(name) for name in python.__code__.co_names]
+        for other in called:
+            assert not isinstance(other, CPUDispatcher) or other.targetoptions.get("no_cpython_wrapper"), other
+    assert sum("no_cpython_wrapper" not in function.targetoptions for function in functions) > 10
+
+
+def test_a_kept_function_gives_in_another_process_what_it_gave(tmp_path):
+    (tmp_path / "sums.py").write_text(
+        "import numpy as np\n"
+        "from kinertia.model.compiled import compiled, part\n"
+        "@part\n"
+        "def half(x):\n"
+        "    return 0.5 * x\n"
+        "@compiled\n"
+        "def halves(x):\n"
+        "    return np.array([half(value) for value in x]), 2 * len(x)\n",
+        encoding="utf-8",
+    )
+    program = (
+        f"import sys, numpy as np; from kinertia.model import compiled; from pathlib import Path; "
+        f"compiled.cache_folder = lambda: Path({str(tmp_path)!r}); sys.path.insert(0, {str(tmp_path)!r}); "
+        "from sums import halves; values, count = halves(np.array([1.0, 2.0])); "
+        "print(values.tolist(), count, sum(halves.stats.cache_hits.values()))"
+    )
+    site = PACKAGE.parent / "kinertia"
+    assert [run(site, program) for _ in range(2)] == ["[0.5, 1.0] 4 0", "[0.5, 1.0] 4 1"]
 
 
 def test_other_packages_functions_are_kept_where_they_were():

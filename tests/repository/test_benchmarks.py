@@ -75,6 +75,16 @@ def test_a_process_is_timed_whole_and_may_not_fail():
         command_speed.spent([sys.executable, "-c", "raise SystemExit(1)"])
 
 
+def test_a_process_of_another_checkout_runs_its_package(tmp_path):
+    package = tmp_path / "src" / "kinertia"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("before = True\n", encoding="utf-8")
+    program = [sys.executable, "-c", "import kinertia; assert kinertia.before"]
+    command_speed.spent(program, tmp_path)
+    with pytest.raises(subprocess.CalledProcessError):
+        command_speed.spent(program)
+
+
 @pytest.mark.slow
 def test_a_minute_takes_little_more_memory_than_a_walk():
     """Its normal equations alone would be 350 MB, and what was made of them some four times as much."""

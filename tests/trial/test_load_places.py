@@ -9,8 +9,8 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
-from kinertia.trial.load_places import load_places_doubts, load_places_trouble
 from kinertia.trial.sampled_time import runs
+from loads_and_feet import load_places_doubts, load_places_trouble
 from recordings import RUNS, SQUATS, WALKS
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET

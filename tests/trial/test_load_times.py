@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.trial.load_places import load_places_trouble
+from loads_and_feet import load_places_trouble
 from recordings import LONG_WALKS, RUNS, WALKS
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.trial.data import Markers
-from kinertia.trial.load_places import load_places_trouble
+from loads_and_feet import load_places_trouble
 from walk_on_plates import ALL_STEPS, FEET, STRIDE_M
 from walk_on_plates import walk as simple_walk
 

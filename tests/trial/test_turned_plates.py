@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.load_places import load_places_trouble
+from loads_and_feet import load_places_trouble
 from recordings import SYNTHETIC, here
 
 WALKS = here(["synthetic/walk.c3d", "pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d"])

@@ -25,7 +25,7 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
 
         from kinertia.estimation.prior import literature_prior
         from kinertia.estimation.simultaneous.fit import fit_simultaneous
-        from kinertia.motion.dynamics import axis_motion, residual_terms, root_regressor
+        from kinertia.motion.dynamics import axis_motion, consistent_root_acceleration, residual_terms, root_regressor
         from kinertia.motion.kinematics import solve_kinematics
         from kinertia.motion.rigid_body import axis_force_derivatives
         from kinertia.synthetic.walk import walk, walking_subject
@@ -41,7 +41,8 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
         kinematics = solve_kinematics(short.skeleton, measured, 0.0, 10.0)
         progress(_STAGE, _KINEMATICS_SHARE)
         skeleton, bsp, motion = short.skeleton, short.bsp, short.motion
-        residual_terms(skeleton, bsp, motion, short.foot_loads.sum(axis=1))
+        for balance in (residual_terms, consistent_root_acceleration):
+            balance(skeleton, bsp, motion, short.foot_loads.sum(axis=1))
         root_regressor(skeleton, bsp.segments, motion)
         state = axis_motion(skeleton, motion)
         every = np.ones(len(skeleton.tree.parent), dtype=bool)

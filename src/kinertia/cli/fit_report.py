@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
-
-from rich.table import Table
+from typing import TYPE_CHECKING, Any
 
 from kinertia.checks.verdict import Verdict
 from kinertia.cli.terminal import out, plain_table, show_verdicts, show_warning
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
 from kinertia.report.files import summary
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 _MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
 _STAGES = ("literature", "corrected", "estimate")

@@ -5,9 +5,12 @@ A terminal or pipe that is not UTF-8, as on Windows, gets a question mark for ev
 
 from __future__ import annotations
 
+import atexit
 import gc
 import io
+import os
 import sys
+import threading
 from importlib.metadata import version
 
 _NEW_OBJECTS = 100_000
@@ -22,6 +25,7 @@ def main() -> None:
     if given == ["--version"]:
         print(version("kinertia"))
         return
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else every package there is, is looked through
     gc.disable()  # what is imported stays: looking through it for garbage, again and again, finds none
     from kinertia.cli.app import application_for, run
 
@@ -33,3 +37,25 @@ def main() -> None:
         run(app, given)
     finally:
         gc.freeze()  # all of it ends with the process: Python need not look through it for garbage once more
+
+
+def program() -> None:
+    """`main`, with which this process ends."""
+    try:
+        main()
+    except SystemExit as end:
+        _end(end.code)
+        raise
+
+
+def _end(status: object) -> None:
+    """End this process without freeing everything in it one by one first, unless something else is at work in it."""
+    if threading.active_count() > 1 or not isinstance(status, int):
+        return
+    atexit._run_exitfuncs()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except (OSError, ValueError):  # a closed pipe: Python has its own way to say so
+        return
+    os._exit(status)

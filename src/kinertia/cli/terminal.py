@@ -1,4 +1,7 @@
-"""What all commands share on a terminal: results on one stream, progress and errors on the other, plain tables."""
+"""What all commands share on a terminal: results on one stream, progress and errors on the other, plain tables.
+
+A command that is quiet does not load rich.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +9,49 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import typer
-from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
 
 from kinertia.checks.verdict import Verdict
 from kinertia.cli.compiling import compile_once
 
-# names of files and trials may contain what rich takes for markup
-out = Console(markup=False, emoji=False, highlight=False)
-err = Console(markup=False, emoji=False, highlight=False, stderr=True)
+if TYPE_CHECKING:
+    from rich.console import Capture, Console
+    from rich.table import Table
+
+
+class Stream:
+    """One of the two standard streams.
+
+    Attributes:
+        quiet: nothing is written.
+    """
+
+    def __init__(self, stderr: bool = False) -> None:
+        self.quiet = False
+        self._stderr = stderr
+
+    @cached_property
+    def console(self) -> Console:
+        """What writes to it."""
+        from rich.console import Console
+
+        # names of files and trials may contain what rich takes for markup
+        return Console(markup=False, emoji=False, highlight=False, stderr=self._stderr)
+
+    def print(self, *words: Any, **form: Any) -> None:
+        """As `rich.console.Console.print` does."""
+        if not self.quiet:
+            self.console.print(*words, **form)
+
+    def capture(self) -> Capture:
+        """What is written within a `with` block is kept in place of being shown."""
+        return self.console.capture()
+
+
+out, err = Stream(), Stream(stderr=True)
 _COLOURS = {"pass": "green", "caution": "yellow", "fail": "bold red"}
 
 
@@ -46,26 +77,25 @@ def be_quiet(quiet: bool) -> bool:
 
 def show_error(message: str) -> None:
     """One line for one error."""
+    from rich.text import Text
+
     text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
     err.print(text, soft_wrap=True)
 
 
 def show_warning(sentence: str) -> None:
     """One of a result's, on standard output."""
+    from rich.text import Text
+
     out.print(Text("warning: ", style="bold yellow").append(sentence, style="not bold default"))
 
 
 def show_verdicts(verdicts: Iterable[Verdict]) -> None:
     """One paragraph each, the level first."""
+    from rich.text import Text
+
     for level, sentence in verdicts:
         out.print(Text(f"{level}: ", style=_COLOURS[level]).append(sentence, style="not bold default"))
-
-
-class _TimeLeftColumn(TimeRemainingColumn):
-    """The time left, said to be that; nothing as long as nobody knows."""
-
-    def render(self, task: Task) -> Text:
-        return super().render(task).append(" left") if task.time_remaining else Text()
 
 
 @contextmanager
@@ -82,36 +112,30 @@ def shown_progress() -> Iterator[Callable[[str, float], None]]:
 
 @contextmanager
 def _shown_progress() -> Iterator[Callable[[str, float], None]]:
-    seen: list[str] = []
     if out.quiet:
         yield lambda stage, share: None
         return
-    if not err.is_terminal:
+    if err.console.is_terminal:
+        from kinertia.cli.progress_bar import shown_bar
 
-        def line(stage: str, share: float) -> None:
-            if stage not in seen:
-                seen.append(stage)
-                err.print(stage)
-
-        yield line
+        with shown_bar(err.console) as move:
+            yield move
         return
-    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn(), _TimeLeftColumn())
-    with Progress(*columns, console=err, transient=True) as bar:
+    seen: list[str] = []
 
-        def move(stage: str, share: float) -> None:
-            if seen[-1:] != [stage]:
-                seen.append(stage)
-                for task in bar.task_ids:
-                    bar.remove_task(task)
-                bar.add_task(stage, total=None)  # a task of its own, or the time left would be that of all stages
-            if share > 0:
-                bar.update(bar.task_ids[-1], total=1.0, completed=share)
+    def line(stage: str, share: float) -> None:
+        if stage not in seen:
+            seen.append(stage)
+            err.print(stage)
 
-        yield move
+    yield line
 
 
 def plain_table(*headings: str) -> Table:
     """First two columns to the left if the second has no heading, the numbers to the right."""
+    from rich import box
+    from rich.table import Table
+
     table = Table(box=box.SIMPLE_HEAD, padding=0)
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k == 0 or not heading else "right", overflow="fold")

@@ -28,7 +28,7 @@ from kinertia.trial.data import Markers, Recording, Trial
 from kinertia.trial.exchanged_torques import exchanged_torques_doubts
 from kinertia.trial.foot_ways import belt_doubts
 from kinertia.trial.force_resolution import ringing_doubts
-from kinertia.trial.load_places import load_places_doubts, load_places_trouble
+from kinertia.trial.load_places import LoadPlaces
 from kinertia.trial.mains_hum import hum_doubts, hum_trouble
 from kinertia.trial.marker_faults import (
     exchanged_trouble,
@@ -107,9 +107,11 @@ def trial_doubts(
         trouble = model_on_person_trouble(marker_set.in_model, own, marker_set)
         session = [] if trouble else model_on_person_doubts(marker_set.in_model, own, marker_set)
     smeared = [] if recording.plates is None else ringing_doubts(recording.plates)
+    places = None
     if not trouble and recording.plates is not None:
         trouble = loads_trouble(recording.plates) or hum_trouble(recording.plates)
-        if not trouble and feet is not None and (trouble := load_places_trouble(recording, feet)):
+        places = None if trouble or feet is None else LoadPlaces.of(recording, feet)
+        if places is not None and (trouble := places.trouble()):
             # loads that are smeared last too long, and those with wrong torques act elsewhere
             trouble = "; ".join([*smeared, *torque_columns_doubts(recording.plates), trouble])
     if trouble:
@@ -129,8 +131,8 @@ def trial_doubts(
         sentences += torque_columns_doubts(recording.plates) or torque_point_doubts(recording.plates)
         # what is usual of loads under feet is of people who land on the heel
         backwards = marker_set is not None and walks_backwards(markers, marker_set)
-        if feet is not None and not backwards and _shows_whole_feet(markers, marker_set):
-            sentences += load_places_doubts(recording, feet)
+        if places is not None and not backwards and _shows_whole_feet(markers, marker_set):
+            sentences += places.doubts()
     return _told(sentences)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -24,10 +25,11 @@ from kinertia.model.marker_set import (
 )
 
 
-def preset_names() -> list[str]:
+@cache
+def preset_names() -> tuple[str, ...]:
     """Names of the marker sets that come with the package."""
     folder = resources.files("kinertia.io") / "marker_sets"
-    return sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return tuple(sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml")))
 
 
 def read_marker_set(name: str | Path) -> MarkerSet:
@@ -109,14 +111,14 @@ def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
 
 
 def _check_entry(path: Path, document: TomlFile, table: str, entry: str, value: object, names: Sequence[str]) -> None:
-    line = document.line((table, entry))
     if entry not in names:
         near = difflib.get_close_matches(entry, names, n=1)
         hint = f"; did you mean {near[0]}?" if near else f"; known: {', '.join(names)}"
-        raise FileError(path, f"unknown [{table}] entry '{entry}'{hint}", line)
+        raise FileError(path, f"unknown [{table}] entry '{entry}'{hint}", document.line((table, entry)))
     items = value if isinstance(value, list) else [value]
     if not items or not all(isinstance(item, str) and item for item in items):
-        raise FileError(path, f"[{table}] {entry} must be a label or a list of labels, not {value!r}", line)
+        what = f"[{table}] {entry} must be a label or a list of labels, not {value!r}"
+        raise FileError(path, what, document.line((table, entry)))
 
 
 def _labels(value: str | Sequence[str]) -> tuple[str, ...]:

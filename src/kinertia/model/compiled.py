@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import platformdirs
 
@@ -25,6 +25,7 @@ _COMPLETE = "complete"
 """File that says so."""
 SOURCES = (
     "model/compiled.py",
+    "model/kept_code.py",
     "model/spatial.py",
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
@@ -46,13 +47,20 @@ SOURCES = (
 
 
 def compiled(function: F) -> F:
-    """The function as machine code; division by zero gives inf or nan, as NumPy has it."""
-    return _compiled(function)
+    """The function as machine code, which is kept; division by zero gives inf or nan, as NumPy has it. Only Python
+    calls it.
+    """
+    from kinertia.model.kept_code import KeptCode  # brings numba
+
+    result: Any = _compiled(function)
+    with _kept_in(cache_folder()):
+        result._cache = KeptCode(function)
+    return cast(F, result)
 
 
 def part(function: F) -> F:
-    """As `compiled`, for functions that only compiled ones call: to let Python call them takes longer to compile than
-    many of them do.
+    """As `compiled`, for functions that only compiled ones call, with whose code theirs is kept: to let Python call
+    them takes longer to compile than many of them do.
     """
     return _compiled(function, no_cpython_wrapper=True)
 
@@ -65,9 +73,7 @@ def inlined(function: F) -> F:
 def _compiled(function: F, **options: bool) -> F:
     import numba  # so that commands which compute nothing do not load it
 
-    with _kept_in(cache_folder()):
-        compile_it = numba.njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)
-        result: F = compile_it(function)
+    result: F = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)(function)
     return result
 
 

@@ -74,7 +74,7 @@ def _elsewhere(markers: Markers, marker_set: MarkerSet, far: Sequence[_Pair]) ->
     segments = {name: [one for one in own if one in markers.labels] for name, own in marker_set.segments.items()}
     for odd in {label for pair in far for label in (pair.one, pair.other)}:
         changes = {
-            name: np.median([_change_m(markers, odd, mate) for mate in own if mate != odd])
+            name: np.median(_changes_m(markers, [(odd, mate) for mate in own if mate != odd]))
             for name, own in segments.items()
             if set(own) - {odd} and (odd in own or not name.startswith(_OWN_WAY))
         }
@@ -109,7 +109,7 @@ def _neighbours_change_m(markers: Markers, marker_set: MarkerSet, upper: str, lo
     """Median over the pairs of a marker of each; NaN where one has none."""
     here = set(markers.labels)
     above, below = ([label for label in marker_set.segments.get(name, ()) if label in here] for name in (upper, lower))
-    changes = [_change_m(markers, one, other, np.nan) for one in above for other in below]
+    changes = _changes_m(markers, [(one, other) for one in above for other in below], np.nan)
     return float(np.nanmedian(changes)) if np.isfinite(changes).any() else np.nan
 
 
@@ -130,7 +130,8 @@ def _pairs(markers: Markers, marker_set: MarkerSet) -> list[_Pair]:
             if all(labels and labels[0] in here for labels in both):
                 words = f"on both sides of the {'right' if side == 'r' else 'left'} {one.partition('_')[0]}"
                 named.append((both[0][0], both[1][0], words))
-    return [_Pair(_change_m(markers, one, other), one, other, joined) for one, other, joined in named]
+    changes = _changes_m(markers, [(one, other) for one, other, _ in named])
+    return [_Pair(float(change), *which) for change, which in zip(changes, named, strict=True)]
 
 
 def _rather(markers: Markers, marker_set: MarkerSet, far: Sequence[_Pair], worst: _Pair) -> str:
@@ -140,15 +141,24 @@ def _rather(markers: Markers, marker_set: MarkerSet, far: Sequence[_Pair], worst
     torn = Counter(label for pair in far for label in (pair.one, pair.other))
     odd = max((worst.one, worst.other), key=lambda label: (label not in marks, torn[label]))
     mates = [mate for mate in markers.labels if mate in owners and owners[mate] != owners.get(odd)]
-    changes = [_Pair(_change_m(markers, odd, mate, np.inf), odd, mate, owners[mate]) for mate in mates]
-    best = min(changes, default=worst)
+    changes = _changes_m(markers, [(odd, mate) for mate in mates], np.inf)
+    rather = [_Pair(float(change), odd, mate, owners[mate]) for change, mate in zip(changes, mates, strict=True)]
+    best = min(rather, default=worst)
     if best.change_m > min(_TOGETHER_M, _MUCH_BETTER * worst.change_m):
         return ""
     return f", and that from {best.one} to {best.other} ({best.joined}) by {1e3 * best.change_m:.0f} mm"
 
 
-def _change_m(markers: Markers, one: str, other: str, unknown: float = 0.0) -> float:
-    place = markers.select((one, other)).positions
-    apart: FloatArray = np.linalg.norm(place[:, 0] - place[:, 1], axis=1)
-    apart = apart[np.isfinite(apart)]
-    return float(np.ptp(np.quantile(apart, _MOST_LOWEST))) if len(apart) >= _FEWEST_FRAMES else unknown
+def _changes_m(markers: Markers, pairs: Sequence[tuple[str, str]], unknown: float = 0.0) -> FloatArray:
+    """(p,) m, by how much the distance of each two markers changes; `unknown` where few frames show both."""
+    place = {label: column for column, label in enumerate(markers.labels)}
+    one, other = ([place[pair[end]] for pair in pairs] for end in (0, 1))
+    apart: FloatArray = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=2)
+    seen = np.isfinite(apart)
+    known = np.count_nonzero(seen, axis=0) >= _FEWEST_FRAMES
+    always = known & seen.all(axis=0)
+    changes = np.full(len(pairs), unknown)
+    changes[always] = np.ptp(np.quantile(apart[:, always], _MOST_LOWEST, axis=0), axis=0)
+    for pair in np.flatnonzero(known & ~always):
+        changes[pair] = np.ptp(np.quantile(apart[seen[:, pair], pair], _MOST_LOWEST))
+    return changes

@@ -12,11 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FEET
 from kinertia.trial.gait_events import GaitEvent, gait_events, load_edges
 from kinertia.trial.ground_contact import CONTACT_SLACK_S
@@ -107,7 +107,7 @@ def feet_under_pelvis(skeleton: Skeleton, kinematics: Kinematics) -> FeetUnderPe
         ]
         parts.append([pose.rotation[:, 0, :, 0], pose.translation[:, 0], *feet])
     facing, pelvis, *points = (np.concatenate(column) for column in zip(*parts, strict=True))
-    facing = gaussian_filter1d(facing, _HEADING_S * len(time) / max(np.ptp(time), 1e-9), axis=0, mode="nearest")
+    facing = gaussian_mean(facing, _HEADING_S * len(time) / max(np.ptp(time), 1e-9))
     facing = facing * [1.0, 0.0, 1.0]
     heading = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
     return FeetUnderPelvis(

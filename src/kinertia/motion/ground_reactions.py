@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.load_splines import loads_and_rates
+from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
@@ -191,5 +191,5 @@ def _points(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
     """Mean over about half a period of the motion's cutoff."""
-    result: np.ndarray = gaussian_filter1d(values, 0.25 / motion_hz / step_s, axis=0, mode="nearest")
+    result: np.ndarray = gaussian_mean(values, 0.25 / motion_hz / step_s)
     return result

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
-from kinertia.trial.data import FloatArray, Markers
+from kinertia.trial.data import BoolArray, FloatArray, Markers
 
 _SHARES = {"pelvis": 14.2, "torso": 40.0, "thigh": 12.3, "shank": 4.8, "foot": 1.2, "upper_arm": 2.4, "forearm": 2.3}
 """Per cent of the body's mass, head with torso, hand with forearm (Dumas 2007, men)."""
@@ -32,14 +32,20 @@ def markers_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | 
     for column, label in enumerate(markers.labels):
         if owners.get(label) and seen[:, column].mean() >= _SEEN:
             known = seen[:, column]
-            own = [np.interp(markers.time, markers.time[known], way[known]) for way in markers.positions[:, column].T]
-            places.setdefault(owners[label], []).append(np.stack(own, axis=1))
+            places.setdefault(owners[label], []).append(_filled(markers.time, markers.positions[:, column], known))
     if not places.keys() & {"pelvis", "torso"}:
         return None
     shares = _shares(places)
     middles = (shares[name] * np.mean(own, axis=0) for name, own in places.items())
     total: FloatArray = sum(middles, np.zeros((len(seen), 3)))
     return total / sum(shares.values())
+
+
+def _filled(time: FloatArray, way: FloatArray, known: BoolArray) -> FloatArray:
+    """A way (n, 3), bridged by lines where it is not known."""
+    if known.all():
+        return way
+    return np.stack([np.interp(time, time[known], along[known]) for along in way.T], axis=1)
 
 
 def _shares(segments: Mapping[str, object]) -> dict[str, float]:

@@ -48,6 +48,7 @@ Hoog FR (1985) Numer Math 47:99-106. de Hoog FR, Hutchinson MF (1987) Numer Math
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import factorial
 from typing import Literal
 
@@ -303,7 +304,7 @@ class _System:
     @classmethod
     def of(cls, t: Array) -> _System:
         """A stretch at a time: row j of either knows of t[j] to t[j + 5] only."""
-        parts = [_matrices(t[rows.start : rows.stop + 5]) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
+        parts = [_matrices(t[rows.start : rows.stop + 5].tobytes()) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
         rows = [slice(0, _ROWS_AT_ONCE)] * (len(parts) - 1) + [slice(None)]
         differences = [own[kept] for (own, _), kept in zip(parts, rows, strict=True)]
         gram = [own[:, kept] for (_, own), kept in zip(parts, rows, strict=True)]
@@ -375,8 +376,10 @@ class _System:
         return matrix
 
 
-def _matrices(t: Array) -> tuple[Array, Array]:
-    """`differences` and `gram` of `_System` for sample times (n,)."""
+@lru_cache(maxsize=4)
+def _matrices(times: bytes) -> tuple[Array, Array]:
+    """`differences` and `gram` of `_System` for sample times (n,): wanted again for each quantity of a trial."""
+    t = np.frombuffer(times)
     n = len(t)
     knots = np.stack([t[m : n - 3 + m] for m in range(4)], axis=1)
     factors = knots[:, :, None] - knots[:, None, :] + np.eye(4)

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FloatArray, Markers, Trial
 
 TRUNK_SD_M = 0.08
@@ -71,7 +71,7 @@ def _facing(forward: FloatArray, rate_hz: float) -> FloatArray:
     known = np.asarray(np.isfinite(forward).all(axis=1))
     flat = np.where(known[:, None], forward, 0.0) * [1.0, 0.0, 1.0]
     if len(flat) > 1:
-        flat = gaussian_filter1d(flat, _HEADING_S * rate_hz, axis=0, mode="nearest")
+        flat = gaussian_mean(flat, _HEADING_S * rate_hz)
     x = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
     up = np.tile([0.0, 1.0, 0.0], (len(x), 1))
     return np.stack([x, up, np.cross(x, up)], axis=2)

@@ -8,6 +8,7 @@ On sound trials, measured in six laboratories and made by OpenSim, loads act wit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,43 +35,55 @@ _OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
 _MOSTLY = 0.5
 
 
-def load_places_trouble(recording: Recording, feet: Mapping[str, Sequence[str]]) -> str:
-    """Why loads cannot be those of these feet at this time; empty where they can.
+@dataclass(frozen=True, eq=False)
+class LoadPlaces:
+    """Where loads and feet are.
 
-    Args:
-        recording: a motion with plates.
-        feet: labels of the markers on each foot, "r" and "l".
+    Attributes:
+        plates: their loads.
+        contacts: every load, with what it says of the feet.
+        ways: of the right and the left foot.
     """
-    ways = foot_ways(recording.markers, feet, recording.belt)
-    if ways is None or recording.plates is None:
-        return ""
-    contacts = contacts_of(recording.plates, ways)
-    if not contacts:
-        return ""
-    return (
-        _unit_trouble(recording.plates, contacts)
-        or other_rate_trouble(recording.plates, contacts, ways)
-        or rate_trouble(recording.plates, contacts, ways)
-        or exchanged_plates_trouble(recording.plates, contacts, ways)
-        or delay_trouble(recording.plates, contacts, ways)
-        or turned_plates_trouble(recording.plates, contacts, ways)
-        or other_delay_trouble(recording.plates, contacts, ways)
-        or _place_trouble(contacts)
-    )
 
+    plates: PlateLoads
+    contacts: Sequence[Contact]
+    ways: tuple[FootWay, FootWay]
 
-def load_places_doubts(recording: Recording, feet: Mapping[str, Sequence[str]]) -> list[str]:
-    """Loads that do not travel along their foot, offsets of all plates together, and loads that belong to both feet, if
-    `load_places_trouble` found nothing.
-    """
-    ways = foot_ways(recording.markers, feet, recording.belt)
-    if ways is None or recording.plates is None:
-        return []
-    contacts = contacts_of(recording.plates, ways)
-    if travel := load_travel_doubts(recording.plates, contacts, ways):
-        return travel
-    doubts = [_offset_doubt(contacts), _both_feet_doubt(recording.plates, contacts, ways)]
-    return [one for one in doubts if one]
+    @classmethod
+    def of(cls, recording: Recording, feet: Mapping[str, Sequence[str]]) -> LoadPlaces | None:
+        """Of a motion; None without plates, or where a foot is hardly seen.
+
+        Args:
+            recording: the motion.
+            feet: labels of the markers on each foot, "r" and "l".
+        """
+        if recording.plates is None or (ways := foot_ways(recording.markers, feet, recording.belt)) is None:
+            return None
+        return cls(recording.plates, contacts_of(recording.plates, ways), ways)
+
+    def trouble(self) -> str:
+        """Why loads cannot be those of these feet at this time; empty where they can."""
+        if not self.contacts:
+            return ""
+        return (
+            _unit_trouble(self.plates, self.contacts)
+            or other_rate_trouble(self.plates, self.contacts, self.ways)
+            or rate_trouble(self.plates, self.contacts, self.ways)
+            or exchanged_plates_trouble(self.plates, self.contacts, self.ways)
+            or delay_trouble(self.plates, self.contacts, self.ways)
+            or turned_plates_trouble(self.plates, self.contacts, self.ways)
+            or other_delay_trouble(self.plates, self.contacts, self.ways)
+            or _place_trouble(self.contacts)
+        )
+
+    def doubts(self) -> list[str]:
+        """Loads that do not travel along their foot, offsets of all plates together, and loads that belong to both
+        feet, if `trouble` found nothing.
+        """
+        if travel := load_travel_doubts(self.plates, self.contacts, self.ways):
+            return travel
+        doubts = [_offset_doubt(self.contacts), _both_feet_doubt(self.plates, self.contacts, self.ways)]
+        return [one for one in doubts if one]
 
 
 def _unit_trouble(plates: PlateLoads, contacts: Sequence[Contact]) -> str:

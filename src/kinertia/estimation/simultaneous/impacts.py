@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
-from scipy.ndimage import maximum_filter1d
 
+from kinertia.motion.moving_windows import greatest
 from kinertia.trial.sampled_time import runs
 
 _BESIDE = 2.0
@@ -54,7 +54,7 @@ def impact_factors(
         step_s = (time[last] - time[first]) / (last - first)
         spacing = max(spacing_s, 2.0 * step_s)
         left = _left(time[own], force[own], spacing)
-        near = maximum_filter1d(left, 1 + 2 * round(0.5 * spacing / step_s))
+        near = greatest(left, 1 + 2 * round(0.5 * spacing / step_s))
         result[own] = np.sqrt(1.0 + np.square(_BESIDE * near / force_sd))
     return result
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.motion.moving_windows import all_around
 
 _UNSEEN = 3.0
 """Skin that moves as a block moves the segment and leaves nothing to see: the power of all errors over that of those
@@ -48,7 +48,7 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
         n, m, _ = left.shape
         own = MotionBasis(trial.time[frames], spacing_s)
         around = 1 + 2 * int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
-        inside = minimum_filter1d(np.isfinite(left).all(axis=-1), around, axis=0, mode="constant", cval=0)
+        inside = all_around(np.isfinite(left).all(axis=-1), around)
         rows = inside & trial.dynamic[frames][:, None]
         for square, part in zip(squares, own.evaluate(own.fit(left.reshape(n, -1))), strict=True):
             square += np.where(rows, np.square(part).reshape(n, m, 3).sum(axis=-1), 0.0).sum(axis=0)
