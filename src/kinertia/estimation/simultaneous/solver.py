@@ -76,6 +76,8 @@ _MOTION_CONVERGED = 3e-4
 """As CONVERGED, of the motion alone."""
 _MOST_THROUGH_IMPACTS = 5
 """Quadratics for the motion alone; one or two are usual."""
+_CONTINUED = 0.01
+"""As CONVERGED, of an estimate that differs in its knots only: some tenths of a deviation apart, and averaged."""
 _MOST_CONTINUED = 3
 """Quadratics from an optimum to that with other knots; one is usual."""
 _USUAL_ITERATIONS = 5
@@ -190,7 +192,7 @@ def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.slope.point, _LEAST_DAMPING)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.right).static))
-        at = _descended(problem, model, at._replace(slope=here.slope), True, CONVERGED)
+        at = _descended(problem, model, at._replace(slope=here.slope), False, _CONTINUED)
         if at.converged:
             break
     return at.slope.point
