@@ -384,7 +384,6 @@ def _matrices(times: bytes) -> tuple[Array, Array]:
     knots = np.stack([t[m : n - 3 + m] for m in range(4)], axis=1)
     factors = knots[:, :, None] - knots[:, None, :] + np.eye(4)
     differences = 2 * (knots[:, 3] - knots[:, 0])[:, None] / factors.prod(axis=2)
-
     nodes, weights = np.polynomial.legendre.leggauss(3)  # exact to degree 5; the integrand has degree 4
     x = t[:-1, None] + np.diff(t)[:, None] * (nodes + 1) / 2
     weight = np.diff(t)[:, None] * weights / 2
