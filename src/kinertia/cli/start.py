@@ -50,7 +50,10 @@ def program() -> None:
 
 def _end(status: object) -> None:
     """End this process without freeing everything in it one by one first, unless something else is at work in it."""
-    if threading.active_count() > 1 or not isinstance(status, int):
+    from kinertia.motion.two_threads import THREAD
+
+    at_work = [each for each in threading.enumerate() if not each.name.startswith(THREAD)]
+    if len(at_work) > 1 or not isinstance(status, int):
         return
     atexit._run_exitfuncs()
     try:

@@ -18,6 +18,8 @@ from typing import TypeVar
 T = TypeVar("T")
 R = TypeVar("R")
 
+THREAD = "kinertia"
+"""How the name of the second thread begins."""
 _second = Lock()
 """Held by whoever has the second thread: nobody makes a third."""
 
@@ -45,7 +47,7 @@ def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
 @cache
 def _thread() -> ThreadPoolExecutor:
     """The second thread, which is started once."""
-    return ThreadPoolExecutor(1, thread_name_prefix="kinertia")
+    return ThreadPoolExecutor(1, thread_name_prefix=THREAD)
 
 
 @cache

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.elimination import Branch, Eliminated, Factored
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
@@ -24,6 +23,7 @@ from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK,
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.moving_windows import even_mean
 from kinertia.motion.two_threads import side_by_side
 
 _FRAMES_AT_ONCE = 100
@@ -96,7 +96,7 @@ def curve_deviations(
     side_by_side(lambda branch: curves.add(branch, root, middle), eliminated.branches)
     variance, impact, speed = curves.variance, curves.impact, curves.speed
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    lost = uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
+    lost = even_mean(np.square(impact), around)
     parts = (
         variance.coordinates,
         variance.moments + lost,

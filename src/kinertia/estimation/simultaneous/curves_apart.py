@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.moving_windows import even_mean
 
 _KNOTS = 2.0
 """Half of the stretch over which their squares are averaged, in knot intervals: few estimates are alike by chance."""
@@ -22,7 +22,7 @@ def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int
     basis = problems[0].bases[k]
     around = 1 + 2 * round(_KNOTS * len(basis.first) / (basis.size - 5))
     parts = [np.stack(each) for each in zip(*every, strict=True)]
-    variances = [uniform_filter1d(each.var(axis=0, ddof=1), around, axis=0, mode="nearest") for each in parts]
+    variances = [even_mean(each.var(axis=0, ddof=1), around) for each in parts]
     return CurveDeviations(*(np.sqrt(np.maximum(each, 0.0)) for each in variances))
 
 

@@ -8,7 +8,8 @@ force that accelerates the body.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+
+from kinertia.motion.moving_windows import even_mean
 
 _SWING = 0.015
 """Root error per force that accelerates the body. Set on one person's trials: the clocks of jumps and walks agree as
@@ -37,6 +38,6 @@ def swing_factors(
     """
     accelerating = np.where(dynamic[:, None], force - [0.0, weight_n, 0.0], 0.0)
     frames = 1 + 2 * round(0.5 * _SWING_S * (len(time) - 1) / (time[-1] - time[0]))
-    square = np.maximum(uniform_filter1d(np.square(accelerating).sum(axis=1), frames), 0.0)
+    square = np.maximum(even_mean(np.square(accelerating).sum(axis=1), frames), 0.0)
     result: np.ndarray = np.sqrt(1.0 + square * (_SWING / usual_n) ** 2)
     return result
