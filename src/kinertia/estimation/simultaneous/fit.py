@@ -13,6 +13,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.instrument_warnings import (
     CLOCK_OF,
+    GAIN,
     GAIN_IN,
     instrument_corrections,
     instrument_warnings,
@@ -256,7 +257,8 @@ def _calibration(
                 calibration[f"{name}: {unknown}"] = _entry(value, known.zero_n.sd, sd, unit)
     for trial, gains in zip(trials, result.gains, strict=True):
         for plate, (gain, sd) in gains.items():
-            calibration[f"{_plate(plate)}: {GAIN_IN}{trial}"] = _entry(gain, known.trial_gain.sd, sd, "1")
+            expected = float(np.hypot(known.plate[GAIN].sd, known.trial_gain.sd))
+            calibration[f"{_plate(plate)}: {GAIN_IN}{trial}"] = _entry(gain, expected, sd, "1")
     for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False):
         calibration[f"{BENDING_IN}{trial}"] = _entry(kappa, mass_kg * BENDING_PRIOR_M.sd, sd, "kg m")
     return calibration

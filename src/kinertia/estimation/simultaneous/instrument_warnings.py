@@ -18,9 +18,10 @@ Entry = Mapping[str, float | str]
 error, put back, moves the joint moment that it moves most) and contradicted_by ("" by nobody)."""
 
 _NOTABLE = 2.0
+_NOTHING: Entry = {"value": 0.0, "prior_sd": 1.0, "sd": 1.0, "unit": "1"}
 GAIN = "gain"
 GAIN_IN = "gain in "
-"""Before the name of a trial, what a plate's gain is there besides that in all trials."""
+"""Before the name of a trial, the whole gain of a plate in it: what it has in all trials, and there besides."""
 FREE_MOMENT = "free moment"
 """What a plate adds to the vertical moment, among what is calibrated."""
 CLOCK_OF = "clock of "
@@ -75,13 +76,21 @@ def instrument_corrections(calibration: Mapping[str, Entry], along: Mapping[str,
 
 
 def _own(calibration: Mapping[str, Entry]) -> Iterator[tuple[str, Entry]]:
-    """Entries of instruments, without what several plates have alike."""
+    """Entries of instruments, without what several plates have alike.
+
+    A gain that is certain is that of all trials; else it is what the plate has in each.
+    """
     elsewhere: dict[str, dict[str, float]] = {what: common(calibration, what) for what in (GAIN, *ZERO_UNKNOWNS)}
     elsewhere[FREE_MOMENT] = mirrored_free_moments(calibration)
     for name, entry in calibration.items():
-        _, colon, what = name.partition(": ")
-        if colon and not elsewhere.get(what):
-            yield name, entry
+        instrument, colon, what = name.partition(": ")
+        if not colon or elsewhere.get(GAIN if what.startswith(GAIN_IN) else what):
+            continue
+        of_all = accuses(calibration.get(f"{instrument}: {GAIN}", _NOTHING))
+        single = any(each.startswith(f"{instrument}: {GAIN_IN}") for each in calibration)
+        if (what.startswith(GAIN_IN) and of_all) or (what == GAIN and single and not of_all):
+            continue
+        yield name, entry
 
 
 class _Error:

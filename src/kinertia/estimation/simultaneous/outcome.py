@@ -13,6 +13,8 @@ from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.plate_loads import GAIN
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
@@ -37,7 +39,7 @@ class SimultaneousResult:
             of a single trial whose clock has been checked.
         zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
             deviations (2,).
-        gains: per trial, per plate its gain in it besides that in all, and the posterior deviation.
+        gains: per trial, per plate its whole gain in it, and the posterior deviation.
         trunks_kg_m: per trial how much the trunk bends (`trunk_bending`), and the posterior deviation; none without a
             trunk.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
@@ -123,7 +125,7 @@ def result_of(
         (float(values[layout.clock]), float(sd[layout.clock])),
         tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
         tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
-        tuple(_gains(problem, k, values, sd) for k in range(len(problem.trials))),
+        tuple(_gains(problem, k, values, covariance) for k in range(len(problem.trials))),
         tuple(zip(values[layout.trunks].tolist(), sd[layout.trunks].tolist(), strict=True)),
         tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
         tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
@@ -148,12 +150,15 @@ def _at_most(covariance: np.ndarray, sd: np.ndarray) -> np.ndarray:
     return result
 
 
-def _gains(problem: MapProblem, k: int, values: np.ndarray, sd: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Those of a trial, and their deviations."""
-    at = problem.layout.gains_of(k)
-    return dict(
-        zip(problem.trials[k].ground.plates, zip(values[at].tolist(), sd[at].tolist(), strict=True), strict=True)
-    )
+def _gains(problem: MapProblem, k: int, values: np.ndarray, covariance: np.ndarray) -> dict[str, tuple[float, float]]:
+    """The whole gains of a trial's plates in it, and their deviations."""
+    result, layout = {}, problem.layout
+    for plate, at in zip(problem.trials[k].ground.plates, layout.gains_of(k), strict=True):
+        sums = np.zeros(layout.size)
+        sums[layout.plates] = problem.to_plates[len(PLATE_ERRORS) * problem.plates.index(plate) + GAIN]
+        sums[at] = 1.0
+        result[plate] = float(sums @ values), float(np.sqrt(sums @ covariance @ sums))
+    return result
 
 
 def _shown(
