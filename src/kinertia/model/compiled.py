@@ -36,6 +36,7 @@ SOURCES = (
     "estimation/simultaneous/axis_columns.py",
     "estimation/simultaneous/normal_equations.py",
     "estimation/simultaneous/elimination.py",
+    "estimation/simultaneous/root_gradient.py",
     "estimation/simultaneous/knot_interval.py",
     "estimation/simultaneous/seen_markers.py",
     "estimation/simultaneous/marker_gradient.py",

@@ -78,13 +78,8 @@ def empty_frame(a: int, gravity_m_s2: float) -> Frame:
 @part
 def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
     """Places, velocities and accelerations in one frame, from places, rates and accelerations of the axes (a,)."""
-    axes, velocity, acceleration, swept, turned = (
-        frame.axes,
-        frame.velocity,
-        frame.acceleration,
-        frame.swept,
-        frame.turned,
-    )
+    axes, velocity, acceleration = frame.axes, frame.velocity, frame.acceleration
+    swept, turned = frame.swept, frame.turned
     place_axes(tree, x, frame.rotation, frame.translation, axes)
     twice = np.empty((1, 6))
     for j in range(len(x)):
@@ -128,7 +123,7 @@ def _place_inertia(j: int, bodies: np.ndarray, frame: Frame) -> None:
 
 
 @inlined
-def _inertia_times(inertia: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
+def inertia_times(inertia: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
     """out[k] = I_j s[i]."""
     m, x, y, z = inertia[j, 0], inertia[j, 1], inertia[j, 2], inertia[j, 3]
     lx, ly, lz, wx, wy, wz = s[i, 0], s[i, 1], s[i, 2], s[i, 3], s[i, 4], s[i, 5]
@@ -154,7 +149,7 @@ def _bias_times(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray
 
 
 @inlined
-def _times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
+def times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
     """out[k] = s[i] B_j."""
     x, y, z = 2.0 * bias[j, 0], 2.0 * bias[j, 1], 2.0 * bias[j, 2]
     lx, ly, lz, wx, wy, wz = s[i, 0], s[i, 1], s[i, 2], s[i, 3], s[i, 4], s[i, 5]
@@ -202,10 +197,10 @@ def _columns(frame: Frame) -> None:
     for j in range(len(axes)):
         force_cross(axes, j, frame.force, j, place, j)
         _bias_times(bias, j, swept, j, by_swept, j)
-        _inertia_times(inertia, j, frame.turned, j, by_turned, j)
+        inertia_times(inertia, j, frame.turned, j, by_turned, j)
         _bias_times(bias, j, axes, j, rate, j)
-        _inertia_times(inertia, j, swept, j, twice, j)
-        _inertia_times(inertia, j, axes, j, acceleration, j)
+        inertia_times(inertia, j, swept, j, twice, j)
+        inertia_times(inertia, j, axes, j, acceleration, j)
         for k in range(6):
             place[j, k] += by_swept[j, k] + by_turned[j, k]
             rate[j, k] += 2.0 * twice[j, k]
@@ -233,8 +228,8 @@ def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, 
     for j in range(len(bodies)):
         if _bears(bodies, j):
             _place_inertia(j, bodies, frame)
-            _inertia_times(inertia, j, frame.velocity, j, momentum, j)
-            _inertia_times(inertia, j, frame.acceleration, j, force, j)
+            inertia_times(inertia, j, frame.velocity, j, momentum, j)
+            inertia_times(inertia, j, frame.acceleration, j, force, j)
             force_cross(frame.velocity, j, momentum, j, second, 0)
             for k in range(6):
                 force[j, k] += second[0, k]
@@ -242,14 +237,20 @@ def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, 
 
 
 @part
-def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
-    """Inertia and bias of all that the axes carry, and the derivatives `column`, after `fill`."""
+def carry(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
+    """Inertia and bias of all that the axes carry, after `fill`."""
     frame.bias[:] = 0.0
     for j in range(len(bodies)):
         if _bears(bodies, j):
             _place_bias(j, frame.velocity, frame.inertia, frame.momentum, frame.bias)
     hand_down(tree.parent, frame.inertia)
     hand_down(tree.parent, frame.bias)
+
+
+@part
+def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
+    """The same, and the derivatives `column`."""
+    carry(tree, bodies, frame)
     _columns(frame)
 
 
@@ -309,7 +310,7 @@ def root_balance(
         fill(tree, bodies, x[k], v[k], a[k], frame)
         hand_down(tree.parent, inertia)
         for j in range(6):
-            _inertia_times(inertia, j, frame.axes, j, column, j)
+            inertia_times(inertia, j, frame.axes, j, column, j)
             taken_about(column[j], about[k], by[k, :, j])
         whole_load(tree.parent, frame.force, load, k)
     return load, by
@@ -389,8 +390,8 @@ def _through_axes(parent: np.ndarray, moving: np.ndarray, frame: Frame, by: tupl
             i = parent[i]
         if not moving[j]:
             continue
-        _times_bias(bias, j, axes, j, biased, j)
-        _inertia_times(inertia, j, axes, j, borne, j)
+        times_bias(bias, j, axes, j, biased, j)
+        inertia_times(inertia, j, axes, j, borne, j)
         i = parent[j]
         while i >= 0:
             place[j, i] = inner(biased, j, swept, i) + inner(borne, j, turned, i)

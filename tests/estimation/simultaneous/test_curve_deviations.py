@@ -40,7 +40,7 @@ def moments(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: 
 
 
 def prior_information(problem, static: np.ndarray) -> np.ndarray:
-    information, places = problem.prior_terms(static)[0], problem.layout.instruments
+    information, places = problem.prior_information(static), problem.layout.instruments
     information[places, places] += GaussianPrior.of(problem.instruments).precision
     return information
 
@@ -228,7 +228,8 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
     sizes = [normal.right.size for normal in normals]
     ends = s + 2 * wide + np.cumsum(sizes)
     information, right = np.zeros((ends[-1],) * 2), np.zeros(ends[-1])
-    information[:s, :s], right[:s], _ = pair.prior_terms(point.static)
+    information[:s, :s] = pair.prior_information(point.static)
+    right[:s], _ = pair.prior_slope(point.static)
     information[places, places] += gaussian.precision
     right[places] += gaussian.pull - gaussian.precision @ point.static[places]
     chains = []

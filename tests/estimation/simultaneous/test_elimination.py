@@ -12,7 +12,8 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.estimation.simultaneous.stretches import stretches
+from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches
+from kinertia.motion import two_threads
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin
 from study_bound import dense_band
@@ -49,7 +50,9 @@ def longer_problem() -> MapProblem:
 
 @pytest.fixture(scope="module")
 def whole():
-    return longer_problem()
+    problem = longer_problem()
+    problem.stretches = [(Stretch.whole(basis),) for basis in problem.bases]
+    return problem
 
 
 @pytest.fixture(scope="module", params=[1, 2, 3])
@@ -117,12 +120,12 @@ def test_single_precision_loses_nothing_that_counts(cut, here, monkeypatch):
     """In units of each unknown's own information, and of how much of that with the motion known is left of it."""
     monkeypatch.setattr(elimination, "UNSAFE", np.inf)
     single = cut.eliminated(0, *here)
-    assert single.last.border.dtype == np.float32
+    assert single.middle.border.dtype == np.float32
     monkeypatch.setattr(elimination, "UNSAFE", 0.0)
     double = cut.eliminated(0, *here)
-    assert double.last.border.dtype == np.float64
+    assert double.middle.border.dtype == np.float64
     # zeros and plates of this problem are shown by next to nothing else
-    scale = np.sqrt(1.0 + np.diag(double.information) + np.diag(cut.prior_terms(here[1])[0]))
+    scale = np.sqrt(1.0 + np.diag(double.information) + np.diag(cut.prior_information(here[1])))
     left = (double.static_diagonal / scale**2).max()
     off = (single.information - double.information) / np.outer(scale, scale)
     assert np.abs(off).max() < 2e-6 * left
@@ -160,6 +163,39 @@ def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
     for k in range(2):
         close(actual.motions[k].qdd, expected.motions[k].qdd)
         close(actual.curve_deviations[k].moments, expected.curve_deviations[k].moments)
+
+
+def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
+    problem = longer_problem()
+    given = problem.skeleton, problem.prior, problem.calibration, problem.trials
+    results = []
+    for cores in (1, 2):
+        monkeypatch.setattr(two_threads, "_cores", lambda cores=cores: cores)
+        results.append(estimate_simultaneous(*given))
+    one, two = results
+    assert len(problem.stretches[0]) > 1
+    assert two.cost == one.cost
+    np.testing.assert_array_equal(two.bsp.table(), one.bsp.table())
+    np.testing.assert_array_equal(two.bsp_covariance, one.bsp_covariance)
+    np.testing.assert_array_equal(two.motions[0].qdd, one.motions[0].qdd)
+    for each in fields(CurveDeviations):
+        np.testing.assert_array_equal(*(getattr(result.curve_deviations[0], each.name) for result in results))
+
+
+@pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])
+def test_gradients_are_taken_of_the_same_frames_in_longer_stretches(splines, monkeypatch):
+    monkeypatch.setattr(limits, "_FRAMES_OF_GRADIENT", 30)
+    basis = MotionBasis(np.linspace(0.0, 1.0, 4 * splines), 1.0 / (splines - 5))
+    parts = stretches(basis, 6)
+    front, back = (joined(half) for half in halves(parts))
+    every = [*front, *reversed(back)]
+    assert [frame for part in every for frame in range(part.frames.start, part.frames.stop)] == list(
+        range(len(basis.first))
+    )
+    assert [spline for part in every for spline in range(part.splines.start, part.splines.stop)] == list(range(splines))
+    for part in every:
+        assert basis.active[part.frames].min() >= part.touched.start
+        assert basis.active[part.frames].max() < part.touched.stop
 
 
 @pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])

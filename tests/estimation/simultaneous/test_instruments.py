@@ -119,15 +119,14 @@ def test_the_session_counts_in_the_normal_equations():
     with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials)
     places, static = problem.layout.laboratory, problem.start_static.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
-    (before, right_before, cost_before), (information, right, cost) = (
-        each.prior_terms(static) for each in (problem, with_session)
-    )
+    before, information = (each.prior_information(static) for each in (problem, with_session))
+    (right_before, cost_before), (right, cost) = (each.prior_slope(static) for each in (problem, with_session))
     np.testing.assert_allclose((information - before)[places, places], 2.0 * session.information)
 
     def extra(values):
         moved = static.copy()
         moved[places] = values
-        return with_session.prior_terms(moved)[2] - problem.prior_terms(moved)[2]
+        return with_session.prior_slope(moved)[1] - problem.prior_slope(moved)[1]
 
     assert cost - cost_before == pytest.approx(extra(static[places]))
     for i in range(places.stop - places.start):

@@ -48,7 +48,7 @@ def test_gradient_of_static_unknowns(problem, here, kind):
     part = slice(part, part + 1) if isinstance(part, int) else part
     step = np.zeros_like(static)
     step[part] = np.random.default_rng(0).normal(size=step[part].shape)
-    right = problem.normal(0, coefficients, static).static_right + problem.prior_terms(static)[1]
+    right = problem.normal(0, coefficients, static).static_right + problem.prior_slope(static)[0]
     slope = sloped(lambda h: cost(problem, coefficients, static + h * step), 1e-6)
     assert -right @ step == pytest.approx(slope, rel=1e-5)
 
@@ -81,7 +81,7 @@ def test_cost_is_half_the_sum_of_squares(any_problem):
     problem = any_problem
     (coefficients,), static = point(problem)
     expected = 0.5 * np.square(residuals(problem, 0, coefficients, static)).sum()
-    assert cost(problem, coefficients, static) == pytest.approx(expected + problem.prior_terms(static)[2])
+    assert cost(problem, coefficients, static) == pytest.approx(expected + problem.prior_slope(static)[1])
 
 
 @pytest.mark.parametrize("any_problem", [pytest.param("27 DOF", marks=pytest.mark.slow), "curved axes"], indirect=True)
@@ -152,7 +152,7 @@ def test_a_slope_is_the_derivative_of_the_cost_by_everything(problem):
 def test_prior_information_is_the_derivative_of_its_gradient(problem):
     """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
     static = problem.start_static
-    information, right, value = problem.prior_terms(static)
+    information, (right, value) = problem.prior_information(static), problem.prior_slope(static)
     # without that of the instruments, about which this says nothing
     places = problem.layout.instruments
     information[places, places] += GaussianPrior.of(problem.instruments).precision
@@ -160,11 +160,11 @@ def test_prior_information_is_the_derivative_of_its_gradient(problem):
     np.testing.assert_allclose(right * scale, 0.0, atol=1e-6)
     assert value == pytest.approx(0.0, abs=1e-12)
     h = 1e-5
-    information = problem.prior_terms(static)[0]
+    information = problem.prior_information(static)
     for j in np.random.default_rng(0).choice(len(static), 30, replace=False):
         step = np.zeros_like(static)
         step[j] = h * scale[j]
-        slope = (problem.prior_terms(static - step)[1] - problem.prior_terms(static + step)[1]) / (2 * h)
+        slope = (problem.prior_slope(static - step)[0] - problem.prior_slope(static + step)[0]) / (2 * h)
         np.testing.assert_allclose(slope * scale, information[:, j] * scale[j] * scale, atol=1e-4)
 
 
@@ -176,7 +176,7 @@ def test_prior_cost_counts_deviations(problem):
     for at, deviation in cases:
         static = problem.start_static.copy()
         static[at] += deviation
-        assert problem.prior_terms(static)[2] == pytest.approx(0.5)
+        assert problem.prior_slope(static)[1] == pytest.approx(0.5)
 
 
 def test_prior_cost_of_a_body_is_its_mahalanobis_distance_and_the_scale(problem, here):
@@ -186,7 +186,7 @@ def test_prior_cost_of_a_body_is_its_mahalanobis_distance_and_the_scale(problem,
     gap = (bsp.table() - prior.mean.table()).ravel()
     scale = (bsp.total_mass_kg - prior.mass_kg) / prior.mass_sd_kg
     expected = 0.5 * (gap @ np.linalg.solve(prior.covariance, gap) + scale**2)
-    assert problem.prior_terms(static)[2] == pytest.approx(expected, rel=1e-6)
+    assert problem.prior_slope(static)[1] == pytest.approx(expected, rel=1e-6)
 
 
 def test_start_is_the_prior_s_mean(problem):
@@ -229,7 +229,7 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     np.testing.assert_array_equal(pair.in_trial(1, at), on_time)
     together = pair.at(at)
     assert together.trials[1].gradient.cost == pytest.approx(problem.normal(0, coefficients, static).cost)
-    expected = sum(trial.gradient.cost for trial in together.trials) + problem.prior_terms(static)[2]
+    expected = sum(trial.gradient.cost for trial in together.trials) + problem.prior_slope(static)[1]
     assert together.slope.cost == pytest.approx(expected + 0.5 * np.square(own).sum())
 
 
@@ -258,7 +258,7 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
         place = Point((coefficients,), values, problem.beginning.displaced)
         return place.like(problem.slope(place).right).static
 
-    informed = problem.prior_terms(static)[0] + problem.normal(0, coefficients, static).static
+    informed = problem.prior_information(static) + problem.normal(0, coefficients, static).static
     bends = problem.bends(right(static))
     assert (bends[rows] >= 0.0).all()
     pulled = [row for row in rows if right(static)[row] < 0.0]

@@ -19,9 +19,20 @@ def total(q: np.ndarray) -> float:
 
 
 def test_within_nothing_is_paid_and_beyond_one_deviation_is_a_half():
-    assert total(np.array([[1.0, 0.5, 1e9], [0.0, -1.0, -1e9]])) == 0.0
-    assert total(np.array([[-CLAMPED_SD, 0.0, 0.0]])) == pytest.approx(0.5)
+    assert total(np.array([[1.0, 0.5, 1e9], [0.05, -0.95, -1e9]])) == 0.0
     assert total(np.array([[1.0, 1.0 + SD, 0.0]])) == pytest.approx(0.5)
+    # the end is rounded off over half of this deviation
+    assert total(np.array([[-10.0 * CLAMPED_SD, 0.0, 0.0]])) == pytest.approx(50.0)
+    assert total(np.array([[-CLAMPED_SD, 0.0, 0.0]])) == pytest.approx(0.5 * (0.5 * np.log1p(np.exp(2.0))) ** 2)
+
+
+def test_cost_and_curvature_have_no_corner_at_an_end():
+    q = np.array([[2.6 + x, 0.0, 0.0] for x in np.linspace(-0.05, 0.05, 2001)])
+    terms = RangeTerms.of(BOUNDS, q, 1.0)
+    curvature = terms.curvature[:, 0]
+    slopes = -np.gradient(terms.pull[:, 0], q[:, 0])
+    np.testing.assert_allclose(slopes[2:-2], curvature[2:-2], atol=5e-3 / CLAMPED_SD**2)
+    assert np.abs(np.diff(curvature)).max() < 0.01 / CLAMPED_SD**2
 
 
 def test_derivatives_are_those_of_the_cost():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.root_terms import columns_of, root_terms
+from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.motion.dynamics import Motion, residual_terms, root_regressor
 from small_problem import curved_problem, point, small_problem
@@ -32,7 +32,20 @@ def test_they_are_those_of_the_dynamics_over_their_deviations(problem):
     by_static[:, 3:] += np.cross(skeleton.root.centre(motion.q)[:, :, None], by_ground[:, :3], axis=1)
 
     columns = columns_of(skeleton, bsp.segments, problem.moving, problem.still, layout)
-    terms = root_terms(skeleton, bsp, theta, motion, wrench, by_ground, sd, columns, frames)
+    given = RootFrames(
+        skeleton,
+        bsp,
+        theta,
+        motion,
+        wrench,
+        np.zeros(0),
+        np.zeros(0),
+        lambda into, *_: np.add(into, by_ground, out=into),
+        sd,
+        frames,
+        layout.in_root.stop,
+    )
+    terms = given.terms(columns)
     np.testing.assert_array_equal(terms.frames, frames)
     np.testing.assert_allclose(terms.left, left / sd, atol=1e-10)
     for ours, expected in ((terms.q, by.q), (terms.qd, by.qd), (terms.qdd, by.qdd)):

@@ -11,8 +11,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dsyrk, dtrsm, sgemm, strsm
-from scipy.linalg.lapack import dpotrf
+
+from kinertia.estimation.simultaneous.blas import (
+    cholesky,
+    solve_lower,
+    solve_lower_from_right,
+    subtract_product,
+    subtract_square,
+)
 
 
 @dataclass(frozen=True)
@@ -39,12 +45,10 @@ class BlockBand:
         factors, carried = (diagonal, below) if in_place else (diagonal.copy(), below.copy())
         for i, factor in enumerate(factors):
             if i:
-                dsyrk(-1.0, carried[i - 1].T, beta=1.0, c=factor.T, trans=1, overwrite_c=1)
-            _, failed = dpotrf(factor.T, clean=1, overwrite_a=1)
-            if failed:
-                raise np.linalg.LinAlgError("the matrix is not positive definite")
+                subtract_square(factor, carried[i - 1])
+            cholesky(factor)
             if i < len(carried):
-                dtrsm(1.0, factor.T, carried[i].T, trans_a=1, overwrite_b=1)
+                solve_lower_from_right(factor, carried[i])
         return cls(factors, carried)
 
     @cached_property
@@ -60,8 +64,8 @@ class BlockBand:
         result = right if in_place else right.copy()
         for i in range(len(result)):
             if i:
-                _subtract_product(result[i], self.below[i - 1], result[i - 1])
-            _solve_in_place(self.diagonal[i], result[i])
+                subtract_product(result[i], self.below[i - 1], result[i - 1])
+            solve_lower(self.diagonal[i], result[i])
         return result
 
     def backward(self, right: np.ndarray, after: np.ndarray | None = None, in_place: bool = False) -> np.ndarray:
@@ -69,8 +73,8 @@ class BlockBand:
         result, known = right if in_place else right.copy(), after
         for i in range(len(result) - 1, -1, -1):
             if known is not None:
-                _subtract_product(result[i], self.below[i].T, known)
-            _solve_in_place(self.diagonal[i], result[i], transposed=True)
+                subtract_product(result[i], self.below[i], known, transposed=True)
+            solve_lower(self.diagonal[i], result[i], transposed=True)
             known = result[i]
         return result
 
@@ -82,7 +86,7 @@ class BlockBand:
         unit = np.eye(self.diagonal.shape[1])
         for i in range(len(diagonal) - 1, -1, -1):
             half = unit.copy()
-            _solve_in_place(self.diagonal[i], half)
+            solve_lower(self.diagonal[i], half)
             diagonal[i] = half.T @ half
             if next_one is not None:
                 carried = self.below[i] @ half
@@ -90,18 +94,3 @@ class BlockBand:
                 diagonal[i] -= carried.T @ below[i]
             next_one = diagonal[i]
         return diagonal, below
-
-
-# BLAS and LAPACK take matrices column by column: a row-wise matrix is its own transpose there, and is not copied
-
-
-def _solve_in_place(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
-    """L^-1 right, or L^-T right, in the place of `right`, whose rows must lie one after the other."""
-    solve = strsm if right.dtype == np.float32 else dtrsm
-    solve(1.0, lower.T, right.T, side=1, lower=0, trans_a=int(transposed), overwrite_b=1)
-
-
-def _subtract_product(target: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
-    """Take left @ right off the target, in its place; its rows must lie one after the other."""
-    product = sgemm if target.dtype == np.float32 else dgemm
-    product(-1.0, right.T, left.T, beta=1.0, c=target.T, overwrite_c=1)

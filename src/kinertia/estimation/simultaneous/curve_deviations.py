@@ -17,11 +17,14 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from kinertia.estimation.simultaneous.elimination import Eliminated, Factored
+from kinertia.estimation.simultaneous.elimination import Branch, Eliminated, Factored
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.stretches import Stretch
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.two_threads import side_by_side
 
 _FRAMES_AT_ONCE = 100
 """Larger arrays would leave the processor's cache."""
@@ -75,25 +78,23 @@ def curve_deviations(
             those that root equations depend on, which come first, have as many columns that are not zero.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
-    in_root = problem.layout.in_root
     size = (len(frames), coefficients.shape[1])
-    variance, impact, speed = CurveDeviations.filled(*size, 0.0), np.empty(size), np.empty(size)
-    reactions, spread = problem.reactions(k, static), None
-    # errors that come back count more often only for what does not move
-    shares = np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats)
-    for part in eliminated.backwards():
-        spread = _MotionSpread.of(part, coefficients.shape[1], root, spread)
-        begin, end = np.searchsorted(frames, [part.stretch.frames.start, part.stretch.frames.stop])
-        for start in range(begin, end, _FRAMES_AT_ONCE):
-            rows = slice(start, min(start + _FRAMES_AT_ONCE, end))
-            chosen = frames[rows]
-            motion = problem.full(basis.evaluate(coefficients, chosen), static)
-            by = moment_derivatives(problem, k, motion, static, reactions, chosen)
-            impact[rows], speed[rows] = by.impact, motion[1][:, problem.moving]
-            seen = _Seen.of(by, speed[rows], basis.first[chosen], basis.values[:, chosen], shares)
-            spread.variances(seen, root[in_root, in_root], variance, rows)
-            loaded = reactions.at(problem.trials[k].time[chosen])[..., :3] != 0.0
-            variance.ground_forces[rows] += np.square(reactions.noise_n * loaded)
+    curves = _Curves(
+        problem,
+        k,
+        coefficients,
+        static,
+        problem.reactions(k, static),
+        # errors that come back count more often only for what does not move
+        np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
+        frames,
+        CurveDeviations.filled(*size, 0.0),
+        np.empty(size),
+        np.empty(size),
+    )
+    middle = _EndSpread.of_middle(eliminated.middle, root)
+    side_by_side(lambda branch: curves.add(branch, root, middle), eliminated.branches)
+    variance, impact, speed = curves.variance, curves.impact, curves.speed
     around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
     lost = uniform_filter1d(np.square(impact), around, axis=0, mode="nearest")
     parts = (
@@ -103,6 +104,51 @@ def curve_deviations(
         variance.ground_forces,
     )
     return CurveDeviations(*(np.sqrt(np.maximum(part, 0.0)) for part in parts))
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """The curves of a trial, whose variances are written branch by branch.
+
+    Attributes:
+        problem, k, coefficients, static: as `curve_deviations` has them.
+        reactions: loads for the joint moments.
+        shares: as `_Seen` has them.
+        frames: (d,) those that are dynamic.
+        variance: of the curves.
+        impact: (d, c) as `MomentDerivatives` has it.
+        speed: (d, c) of the coordinates.
+    """
+
+    problem: MapProblem
+    k: int
+    coefficients: np.ndarray
+    static: np.ndarray
+    reactions: GroundReactions
+    shares: np.ndarray
+    frames: np.ndarray
+    variance: CurveDeviations
+    impact: np.ndarray
+    speed: np.ndarray
+
+    def add(self, branch: Branch, root: np.ndarray, end: _EndSpread) -> None:
+        """Write what the frames of a branch have, whose splines end in a block that is this uncertain."""
+        for part, stretch in zip(branch.outwards(), reversed(branch.stretches), strict=True):
+            spread, end = _MotionSpread.of(part, stretch, root, end)
+            begin, stop = np.searchsorted(self.frames, [stretch.frames.start, stretch.frames.stop])
+            for start in range(begin, stop, _FRAMES_AT_ONCE):
+                self._write(spread, root, slice(start, min(start + _FRAMES_AT_ONCE, stop)))
+
+    def _write(self, spread: _MotionSpread, root: np.ndarray, rows: slice) -> None:
+        problem, basis, chosen = self.problem, self.problem.bases[self.k], self.frames[rows]
+        in_root = problem.layout.in_root
+        motion = problem.full(basis.evaluate(self.coefficients, chosen), self.static)
+        by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen)
+        self.impact[rows], self.speed[rows] = by.impact, motion[1][:, problem.moving]
+        seen = _Seen.of(by, self.speed[rows], basis.first[chosen], basis.values[:, chosen], self.shares)
+        spread.variances(seen, root[in_root, in_root], self.variance, rows)
+        loaded = self.reactions.at(problem.trials[self.k].time[chosen])[..., :3] != 0.0
+        self.variance.ground_forces[rows] += np.square(self.reactions.noise_n * loaded)
 
 
 @dataclass(frozen=True)
@@ -137,13 +183,28 @@ class _Seen:
 
 
 @dataclass(frozen=True)
+class _EndSpread:
+    """How uncertain the splines of one block are: as `_MotionSpread` has it, (k, k) and (k, S)."""
+
+    diagonal: np.ndarray
+    carried: np.ndarray
+
+    @classmethod
+    def of_middle(cls, middle: Factored, root: np.ndarray) -> _EndSpread:
+        """Of the block in the middle of a trial."""
+        (diagonal,), _ = middle.band.inverse_blocks()
+        return cls(diagonal, _carried(middle, root)[0])
+
+
+@dataclass(frozen=True)
 class _MotionSpread:
-    """How uncertain neighbouring spline coefficients of a stretch are, and how they go with the static unknowns.
+    """How uncertain the coefficients of the splines that a stretch touches are, and how they go with the static
+    unknowns.
 
     Attributes:
         start: the first of the splines.
         diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k) of their covariance if the static
-            unknowns were known; with the first block after the stretch.
+            unknowns were known.
         carried: (splines, c, S) how far one deviation of each independent part of the static unknowns carries them.
     """
 
@@ -153,17 +214,23 @@ class _MotionSpread:
     carried: np.ndarray
 
     @classmethod
-    def of(cls, part: Factored, c: int, root: np.ndarray, after: _MotionSpread | None) -> _MotionSpread:
-        """Of a stretch, with this root (S, S) of the static unknowns' covariance; `after` is the next stretch's."""
-        start, size, precision = part.stretch.splines.start, len(root), part.border.dtype
-        band, blocks = part.band.as_precise(precision), part.border @ root.astype(precision)
-        if after is None:
-            carried = band.backward(blocks, in_place=True)
-            return cls(start, *part.band.inverse_blocks(), carried.reshape(-1, c, size))
-        block, first = after.diagonal[:1], after.carried[:SPLINES_PER_BLOCK]
-        carried = band.backward(blocks, first.reshape(-1, size), in_place=True).reshape(-1, c, size)
-        diagonal, below = part.band.inverse_blocks(block[0])
-        return cls(start, np.append(diagonal, block, axis=0), below, np.append(carried, first, axis=0))
+    def of(
+        cls, part: Factored, stretch: Stretch, root: np.ndarray, end: _EndSpread
+    ) -> tuple[_MotionSpread, _EndSpread]:
+        """Of a stretch, with this root (S, S) of the static unknowns' covariance, and of the block with which the next
+        one ends; `end` is that of its own.
+        """
+        carried, size = _carried(part, root, end.carried), len(root)
+        diagonal, below = part.band.inverse_blocks(end.diagonal)
+        other = _EndSpread(diagonal[0], carried[0])
+        every, all_carried = (
+            np.append(diagonal, end.diagonal[None], axis=0),
+            np.append(carried, end.carried[None], axis=0),
+        )
+        if part.backwards:
+            every, all_carried, below = every[::-1], all_carried[::-1], below[::-1].transpose(0, 2, 1)
+        c = every.shape[1] // SPLINES_PER_BLOCK
+        return cls(stretch.touched.start, every, below, all_carried.reshape(-1, c, size)), other
 
     def variances(self, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
         """Write the variances of some frames into rows of `into`; `root` (n, n) is of the static unknowns that root
@@ -211,3 +278,12 @@ class _MotionSpread:
         c = self.carried.shape[1]
         here = slice(offset * c, (offset + 6) * c)
         return pair[here, here], self.carried[first : first + 6].reshape(6 * c, -1)
+
+
+def _carried(part: Factored, root: np.ndarray, after: np.ndarray | None = None) -> np.ndarray:
+    """(b, k, S) how far one deviation of each independent part of the static unknowns carries these splines, in the
+    order of elimination; `after` (k, S) is that of the block eliminated next.
+    """
+    precision = part.border.dtype
+    blocks = part.border @ root.astype(precision)
+    return part.band.as_precise(precision).backward(blocks, after, in_place=True)

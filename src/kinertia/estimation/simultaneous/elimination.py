@@ -1,8 +1,9 @@
-"""The motion of a trial eliminated from its normal equations, stretch by stretch.
+"""The motion of a trial eliminated from its normal equations, from both ends to the middle, stretch by stretch.
 
-Stretches are assembled and eliminated in turn; each passes its contribution to the first block of the next one on.
-Steps and the covariance of the motion need the factors again: those of the last stretch stay in memory, those of the
-others go to a temporary file.
+Stretches are assembled and eliminated in turn; each passes its contribution to the block at which it ends on. Those
+before the middle begin with the first block, those after it with the last, in a thread of their own: they meet in one
+block. Steps and the covariance of the motion need the factors again: those of the stretches beside the middle stay in
+memory, those of the others go to temporary files.
 
 The border, which is most of the work, is in single precision. Gradients and the motion's own factor are in double, so
 that the optimum does not move; the information on what does not move loses nothing either, as long as eliminating the
@@ -13,14 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.blas import solve_lower
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.kept_arrays import KeptArrays
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Gradient, NormalEquations
-from kinertia.estimation.simultaneous.stretches import Stretch
+from kinertia.estimation.simultaneous.stretches import Stretch, halves
 from kinertia.model.compiled import compiled
+from kinertia.motion.two_threads import side_by_side
 
 UNSAFE = 1e4
 """Information on a static unknown with the motion known, over that with it unknown, from which on the border is in
@@ -30,12 +34,12 @@ _ROWS_AT_ONCE = 2000
 
 
 @dataclass(frozen=True)
-class Carried:
-    """What the stretches before a block say of it, their own splines eliminated.
+class EndBlock:
+    """What stretches say of the block at which they end, all others eliminated.
 
     Attributes:
-        diagonal: (k, k) to be added to the block.
-        border: (k, S) to its border.
+        diagonal: (k, k).
+        border: (k, S).
     """
 
     diagonal: np.ndarray
@@ -44,30 +48,129 @@ class Carried:
 
 @dataclass(frozen=True)
 class Factored:
-    """A stretch with its motion eliminated.
+    """Neighbouring blocks of splines, eliminated.
 
     Attributes:
-        stretch: of the trial.
-        band: factor L of the motion's own normal matrix, those before it eliminated.
+        splines: of the trial, in time; of fewer than the blocks have where the trial ends in one.
+        backwards: eliminated from the last to the first.
+        band: factor L of their own normal matrix, those before them eliminated; blocks in the order of elimination.
         border: (b, k, S) L^-1 times the border, in single or double precision.
-        left: to the block after the stretch; None after the last.
     """
 
-    stretch: Stretch
+    splines: slice
+    backwards: bool
     band: BlockBand
     border: np.ndarray
-    left: Carried | None
 
-    @property
-    def lost(self) -> np.ndarray:
-        """(S, S) what it takes of the information on the static unknowns."""
+    def take_off(self, information: np.ndarray) -> None:
+        """Take what eliminating these splines costs off the information (S, S) on the static unknowns."""
         blocks, wide, s = self.border.shape
         flat = self.border.reshape(blocks * wide, s)
-        result = np.zeros((s, s))
         for start in range(0, len(flat), _ROWS_AT_ONCE):
             rows = flat[start : start + _ROWS_AT_ONCE]
-            result += rows.T @ rows
-        return result
+            information -= rows.T @ rows
+
+    def in_blocks(self, motion: np.ndarray) -> np.ndarray:
+        """(b, k, 1) what is given for every spline of the trial (size, c), of these."""
+        blocks, wide = self.band.diagonal.shape[:2]
+        flat, own = np.zeros(blocks * wide), motion[self.splines].ravel()
+        flat[: len(own)] = own
+        return np.ascontiguousarray(self.in_order(flat.reshape(blocks, wide, 1)))
+
+    def in_order(self, blocks: np.ndarray) -> np.ndarray:
+        """Blocks (b, ...) in time, in the order of elimination; and back."""
+        return blocks[::-1] if self.backwards else blocks
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One half of a trial, eliminated towards its middle.
+
+    Attributes:
+        gradient: of its frames, before.
+        static_diagonal: (S,) diagonal of the information on the static unknowns with the motion known.
+        information: (S, S) on them with the motion unknown but for the middle.
+        stretches: in the order of elimination.
+        before: what is kept of all stretches but the last.
+        last: the one beside the middle.
+        end: what they leave to the middle.
+    """
+
+    gradient: Gradient
+    static_diagonal: np.ndarray
+    information: np.ndarray
+    stretches: tuple[Stretch, ...]
+    before: KeptArrays
+    last: Factored
+    end: EndBlock
+
+    @classmethod
+    def of(
+        cls,
+        of: Callable[[Stretch], NormalEquations],
+        done: Callable[[NormalEquations], None],
+        damping: float,
+        precision: type[np.floating],
+        stretches: Sequence[Stretch],
+    ) -> Branch:
+        """Eliminate stretches in this order, backwards if the first is not the beginning of the trial."""
+        backwards, end, kept = stretches[0].splines.start > 0, None, KeptArrays()
+        for k, stretch in enumerate(stretches):
+            normal = of(stretch)
+            s = normal.border.shape[2]
+            if k == 0:
+                size = max(each.touched.stop for each in stretches)
+                whole = Gradient.zero(size, normal.right.shape[1], len(normal.static_right))
+                diagonal, information = np.zeros(s), np.zeros((s, s))
+            whole.add(normal, stretch.touched)
+            information += normal.static[:s, :s]
+            diagonal += np.diag(normal.static)[:s]
+            part, end = factored(normal, stretch, damping, end, precision, backwards)
+            done(normal)
+            part.take_off(information)
+            if k < len(stretches) - 1:
+                kept.add(part.band.diagonal, part.band.below, part.border)
+        assert end is not None
+        return cls(whole, diagonal, information, tuple(stretches), kept, part, end)
+
+    def outwards(self) -> Iterator[Factored]:
+        """What has been factored, from the middle to the end of the trial."""
+        yield self.last
+        for k in range(len(self.stretches) - 2, -1, -1):
+            yield self._kept(k)
+
+    def inwards(self) -> Iterator[Factored]:
+        """The same from the end of the trial to the middle."""
+        for k in range(len(self.stretches) - 1):
+            yield self._kept(k)
+        yield self.last
+
+    def _kept(self, k: int) -> Factored:
+        diagonal, below, border = self.before.get(k)
+        backwards = self.last.backwards
+        return Factored(_eliminated(self.stretches[k], backwards), backwards, BlockBand(diagonal, below), border)
+
+    def forward(self, right: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+        """L^-1 times a right-hand side (size, c) of the motion, per stretch (b, k, 1); what it takes of that of the
+        static unknowns (S,), and of that of the middle block (k, 1).
+        """
+        solved, lost, carried = [], np.zeros(len(self.information)), np.zeros((len(self.end.diagonal), 1))
+        for part in self.inwards():
+            flat = part.in_blocks(right)
+            flat[:1] -= carried
+            motion = part.band.forward(flat, in_place=True)
+            carried = part.band.below[-1] @ motion[-1]
+            lost += taken(part, motion)
+            solved.append(motion)
+        return solved, lost, carried
+
+    def step(self, solved: Sequence[np.ndarray], static: np.ndarray, middle: np.ndarray, into: np.ndarray) -> None:
+        """Write the step of its splines into that of the motion (size, c), for a step (S,) of the static unknowns and
+        one (k, 1) of the middle block.
+        """
+        after = middle
+        for part, motion in zip(self.outwards(), reversed(solved), strict=True):
+            after = write_step(part, motion, static, into, after)[0]
 
 
 @dataclass(frozen=True)
@@ -78,152 +181,159 @@ class Eliminated:
         gradient: of the whole trial, before.
         static_diagonal: (S,) diagonal of the information on the static unknowns with the motion known.
         information: (S, S) on them with the motion unknown (Schur complement).
-        stretches: in time.
-        before: what is kept of all stretches but the last.
-        last: the last one.
+        branches: the trial's halves; one of a very short trial.
+        middle: the block between them.
     """
 
     gradient: Gradient
     static_diagonal: np.ndarray
     information: np.ndarray
-    stretches: tuple[Stretch, ...]
-    before: KeptArrays
-    last: Factored
+    branches: tuple[Branch, ...]
+    middle: Factored
 
     @classmethod
-    def of(cls, stretches: Sequence[Stretch], of: Callable[[Stretch], NormalEquations], damping: float) -> Eliminated:
+    def of(
+        cls,
+        stretches: Sequence[Stretch],
+        of: Callable[[Stretch], NormalEquations],
+        done: Callable[[NormalEquations], None],
+        damping: float,
+    ) -> Eliminated:
         """Eliminate the motion.
 
         Args:
             stretches: of the trial.
             of: makes the normal equations of one.
+            done: told when they are no longer needed.
             damping: share by which the motion's diagonal is raised.
         """
-        result = cls._of(stretches, of, damping, np.float32)
+        result = cls._of(stretches, partial(Branch.of, of, done, damping, np.float32))
         if (result.static_diagonal > UNSAFE * np.diag(result.information)).any():
-            return cls._of(stretches, of, damping, np.float64)
+            return cls._of(stretches, partial(Branch.of, of, done, damping, np.float64))
         return result
 
     @classmethod
-    def _of(
-        cls,
-        stretches: Sequence[Stretch],
-        of: Callable[[Stretch], NormalEquations],
-        damping: float,
-        precision: type[np.floating],
-    ) -> Eliminated:
-        normal = of(stretches[0])
-        whole = Gradient.zero(stretches[-1].splines.stop, normal.right.shape[1], len(normal.static_right))
-        static, lost, kept, carried = np.zeros_like(normal.static), np.zeros_like(normal.static), KeptArrays(), None
-        for k, stretch in enumerate(stretches):
-            normal = of(stretch) if k else normal
-            whole.add(normal, stretch.touched)
-            static += normal.static
-            part = factored(normal, stretch, damping, carried, precision)
-            lost += part.lost
-            carried = part.left
-            if not stretch.is_last:
-                kept.add(part.band.diagonal, part.band.below, part.border)
-        return cls(whole, np.diag(static), static - lost, tuple(stretches), kept, part)
+    def _of(cls, stretches: Sequence[Stretch], branch_of: Callable[[Sequence[Stretch]], Branch]) -> Eliminated:
+        branches = tuple(side_by_side(branch_of, [half for half in halves(stretches) if half]))
+        size, (_, c) = stretches[-1].splines.stop, branches[0].gradient.right.shape
+        whole = Gradient.zero(size, c, len(branches[0].gradient.static_right))
+        for branch in branches:
+            whole.add(branch.gradient, slice(0, len(branch.gradient.right)))
+        diagonal, border = (sum(getattr(each.end, name) for each in branches) for name in ("diagonal", "border"))
+        start = branches[0].last.splines.stop
+        splines = slice(start, min(start + SPLINES_PER_BLOCK, size))
+        band = BlockBand.factor(diagonal[None], np.zeros((0, *diagonal.shape)))
+        if border.size:
+            solve_lower(band.as_precise(border.dtype).diagonal[0], border)
+        middle = Factored(splines, False, band, border[None])
+        information: np.ndarray = np.sum([branch.information for branch in branches], axis=0)
+        middle.take_off(information)
+        known: np.ndarray = np.sum([branch.static_diagonal for branch in branches], axis=0)
+        return cls(whole, known, information, branches, middle)
 
-    def forwards(self) -> Iterator[Factored]:
-        """The stretches from the first to the last; what they left to one another is gone."""
-        for k, stretch in enumerate(self.stretches[:-1]):
-            yield self._kept(k, stretch)
-        yield self.last
-
-    def backwards(self) -> Iterator[Factored]:
-        """The stretches from the last to the first."""
-        yield self.last
-        for k in range(len(self.stretches) - 2, -1, -1):
-            yield self._kept(k, self.stretches[k])
-
-    def _kept(self, k: int, stretch: Stretch) -> Factored:
-        diagonal, below, border = self.before.get(k)
-        return Factored(stretch, BlockBand(diagonal, below), border, None)
-
-    def forward(self, right: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-        """L^-1 times a right-hand side (size, c) of the motion, per stretch (b, k, 1), and what it takes of the
-        right-hand side of the static unknowns (S,).
+    def forward(self, right: np.ndarray) -> tuple[list[list[np.ndarray]], np.ndarray]:
+        """L^-1 times a right-hand side (size, c) of the motion, per branch and stretch (b, k, 1), then of the middle;
+        and what it takes of the right-hand side of the static unknowns (S,).
         """
-        solved, lost = [], np.zeros(len(self.information))
-        carried: np.ndarray | float = 0.0
-        for part in self.forwards():
-            blocks, wide = part.band.diagonal.shape[:2]
-            flat = np.zeros((blocks * wide, 1))
-            own = right[part.stretch.splines].ravel()
-            flat[: len(own), 0] = own
-            flat[:wide] += carried
-            motion = part.band.forward(flat.reshape(blocks, wide, 1))
-            if not part.stretch.is_last:
-                carried = -part.band.below[-1] @ motion[-1]
-            rows = part.border.reshape(blocks * wide, len(lost))
-            lost += motion.ravel().astype(rows.dtype) @ rows
-            solved.append(motion)
-        return solved, lost
+        halves = side_by_side(lambda branch: branch.forward(right), self.branches)
+        flat = self.middle.in_blocks(right) - sum(carried for _, _, carried in halves)
+        middle = self.middle.band.forward(flat, in_place=True)
+        lost = taken(self.middle, middle) + sum(lost for _, lost, _ in halves)
+        return [*(solved for solved, _, _ in halves), [middle]], lost
 
-    def motion_step(self, solved: Sequence[np.ndarray], static: np.ndarray) -> np.ndarray:
+    def motion_step(self, solved: Sequence[Sequence[np.ndarray]], static: np.ndarray) -> np.ndarray:
         """(size, c) step of the motion for a step (S,) of the static unknowns; `solved` is what `forward` gives."""
-        result, after = np.empty_like(self.gradient.right), None
-        for part, motion in zip(self.backwards(), reversed(solved), strict=True):
-            rows = part.border @ static.astype(part.border.dtype)
-            step = part.band.backward(motion - rows[..., None], after)
-            own = result[part.stretch.splines]
-            own[:] = step.reshape(-1, own.shape[1])[: len(own)]
-            after = step[0]
+        result = np.empty_like(self.gradient.right)
+        *halves, (middle,) = solved
+        (block,) = write_step(self.middle, middle, static, result)
+        side_by_side(
+            lambda half: half[0].step(half[1], static, block, result), list(zip(self.branches, halves, strict=True))
+        )
         return result
+
+
+def taken(part: Factored, motion: np.ndarray) -> np.ndarray:
+    """(S,) what L^-1 times the motion's right-hand side takes of that of the static unknowns."""
+    rows = part.border.reshape(motion.size, part.border.shape[2])
+    result: np.ndarray = motion.ravel().astype(rows.dtype) @ rows
+    return result
+
+
+def write_step(
+    part: Factored, motion: np.ndarray, static: np.ndarray, into: np.ndarray, after: np.ndarray | None = None
+) -> np.ndarray:
+    """Write the step of some splines into that of the motion (size, c), and return it as blocks (b, k, 1) in the order
+    of elimination; `after` (k, 1) is that of the block eliminated next.
+    """
+    rows = part.border @ static.astype(part.border.dtype)
+    step = part.band.backward(motion - rows[..., None], after, in_place=True)
+    own = into[part.splines]
+    own[:] = part.in_order(step).reshape(-1, own.shape[1])[: len(own)]
+    return step
 
 
 def factored(
     normal: NormalEquations,
     stretch: Stretch,
     damping: float,
-    carried: Carried | None,
+    carried: EndBlock | None,
     precision: type[np.floating],
-) -> Factored:
-    """Eliminate the splines of a stretch, with their diagonal raised by this share.
+    backwards: bool = False,
+) -> tuple[Factored, EndBlock]:
+    """Eliminate the splines that a stretch touches, all but the last block, or but the first if `backwards`.
 
     Args:
         normal: its normal equations.
-        carried: what the stretches before it leave to its first block.
+        damping: share by which their diagonal is raised.
+        carried: what the stretches before it leave to the block with which this begins.
         precision: of the border.
     """
     size, c, s = normal.border.shape
-    # one block more than just fits, so that six active splines always lie in two
+    # where the trial ends one block more than just fits, so that six active splines always lie in two
     count = size // SPLINES_PER_BLOCK + (1 if stretch.is_last else 0)
-    diagonal, below = _blocks(normal.band, count, damping)
-    border = np.empty((count * SPLINES_PER_BLOCK, c, s), precision)
-    border[:size], border[size:] = normal.border, 0.0
+    diagonal, below = _blocks(normal.band, count, damping, backwards)
+    border = np.zeros((count * SPLINES_PER_BLOCK, c, s), precision)
+    border[:size] = normal.border
     border = border.reshape(count, SPLINES_PER_BLOCK * c, s)
+    border = np.ascontiguousarray(border[::-1]) if backwards else border
     if carried is not None:
         diagonal[0] += carried.diagonal
         border[0] += carried.border
-    own = count if stretch.is_last else count - 1
-    band = BlockBand.factor(diagonal[:own], below, in_place=True)
+    band = BlockBand.factor(diagonal[:-1], below, in_place=True)
     same = band.as_precise(precision)
-    solved, left = border[:own], None
-    if s:
-        same.forward(solved, in_place=True)
-    if own < count:
-        reach = band.below[-1]
-        left = Carried(diagonal[own] - reach @ reach.T, border[own] - same.below[-1] @ solved[-1])
-    return Factored(stretch, band, solved, left)
+    solved = same.forward(border[:-1], in_place=True) if s else border[:-1]
+    reach = band.below[-1]
+    end = EndBlock(diagonal[-1] - reach @ reach.T, border[-1] - same.below[-1] @ solved[-1])
+    return Factored(_eliminated(stretch, backwards), backwards, band, solved), end
+
+
+def _eliminated(stretch: Stretch, backwards: bool) -> slice:
+    """The splines of all blocks that a stretch touches but the last, or but the first if `backwards`."""
+    start, stop = stretch.touched.start, stretch.touched.stop
+    if backwards:
+        return slice(start + SPLINES_PER_BLOCK, stop)
+    blocks = stretch.size // SPLINES_PER_BLOCK - (0 if stretch.is_last else 1)
+    return slice(start, start + SPLINES_PER_BLOCK * blocks)
 
 
 @compiled
-def _blocks(band: np.ndarray, count: int, damping: float) -> tuple[np.ndarray, np.ndarray]:
-    """Diagonal blocks (b, k, k), k = c SPLINES_PER_BLOCK, and those below (b - 1, k, k); ones where the band ends."""
+def _blocks(band: np.ndarray, count: int, damping: float, backwards: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Diagonal blocks (b, k, k), k = c SPLINES_PER_BLOCK, and those below (b - 1, k, k), from the first to the last or
+    backwards; ones where the band ends.
+    """
     size, wide, c, _ = band.shape
     each = SPLINES_PER_BLOCK
     diagonal, below = np.zeros((count, each * c, each * c)), np.zeros((count - 1, each * c, each * c))
     for spline in range(size):
-        block, i = spline // each, spline % each
+        i, block = spline % each, count - 1 - spline // each if backwards else spline // each
         for offset in range(min(wide, size - spline)):
             j = i + offset
             for row in range(c):
                 for column in range(c):
                     value = band[spline, offset, row, column]
-                    if j >= each:
+                    if j >= each and backwards:
+                        below[block - 1, i * c + row, (j - each) * c + column] = value
+                    elif j >= each:
                         below[block, (j - each) * c + column, i * c + row] = value
                     else:
                         diagonal[block, i * c + row, j * c + column] = value
@@ -233,5 +343,5 @@ def _blocks(band: np.ndarray, count: int, damping: float) -> tuple[np.ndarray, n
     for spline in range(size, count * each):
         for row in range(c):
             place = spline % each * c + row
-            diagonal[spline // each, place, place] = 1.0
+            diagonal[0 if backwards else count - 1, place, place] = 1.0
     return diagonal, below

@@ -47,7 +47,7 @@ class Information:
     @cached_property
     def of_prior(self) -> np.ndarray:
         """(S, S) information of all priors but the instruments'."""
-        return self.problem.prior_terms(self.problem.start_static)[0]
+        return self.problem.prior_information(self.problem.start_static)
 
     def root(self, trials: Iterable[int]) -> np.ndarray:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""

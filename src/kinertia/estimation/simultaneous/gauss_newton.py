@@ -90,12 +90,10 @@ class MotionAlone:
     trials: tuple[Eliminated, ...]
 
     @classmethod
-    def of(cls, problem: MapProblem, point: Point, damping: float, at_ends: bool) -> MotionAlone:
-        """At a point, with the diagonal of the information on the motions raised by this share; `at_ends` as
-        `RangeTerms` has it.
-        """
+    def of(cls, problem: MapProblem, point: Point, damping: float) -> MotionAlone:
+        """At a point, with the diagonal of the information on the motions raised by this share."""
         rows = [(k, part, problem.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
-        return cls(point, tuple(problem.motion_eliminated(*row, damping, at_ends) for row in rows))
+        return cls(point, tuple(problem.eliminated(*row, damping, bordered=False) for row in rows))
 
     def under(self, instruments: GaussianPrior) -> MotionAlone:
         """With this Gaussian for the instruments: the motion does not know of it."""

@@ -53,7 +53,8 @@ def add_markers(
         into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.right, into.static_right[columns])
         return
     static = _Static(into.static[columns, columns], into.static_right[columns], np.zeros(1))
-    _add(markers, first, values, own, still, into.band, into.border[..., columns], into.right, static)
+    border = into.border[..., columns] if into.bordered else into.border
+    _add(markers, first, values, own, still, into.band, border, into.right, static)
     into.cost += 0.5 * float(static.cost[0])
 
 
@@ -74,7 +75,7 @@ def _add(
     """
     n, m = markers.own.shape
     start, stop = own
-    c, a, s = band.shape[2], len(markers.column), border.shape[2]
+    c, a, s = band.shape[2], len(markers.column), len(static.right)
     reach, pairs = _reach(markers, c, still), _pairs(markers.tree.parent)
     placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     most = longest_run(first)
@@ -90,7 +91,7 @@ def _add(
         for k in range(start, end):
             if k + LATER < n:
                 place_markers(markers, k + LATER, placed)
-            _frame(markers, k, k - start, still, pairs, placed, interval, static)
+            _frame(markers, k, k - start, still, pairs, placed, interval, static, border.shape[2] > 0)
             for later in range(1, min(LATER, n - 1 - k) + 1):
                 _pair(markers, k, later, k - start, pairs, placed, interval, static)
         to_splines(first, values, start, end, interval, reach, band, border, right)
@@ -110,8 +111,9 @@ def _frame(
     placed: PlacedMarkers,
     interval: Interval,
     static: _Static,
+    bordered: bool,
 ) -> None:
-    """J^T W J of frame k with itself; J^T W S of places and skin and J^T W r, W r being of five frames."""
+    """J^T W J of frame k with itself; if `bordered` J^T W S of places and skin; J^T W r, W r being of five frames."""
     a, m, here = len(markers.column), len(markers.carrier), k % 5
     most = 1
     for i in range(m):
@@ -124,7 +126,8 @@ def _frame(
         at = placed.places[here, i]
         add_marker(markers.own[k, i], at, at, sums[markers.carrier[i]])
         add_force(pull[i], at, forces[markers.carrier[i]])
-    _by_place(markers, k, row, still, placed, pull, directions, interval, static)
+    if bordered:
+        _by_place(markers, k, row, still, placed, pull, directions, interval, static)
     hand_down(markers.tree.parent, sums)
     hand_down(markers.tree.parent, forces)
     parent, column, slopes, axes = markers.tree.parent, markers.column, markers.slopes, placed.axes[here]

@@ -59,7 +59,8 @@ class Gradient:
 @dataclass
 class NormalEquations(Gradient):
     """With the second derivatives of Gauss and Newton: band (size, 7, c, c), border (size, c, S), static (S, S). Row i
-    of the band has the blocks of splines i and i, i + 1, ...
+    of the band has the blocks of splines i and i, i + 1, ... Of the motion alone the border has no columns, and only
+    band and `right` count.
     """
 
     band: np.ndarray
@@ -67,16 +68,28 @@ class NormalEquations(Gradient):
     static: np.ndarray
 
     @classmethod
-    def zero(cls, size: int, coordinates: int, static: int) -> Self:
+    def zero(cls, size: int, coordinates: int, static: int, bordered: bool = True) -> Self:
         """For so many splines, coordinates and static unknowns."""
         return cls(
             np.zeros((size, coordinates)),
             np.zeros(static),
             0.0,
             np.zeros((size, SPLINES_PER_BLOCK + 1, coordinates, coordinates)),
-            np.zeros((size, coordinates, static)),
+            np.zeros((size, coordinates, static if bordered else 0)),
             np.zeros((static, static)),
         )
+
+    @property
+    def bordered(self) -> bool:
+        """Whether they have a border."""
+        return bool(self.border.shape[2])
+
+    def cleared(self) -> Self:
+        """The same arrays, filled with zeros."""
+        for array in (self.right, self.static_right, self.band, self.border, self.static):
+            array.fill(0.0)
+        self.cost = 0.0
+        return self
 
     @classmethod
     def bytes_per_spline(cls, coordinates: int, static: int) -> int:
@@ -85,7 +98,34 @@ class NormalEquations(Gradient):
         return one.band.nbytes + one.border.nbytes
 
 
-def add_root(into: Gradient, columns: slice, basis: MotionBasis, start: int, root: RootTerms) -> None:
+class UsedAgain:
+    """Normal equations whose memory is used again: to ask the system for as much takes longer than to fill it.
+
+    >>> room = UsedAgain()
+    >>> first = room.zero(8, 2, 3)
+    >>> room.back(first)
+    >>> room.zero(8, 2, 3) is first, room.zero(8, 2, 3) is first
+    (True, False)
+    """
+
+    def __init__(self) -> None:
+        self._free: dict[tuple[int, int, int, bool], list[NormalEquations]] = {}
+
+    def zero(self, size: int, coordinates: int, static: int, bordered: bool = True) -> NormalEquations:
+        """Zeros for so many splines, coordinates and static unknowns."""
+        free = self._free.setdefault((size, coordinates, static, bordered), [])
+        try:
+            return free.pop().cleared()
+        except IndexError:
+            return NormalEquations.zero(size, coordinates, static, bordered)
+
+    def back(self, normal: NormalEquations) -> None:
+        """Take back what nobody needs any more."""
+        size, coordinates = normal.right.shape
+        self._free[size, coordinates, len(normal.static_right), normal.bordered].append(normal)
+
+
+def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: int, root: RootTerms) -> None:
     """Add the terms of the root equations at some frames, one knot interval at a time.
 
     Args:
@@ -106,11 +146,10 @@ def add_root(into: Gradient, columns: slice, basis: MotionBasis, start: int, roo
     for i in range(6):
         each = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
         into.right[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
-    if not isinstance(into, NormalEquations):
-        return
-    into.static[columns, columns] += flat.T @ flat
+    if into.bordered:
+        into.static[columns, columns] += flat.T @ flat
     rows = by_splines(values, root.q, root.qd, root.qdd)
-    border = into.border[..., columns]
+    border = into.border[..., columns] if into.bordered else into.border
     _add_intervals(
         rows.reshape(-1, 6 * c), flat, intervals - start, 6 * np.append(begins, len(knots)), into.band, border
     )
@@ -121,17 +160,23 @@ def _add_intervals(
     rows: np.ndarray, static: np.ndarray, first: np.ndarray, ends: np.ndarray, band: np.ndarray, border: np.ndarray
 ) -> None:
     """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
-    unknowns (6 d, s), of intervals whose rows begin and end at `ends`, and whose splines begin at `first`.
+    unknowns (6 d, s), of intervals whose rows begin and end at `ends`, and whose splines begin at `first`; a border
+    without columns is left out.
     """
     c = band.shape[2]
     for k in range(len(first)):
         own, at = rows[ends[k] : ends[k + 1]], first[k]
-        square, across = np.dot(own.T, own), np.dot(own.T, static[ends[k] : ends[k + 1]])
+        square = np.dot(own.T, own)
         for i in range(6):
             for row in range(c):
                 for j in range(i, 6):
                     for column in range(c):
                         band[at + i, j - i, row, column] += square[i * c + row, j * c + column]
+        if border.shape[2] == 0:
+            continue
+        across = np.dot(own.T, static[ends[k] : ends[k + 1]])
+        for i in range(6):
+            for row in range(c):
                 for s in range(across.shape[1]):
                     border[at + i, row, s] += across[i * c + row, s]
 

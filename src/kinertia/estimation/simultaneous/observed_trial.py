@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Observation:
     skin: SkinPatterns | None = None
     frame_products: np.ndarray | None = None
 
-    @property
+    @cached_property
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
         """(m,) deviations of the markers' errors, m, and how they go from frame to frame."""
         if self.frame_products is None:

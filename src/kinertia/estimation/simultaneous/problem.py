@@ -7,8 +7,7 @@ bordered by what does not move.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -19,17 +18,17 @@ from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_terms import add_markers
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, RootTerms, add_root
+from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, UsedAgain, add_root
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.range_terms import add_ranges
-from kinertia.estimation.simultaneous.root_terms import columns_of, root_terms
+from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.estimation.simultaneous.seen_markers import seen_markers
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import add_start
-from kinertia.estimation.simultaneous.stretches import Stretch, stretches_of_trials
-from kinertia.estimation.simultaneous.trunk_bending import TrunkBending
+from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches_of_trials
+from kinertia.estimation.simultaneous.trunk_bending import BentTrunk, TrunkBending
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     from_log_cholesky,
@@ -41,6 +40,10 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.two_threads import side_by_side
+
+_Add = Callable[[Gradient, int, np.ndarray, np.ndarray, Stretch], None]
+"""Adds terms of a stretch of a trial, given its coefficients and the static unknowns."""
 
 
 class MapProblem:
@@ -83,6 +86,7 @@ class MapProblem:
         self.start_static[self.layout.theta] = to_log_cholesky(nearest_consistent(prior.mean))
         self.start_static[self.layout.coordinates] = [skeleton.locked[name] for name in calibration.coordinates]
         self.start_static[self.layout.locals] = skeleton.marker_locals.ravel()
+        self._room = UsedAgain()
         self.stretches = stretches_of_trials(self.bases, len(self.moving), self.layout.size)
         deviation = np.full(self.layout.size, np.inf)
         deviation[self.layout.coordinates] = list(calibration.coordinates.values())
@@ -151,48 +155,52 @@ class MapProblem:
             result.append(every)
         return result
 
-    def prior_terms(self, static: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Information (S, S), right-hand side (S,) and cost of all priors but the instruments'; of these, of what other
-        people of the session have shown.
-        """
-        bsp = self.bsp(static)
-        jacobian = block_diagonal(table_jacobian(static[self.layout.theta]))
-        gap = (bsp.table() - self.prior.mean.table()).ravel()
+    def prior_information(self, static: np.ndarray) -> np.ndarray:
+        """(S, S) of all priors but the instruments'; of these, of what other people of the session have shown."""
+        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
+        jacobian = block_diagonal(table_jacobian(static[theta]))
         mass_row = self.prior.on_scale @ jacobian[0::10] / self.prior.mass_sd_kg
+        result = np.diag(self.weight)
+        result[laboratory, laboratory] += self.session.information
+        result[skin, skin] += self.skin_information
+        result[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
+        return result
+
+    def prior_slope(self, static: np.ndarray) -> tuple[np.ndarray, float]:
+        """Minus the derivatives (S,) of half the sum of squares of the same priors, and that half."""
+        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
+        bsp, by_own = self.bsp(static), table_jacobian(static[theta])
+        gap = (bsp.table() - self.prior.mean.table()).ravel()
         mass_gap = (float(self.prior.on_scale @ bsp.mass_kg) - self.prior.mass_kg) / self.prior.mass_sd_kg
-        information = np.diag(self.weight)
+        pulls = (self.information @ gap).reshape(-1, 10)
+        pulls[:, 0] += mass_gap / self.prior.mass_sd_kg * self.prior.on_scale
         right = -self.weight * (static - self.start_static)
         cost = float(np.sum(self.weight * np.square(static - self.start_static)))
-        theta, skin, laboratory = self.layout.theta, self.layout.skin, self.layout.laboratory
         by_session = self.session.information @ static[laboratory]
-        information[laboratory, laboratory] += self.session.information
         right[laboratory] += self.session.right - by_session
         cost += float(static[laboratory] @ (by_session - 2.0 * self.session.right))
-        information[skin, skin] += self.skin_information
-        pulled = self.skin_information @ static[skin]
-        right[skin] -= pulled
-        cost += float(static[skin] @ pulled)
-        information[theta, theta] += jacobian.T @ self.information @ jacobian + np.outer(mass_row, mass_row)
-        right[theta] -= jacobian.T @ (self.information @ gap) + mass_row * mass_gap
-        return information, right, 0.5 * (cost + float(gap @ self.information @ gap) + mass_gap**2)
+        by_skin = self.skin_information @ static[skin]
+        right[skin] -= by_skin
+        cost += float(static[skin] @ by_skin)
+        right[theta] -= np.einsum("bi,bij->bj", pulls, by_own).ravel()
+        cost += float(gap @ self.information @ gap) + mass_gap**2
+        return right, 0.5 * cost
 
-    def at(self, point: Point, damping: float = 0.0, at_ends: bool = True) -> Linearised:
-        """Normal equations at a point, motions eliminated with their diagonal raised by this share; `at_ends` as
-        `RangeTerms` has it.
-        """
+    def at(self, point: Point, damping: float = 0.0) -> Linearised:
+        """Normal equations at a point, motions eliminated with their diagonal raised by this share."""
         rows = enumerate(point.coefficients)
-        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping, at_ends) for k, part in rows)
-        slope, information = self._slope(point, [trial.gradient for trial in trials])
-        return Linearised(slope, trials, information)
+        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping) for k, part in rows)
+        slope = self._slope(point, [trial.gradient for trial in trials])
+        return Linearised(slope, trials, self.prior_information(point.static))
 
     def slope(self, point: Point) -> Slope:
         """Cost and where it falls: what `at` has, in a tenth of the time."""
         rows = enumerate(point.coefficients)
-        return self._slope(point, [self.gradient(k, part, self.in_trial(k, point)) for k, part in rows])[0]
+        return self._slope(point, [self.gradient(k, part, self.in_trial(k, point)) for k, part in rows])
 
-    def _slope(self, point: Point, gradients: Sequence[Gradient]) -> tuple[Slope, np.ndarray]:
-        """With the priors, and their information (S, S)."""
-        information, right, cost = self.prior_terms(point.static)
+    def _slope(self, point: Point, gradients: Sequence[Gradient]) -> Slope:
+        """With the priors."""
+        right, cost = self.prior_slope(point.static)
         rows, motions, displaced = zip(gradients, self.displacement_sd_m, point.displaced, strict=True), [], []
         for gradient, sd, own in rows:
             right = right + gradient.static_right
@@ -201,7 +209,7 @@ class MapProblem:
             displaced.append(sd * gradient.static_right[self.layout.locals] - own)
         before, places = sum(motion.size for motion in motions), self.layout.instruments
         instruments = slice(before + places.start, before + places.stop)
-        return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, instruments), information
+        return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, instruments)
 
     def in_trial(self, k: int, point: Point) -> np.ndarray:
         """(S,) static unknowns as they are in trial k: its markers displaced."""
@@ -237,6 +245,124 @@ class MapProblem:
         zeros[self.own_plates[k]] = static[self.layout.zeros_of(k)]
         return np.hstack([errors, zeros])
 
+    def late_s(self, k: int, static: np.ndarray) -> float:
+        """By how much the forces of trial k are late."""
+        return float(static[self.layout.late(k)].sum())
+
+    def eliminated(
+        self,
+        k: int,
+        coefficients: np.ndarray,
+        static: np.ndarray,
+        damping: float = 0.0,
+        bordered: bool = True,
+    ) -> Eliminated:
+        """Trial k with its motion eliminated; not `bordered`: of the motion alone, with all else held."""
+        of = partial(self.normal, k, coefficients, static, bordered=bordered)
+        return Eliminated.of(self.stretches[k], of, self._room.back, damping)
+
+    def normal(
+        self,
+        k: int,
+        coefficients: np.ndarray,
+        static: np.ndarray,
+        stretch: Stretch | None = None,
+        bordered: bool = True,
+    ) -> NormalEquations:
+        """Normal equations of a stretch of trial k, or of all of it."""
+        stretch = stretch or Stretch.whole(self.bases[k])
+        result = self._room.zero(stretch.size, len(self.moving), self.layout.size, bordered)
+        for add in self._terms:
+            add(result, k, coefficients, static, stretch)
+        return result
+
+    def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
+        """Cost of trial k and where it falls."""
+
+        def of_part(part: tuple[Sequence[Stretch], Sequence[_Add]]) -> Gradient:
+            result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
+            for stretch in part[0]:
+                own = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
+                for add in part[1]:
+                    add(own, k, coefficients, static, stretch)
+                result.add(own, stretch.touched)
+            return result
+
+        (of_markers, of_root), longer = self._terms, [joined(half) for half in halves(self.stretches[k]) if half]
+        parts: list[tuple[Sequence[Stretch], Sequence[_Add]]] = [(half, self._terms) for half in longer]
+        if sum(map(len, longer)) <= 2:  # too short for halves
+            parts = [(joined(self.stretches[k]), [add]) for add in (of_markers, of_root)]
+        result, *others = side_by_side(of_part, parts)
+        for other in others:
+            result.add(other, slice(None))
+        return result
+
+    @property
+    def _terms(self) -> tuple[_Add, _Add]:
+        """What adds the terms of a stretch of trial k."""
+        return self._add_to_markers, self._add_to_root
+
+    def _add_to_markers(
+        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch
+    ) -> None:
+        """Add those of markers, ranges and the start."""
+        trial, basis, layout = self.trials[k], self.bases[k], self.layout
+        near = stretch.with_neighbours
+        noise, skin = trial.marker_process, (self.skin[k].cut(near), static[layout.skin])
+        q = self.full(basis.evaluate(coefficients, near), static)[0]
+        markers = seen_markers(self.placed(static), trial.markers[near], q, noise, skin, self.moving, self.still)
+        add_markers(into, layout.in_markers, basis, stretch, markers, len(self.still))
+        inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
+        add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving])
+        add_start(into, stretch, coefficients - self.start[k])
+
+    def _add_to_root(
+        self, into: Gradient, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch
+    ) -> None:
+        """Add those of the root equations."""
+        basis, start, skeleton = self.bases[k], stretch.splines.start, self.placed(static)
+        dynamic = stretch.frames.start + np.flatnonzero(self.trials[k].dynamic[stretch.frames])
+        for piece in pieces(len(dynamic)):
+            root = self.root_frames(k, skeleton, coefficients, static, dynamic[piece])
+            if isinstance(into, NormalEquations):
+                add_root(into, self.layout.in_root, basis, start, root.terms(self.columns))
+            else:
+                root.add_gradient(into, self.columns, basis, start)
+
+    def root_frames(
+        self, k: int, skeleton: Skeleton, coefficients: np.ndarray, static: np.ndarray, frames: np.ndarray
+    ) -> RootFrames:
+        """The root equations of trial k at some of its dynamic frames."""
+        trial, ground = self.trials[k], self.grounds[k]
+        motion = Motion(*self.full(self.bases[k].evaluate(coefficients, frames), static))
+        loads = self.foot_loads(k, static, 0, frames)
+        loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
+        by_plates = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
+        result = RootFrames(
+            skeleton,
+            self.bsp(static),
+            static[self.layout.theta],
+            motion,
+            loads.sum(axis=1),
+            by_plates,
+            self.foot_loads(k, static, 1, frames).sum(axis=1)[..., None],
+            partial(self.add_by_ground, k),
+            trial.root_sd(frames),
+            frames,
+            self.layout.in_root.stop,
+        )
+        if self.trunk is None:
+            return result
+        return result.bent(BentTrunk(self.trunk, static[self.layout.trunks][k], self.layout.trunks.start + k))
+
+    def add_by_ground(self, k: int, by_static: np.ndarray, by_plates: np.ndarray, by_own: np.ndarray) -> None:
+        """`add_by_plates`, and those by what trial k has of its own (n, r, 1 or 2): the time by which its forces are
+        late, and how much the trunk bends.
+        """
+        self.add_by_plates(k, by_static, by_plates)
+        by_static[:, :, self.layout.late(k)] += by_own[:, :, :1]
+        by_static[:, :, self.layout.trunks.start + k : self.layout.trunks.stop][..., :1] += by_own[:, :, 1:]
+
     def add_by_plates(self, k: int, by_static: np.ndarray, by_plates: np.ndarray) -> None:
         """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k to those by the static unknowns that
         root equations depend on (n, r, s).
@@ -246,94 +372,3 @@ class MapProblem:
         by_static[:, :, self.layout.plates] += by_plates[..., :errors].reshape(n, rows, -1) @ self.to_plates
         by_static[:, :, self.layout.zeros_of(k)] += by_plates[:, :, self.own_plates[k], errors:]
         by_static[:, :, self.layout.gains_of(k)] += by_plates[:, :, self.own_plates[k], GAIN]
-
-    def late_s(self, k: int, static: np.ndarray) -> float:
-        """By how much the forces of trial k are late."""
-        return float(static[self.layout.late(k)].sum())
-
-    def eliminated(
-        self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float = 0.0, at_ends: bool = True
-    ) -> Eliminated:
-        """Trial k with its motion eliminated."""
-        of = partial(self.normal, k, coefficients, static, at_ends=at_ends)
-        return Eliminated.of(self.stretches[k], of, damping)
-
-    def motion_eliminated(
-        self, k: int, coefficients: np.ndarray, static: np.ndarray, damping: float, at_ends: bool
-    ) -> Eliminated:
-        """The same with all that does not move held: without information on it."""
-
-        def of(stretch: Stretch) -> NormalEquations:
-            normal = self.normal(k, coefficients, static, stretch, at_ends)
-            return replace(normal, border=normal.border[..., :0], static=normal.static[:0, :0])
-
-        return Eliminated.of(self.stretches[k], of, damping)
-
-    def normal(
-        self,
-        k: int,
-        coefficients: np.ndarray,
-        static: np.ndarray,
-        stretch: Stretch | None = None,
-        at_ends: bool = True,
-    ) -> NormalEquations:
-        """Normal equations of a stretch of trial k, or of all of it."""
-        stretch = stretch or Stretch.whole(self.bases[k])
-        result = NormalEquations.zero(stretch.size, len(self.moving), self.layout.size)
-        self._add(result, k, coefficients, static, stretch, at_ends)
-        return result
-
-    def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
-        """Cost of trial k and where it falls."""
-        result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
-        for stretch in self.stretches[k]:
-            part = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
-            self._add(part, k, coefficients, static, stretch)
-            result.add(part, stretch.touched)
-        return result
-
-    def _add(
-        self,
-        into: Gradient,
-        k: int,
-        coefficients: np.ndarray,
-        static: np.ndarray,
-        stretch: Stretch,
-        at_ends: bool = True,
-    ) -> None:
-        """Add all terms of a stretch of trial k."""
-        trial, basis, layout = self.trials[k], self.bases[k], self.layout
-        near, start = stretch.with_neighbours, stretch.splines.start
-        skeleton = self.placed(static)
-        noise, skin = trial.marker_process, (self.skin[k].cut(near), static[layout.skin])
-        q = self.full(basis.evaluate(coefficients, near), static)[0]
-        markers = seen_markers(skeleton, trial.markers[near], q, noise, skin, self.moving, self.still)
-        add_markers(into, layout.in_markers, basis, stretch, markers, len(self.still))
-        inside = slice(stretch.frames.start - near.start, stretch.frames.stop - near.start)
-        add_ranges(into, basis, stretch, self.skeleton.bounds, q[inside][:, self.moving], at_ends)
-        dynamic = stretch.frames.start + np.flatnonzero(trial.dynamic[stretch.frames])
-        for piece in pieces(len(dynamic)):
-            terms = self._root_terms(k, skeleton, coefficients, static, dynamic[piece])
-            add_root(into, layout.in_root, basis, start, terms)
-        add_start(into, stretch, coefficients - self.start[k])
-
-    def _root_terms(
-        self, k: int, skeleton: Skeleton, coefficients: np.ndarray, static: np.ndarray, frames: np.ndarray
-    ) -> RootTerms:
-        """The root equations at some of the dynamic frames."""
-        trial, layout, ground = self.trials[k], self.layout, self.grounds[k]
-        motion = Motion(*self.full(self.bases[k].evaluate(coefficients, frames), static))
-        loads = self.foot_loads(k, static, 0, frames)
-        by_ground = np.zeros((len(frames), 6, layout.in_root.stop))
-        loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
-        by_plate = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
-        self.add_by_plates(k, by_ground, by_plate)
-        by_ground[:, :, layout.late(k)] = self.foot_loads(k, static, 1, frames).sum(axis=1)[:, :, None]
-        bsp, theta, sd, wrench = self.bsp(static), static[layout.theta], trial.root_sd(frames), loads.sum(axis=1)
-        if self.trunk is None:
-            return root_terms(skeleton, bsp, theta, motion, wrench, by_ground, sd, self.columns, frames)
-        place, kappa = layout.trunks.start + k, static[layout.trunks.start + k]
-        bsp, wrench = self.trunk.bent(bsp, kappa), self.trunk.upright(wrench, kappa, by_ground, place)
-        result = root_terms(skeleton, bsp, theta, motion, wrench, by_ground, sd, self.columns, frames)
-        self.trunk.add_by_parameters(result.static, theta, [place])
-        return result

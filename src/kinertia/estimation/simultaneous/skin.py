@@ -16,7 +16,7 @@ coefficients correlate.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -78,7 +78,7 @@ class SkinPatterns:
     def displaced(self, coefficients: np.ndarray) -> np.ndarray:
         """(n, m, 3) m, how far skin with these coefficients carries the markers along the axes of their segments."""
         result = np.zeros((len(self.values), len(self.first), 3))
-        for markers, places in self._by_segment():
+        for markers, places in self._by_segment:
             patterns = self.values[:, self.first[markers[0]] : self.last[markers[0]]]
             each = coefficients[places].transpose(1, 0, 2).reshape(patterns.shape[1], -1)
             result[:, markers] = (patterns @ each).reshape(-1, len(markers), 3)
@@ -87,19 +87,22 @@ class SkinPatterns:
     def information(self) -> np.ndarray:
         """(k, k) of the coefficients' prior."""
         result = np.zeros((self.size, self.size))
-        for markers, places in self._by_segment():
+        for markers, places in self._by_segment:
             count = len(markers)
             own = np.eye(count) - ALIKE / (1.0 - ALIKE + ALIKE * count)
             flat = places.reshape(count, -1)
             result[flat[:, None], flat[None]] = own[:, :, None] / (1.0 - ALIKE)
         return result
 
-    def _by_segment(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    @cached_property
+    def _by_segment(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Markers (k,) of each segment that has patterns, and where their coefficients stand (k, patterns, 3)."""
+        result = []
         for start in np.unique(self.first[self.last > self.first]):
             markers = np.flatnonzero((self.first == start) & (self.last > self.first))
             count = 3 * int(self.last[markers[0]] - start)
-            yield markers, (self.begin[markers, None] + np.arange(count)).reshape(len(markers), -1, 3)
+            result.append((markers, self.begin[markers, None] + np.arange(count)))
+        return [(markers, places.reshape(len(markers), -1, 3)) for markers, places in result]
 
 
 def skin_patterns(skeleton: Skeleton, trials: Sequence[np.ndarray]) -> tuple[SkinPatterns, ...]:

@@ -30,7 +30,7 @@ from kinertia.estimation.simultaneous.clock_profile import ClockProfile
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
-from kinertia.estimation.simultaneous.linearised import Point, Slope
+from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
@@ -42,17 +42,16 @@ from kinertia.estimation.simultaneous.task_masses import task_covariance
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.one_thread import one_blas_thread
 
-CONVERGED = 3e-3
+CONVERGED = 1e-3
 """Promised decrease of half the sum of squares below which a step is the last of the search: with the one at the end of
 it, from a quadratic of its own, no quantity is then further from the optimum than some hundredths of its deviation."""
-_ENDED = 0.05
-"""What that one may promise; else the search goes on."""
+_ENDED = 0.02
+"""What a step with that quadratic may promise where it was made; else the search goes on. A quadratic made as near as
+this that has led to the last step is the last one, too."""
 _NEAR = 8.0
 """Promised decrease from which on gradients alone are followed: above it a new quadratic is worth its time."""
 _MOST_GRADIENTS = 10
 """With one quadratic."""
-_BLOCKED = 0.5
-"""Share of a step: where no more of it can be taken, coordinates meet the ends of their ranges."""
 _FIRST_DAMPING = 1e-5
 """Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
 information: 1e-3 would hold the first steps back."""
@@ -117,9 +116,8 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
     while True:
         iterations += 1
         last = at.converged or damping > _STUCK or iterations == _MAX_ITERATIONS
-        at_ends = last or not at.slow
         damping = _LEAST_DAMPING if last else damping
-        here = problem.at(at.slope.point, damping, at_ends)
+        here = problem.at(at.slope.point, damping)
         scale = np.maximum(scale, np.diag(here.information) + sum(trial.static_diagonal for trial in here.trials))
         static = here.point.like(here.slope.right).static
         model = GaussNewton.of(problem, here, damping * scale + problem.bends(static))
@@ -127,11 +125,17 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
         if last:
             end = _last_step(problem, model, at)
             if end.converged or not at.converged or iterations >= _MAX_ITERATIONS:
-                cost = begin, end.slope.under(end.judged.gaussian)[0]
-                return Ended(end.slope.point, here, end.judged.gaussian, end.converged, iterations, cost)
-        at = _descended(problem, model, at._replace(slope=here.slope), at_ends, iterations > 1, CONVERGED)
+                return _ended(begin, end, here, iterations)
+        at = _descended(problem, model, at._replace(slope=here.slope), iterations > 1, CONVERGED)
+        if at.converged and at.began < _ENDED and damping == _LEAST_DAMPING:
+            return _ended(begin, at, here, iterations)
         stuck = at.slope.point is here.point
         damping = max(100.0 * damping, 1e-4) if stuck else max(0.01 * damping, _LEAST_DAMPING)
+
+
+def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> Ended:
+    cost = begin, at.slope.under(at.judged.gaussian)[0]
+    return Ended(at.slope.point, here, at.judged.gaussian, at.converged, iterations, cost)
 
 
 class _Judged(NamedTuple):
@@ -164,14 +168,12 @@ class _Judged(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Where the search is, whether the last step was short, and whether gradients with the last quadratic all brought
-    something, to the last of them: what it takes for held at the ends of ranges may then keep the search back.
-    """
+    """Where the search is, whether the last step was short, and what the first one with the last quadratic promised."""
 
     slope: Slope
     judged: _Judged
     converged: bool = False
-    slow: bool = False
+    began: float = np.inf
 
 
 def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
@@ -180,7 +182,7 @@ def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.slope.point, _LEAST_DAMPING)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.right).static))
-        at = _descended(problem, model, at._replace(slope=here.slope), True, True, CONVERGED)
+        at = _descended(problem, model, at._replace(slope=here.slope), True, CONVERGED)
         if at.converged:
             break
     return at.slope.point
@@ -189,15 +191,15 @@ def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
 def _held(problem: MapProblem, point: Point, model: GaussNewton, instruments: GaussianPrior) -> Point:
     """The optimum with this Gaussian for the instruments, from that with another."""
     at = _Place(problem.slope(point), _Judged.known(instruments))
-    return _descended(problem, model, at, True, False, CONVERGED).slope.point
+    return _descended(problem, model, at, False, CONVERGED).slope.point
 
 
 def _descended(
-    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, at_ends: bool, judging: bool, tolerance: float
+    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, judging: bool, tolerance: float
 ) -> _Place:
     """Quasi-Newton steps with one quadratic, as long as they are worth it."""
     slope, judged = at.slope, at.judged
-    pairs, places = SecantPairs.none(len(slope.right)), slope.instruments
+    pairs, places, began = SecantPairs.none(len(slope.right)), slope.instruments, np.inf
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, judged)
         if judging and isinstance(model, GaussNewton):
@@ -206,22 +208,19 @@ def _descended(
                 pairs = pairs.stiffer(places, again.gaussian.precision - judged.gaussian.precision)
                 judged = again
                 step, promised = _answer(slope, model, pairs, judged)
+        began = began if count else promised
         if 0.0 <= promised < tolerance:
-            return _Place(_moved(problem, slope, step), judged, True)
+            return _Place(_moved(problem, slope, step), judged, True, began)
         if (count and promised > _NEAR) or not promised > 0.0:
             break
         there = _lower(problem, slope, judged.gaussian, step, promised)
         if there is None:
             break
         taken = there.point.vector - slope.point.vector
-        if not at_ends and np.linalg.norm(taken) < _BLOCKED * np.linalg.norm(step):
-            return _Place(there, judged)
         change = slope.right - there.right
         change[places] += judged.gaussian.precision @ taken[places]
         expected = 2.0 * promised * float(taken @ step) / float(step @ step)
         slope, pairs = there, pairs.with_pair(taken, change, expected)
-    else:
-        return _Place(slope, judged, slow=True)
     return _Place(slope, judged)
 
 
@@ -289,9 +288,8 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     following = MapProblem(problem.skeleton, problem.prior, problem.calibration, sure)
     at = _Place(following.slope(replace(point, static=rigid)), _Judged.at_first(following))
     for _ in range(_MOST_THROUGH_IMPACTS):
-        at_ends = not at.slow
-        alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING, at_ends)
-        at = _descended(following, alone, at, at_ends, judging=False, tolerance=_MOTION_CONVERGED)
+        alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING)
+        at = _descended(following, alone, at, judging=False, tolerance=_MOTION_CONVERGED)
         if at.converged:
             break
     return at.slope.point.coefficients

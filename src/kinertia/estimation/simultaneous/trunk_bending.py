@@ -12,7 +12,6 @@ specific force at the trunk (acceleration less gravity). It is taken from the gr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,21 +75,38 @@ class TrunkBending:
         parameters[self.row] += kappa * self.parameters
         return BodySegmentParameters.from_dynamic_parameters(bsp.segments, parameters.ravel())
 
-    def upright(self, wrench: np.ndarray, kappa: float, by_static: np.ndarray, place: int) -> np.ndarray:
-        """Ground reactions (d, 6) less the moment kappa y x F / mass; by_static (d, 6, s), their derivatives, become
-        the result's, kappa at this place.
-        """
-        by_static[:, 3] -= kappa / self.mass_kg * by_static[:, 2]
-        by_static[:, 5] += kappa / self.mass_kg * by_static[:, 0]
-        moment = np.zeros_like(wrench)
-        moment[:, 3], moment[:, 5] = wrench[:, 2] / self.mass_kg, -wrench[:, 0] / self.mass_kg
-        by_static[:, :, place] -= moment
-        return wrench - kappa * moment
 
-    def add_by_parameters(self, by_static: np.ndarray, theta: np.ndarray, places: Sequence[int]) -> None:
-        """Add derivatives of the root equations by kappa through the trunk's parameters to those that by_static
-        (d, 6, s) has at these places; they come from those by the trunk's unknowns, of `theta`, which stand first.
-        """
-        own = slice(10 * self.row, 10 * self.row + 10)
-        by_unknowns = np.linalg.solve(dynamic_jacobian(theta[own])[0], self.parameters)
-        by_static[:, :, places] += (by_static[:, :, own] @ by_unknowns)[..., None]
+@dataclass(frozen=True, eq=False)
+class BentTrunk:
+    """A trunk that bends by kappa (kg m) in a trial; that unknown's place is among the static ones."""
+
+    trunk: TrunkBending
+    kappa: float
+    place: int
+
+    def bsp(self, rigid: BodySegmentParameters) -> BodySegmentParameters:
+        """What moves like segments with such a trunk."""
+        return self.trunk.bent(rigid, self.kappa)
+
+    def upright(self, loads: np.ndarray) -> np.ndarray:
+        """Ground reactions (d, 6), or their derivatives (d, 6, ...), less the moment kappa y x F / mass."""
+        result = loads.copy()
+        result[:, 3] -= self.kappa / self.trunk.mass_kg * loads[:, 2]
+        result[:, 5] += self.kappa / self.trunk.mass_kg * loads[:, 0]
+        return result
+
+    def by_kappa(self, loads: np.ndarray) -> np.ndarray:
+        """(d, 6) derivative of that by kappa."""
+        result = np.zeros_like(loads)
+        result[:, 3], result[:, 5] = -loads[:, 2] / self.trunk.mass_kg, loads[:, 0] / self.trunk.mass_kg
+        return result
+
+    @property
+    def unknowns(self) -> slice:
+        """Of the trunk, among the static ones."""
+        return slice(10 * self.trunk.row, 10 * self.trunk.row + 10)
+
+    def by_unknowns(self, theta: np.ndarray) -> np.ndarray:
+        """(10,) step of the trunk's unknowns, at theta (10 b,), that changes its parameters as a unit of kappa does."""
+        result: np.ndarray = np.linalg.solve(dynamic_jacobian(theta[self.unknowns])[0], self.trunk.parameters)
+        return result

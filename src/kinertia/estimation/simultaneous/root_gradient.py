@@ -1,0 +1,171 @@
+"""Where the root equations pull motion and what does not move: the gradient of `root_columns` without its derivatives.
+
+With L the residual over its variance, as a motion at the ground origin, and I, B, f, S, P, Q of `rigid_body`, the pull
+on an axis' place, rate and acceleration is
+
+    L . (S x* f) + (L B) . P + (I L) . Q        (L B) . S + 2 (I L) . P        (I L) . S
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.model.compiled import compiled, part
+from kinertia.model.kinematic_tree import KinematicTree, place_segments
+from kinertia.model.spatial import force_cross, inner
+from kinertia.motion.regressor import in_segment, own_regressor
+from kinertia.motion.rigid_body import (
+    Frame,
+    carry,
+    empty_frame,
+    fill,
+    inertia_times,
+    taken_about,
+    times_bias,
+    whole_load,
+)
+from kinertia.motion.root_columns import Columns
+
+
+@compiled
+def add_root_gradient(
+    tree: KinematicTree,
+    gravity_m_s2: float,
+    bodies: np.ndarray,
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
+    bends: np.ndarray,
+    root: tuple[np.ndarray, np.ndarray],
+    wrench: np.ndarray,
+    sd: np.ndarray,
+    columns: Columns,
+    basis: tuple[np.ndarray, np.ndarray],
+    right: np.ndarray,
+    static_right: np.ndarray,
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Add minus the derivatives of half the sum of squares by the motion (size, c), and by the static unknowns (S,) of
+    coordinates that do not move.
+
+    Args:
+        tree, gravity_m_s2, bodies, motion, bends, root, wrench, sd, columns: as `root_columns` has them.
+        basis: (n,) the first active spline of each frame among those of `right`, and (3, n, 6) values of the active
+            ones and their first two derivatives.
+        right, static_right: to which it is added.
+
+    Returns:
+        Half the sum of squares; its derivatives by the parameters of each segment's body (b, 10); and minus those by
+        the ground reactions (n, 6), force and moment at the ground origin.
+    """
+    (x, v, a), (about, slides), (first, values) = motion, root, basis
+    n, count = x.shape
+    cost, by_bodies, by_ground = 0.0, np.zeros((len(columns.segments), 10)), np.empty((n, 6))
+    frame, left, load, pull, by = (
+        empty_frame(count, gravity_m_s2),
+        np.empty(6),
+        np.zeros((1, 6)),
+        np.empty(6),
+        np.empty(3),
+    )
+    rotation, translation = np.empty((len(tree.carrier), 3, 3)), np.empty((len(tree.carrier), 3))
+    for k in range(n):
+        fill(tree, bodies, x[k], v[k], a[k], frame)
+        carry(tree, bodies, frame)
+        place_segments(tree, frame.rotation, frame.translation, rotation, translation)
+        load[:] = 0.0
+        whole_load(tree.parent, frame.force, load, 0)
+        for r in range(6):
+            load[0, r] -= wrench[k, r]
+        taken_about(load[0], about[k], left)
+        for r in range(6):
+            pull[r] = left[r] / (sd[k, r] * sd[k, r])
+            cost += 0.5 * left[r] * pull[r]
+        by_ground[k] = pull
+        _at_origin(by_ground[k], about[k])
+        _moving_centre(left, pull, slides, first[k], values[0, k], right)
+        _by_bodies(tree, frame, rotation, translation, by_ground[k], columns.segments, by_bodies)
+        for j in range(count):
+            _by_axis(frame, by_ground, k, j, by)
+            if len(bends):
+                place, rate, acceleration, bend = by[0], by[1], by[2], bends[k, j]
+                by[0] = place * bend[0] + rate * bend[1] + acceleration * bend[2]
+                by[1] = rate * bend[0] + acceleration * 2.0 * bend[1]
+                by[2] = acceleration * bend[0]
+            if columns.still[j] >= 0:
+                static_right[columns.still[j]] -= by[0]
+            if columns.moving[j] >= 0:
+                for i in range(6):
+                    along = values[0, k, i] * by[0] + values[1, k, i] * by[1] + values[2, k, i] * by[2]
+                    right[first[k] + i, columns.moving[j]] -= along
+    return cost, by_bodies, by_ground
+
+
+@part
+def _at_origin(pull: np.ndarray, about: np.ndarray) -> None:
+    """Turn the pull (6,) on a force and its moment about a point into that on the same taken at the ground origin."""
+    x, y, z = about[0], about[1], about[2]
+    pull[0] -= pull[4] * z - pull[5] * y
+    pull[1] -= pull[5] * x - pull[3] * z
+    pull[2] -= pull[3] * y - pull[4] * x
+
+
+@part
+def _moving_centre(
+    left: np.ndarray, pull: np.ndarray, slides: np.ndarray, first: int, values: np.ndarray, right: np.ndarray
+) -> None:
+    """What the moment changes because its centre moves with the first three coordinates."""
+    for c in range(3):
+        x, y, z = slides[c, 0], slides[c, 1], slides[c, 2]
+        by = (y * left[2] - z * left[1]) * pull[3]
+        by += (z * left[0] - x * left[2]) * pull[4] + (x * left[1] - y * left[0]) * pull[5]
+        for i in range(6):
+            right[first + i, c] += values[i] * by
+
+
+@part
+def _by_axis(frame: Frame, pulls: np.ndarray, k: int, j: int, by: np.ndarray) -> None:
+    """by = (3,) the pull on place, rate and acceleration of axis j for pulls[k] on the whole load."""
+    axes, swept, turned, borne, biased, force = (
+        frame.axes,
+        frame.swept,
+        frame.turned,
+        frame.spare[0],
+        frame.spare[1],
+        frame.spare[2],
+    )
+    inertia_times(frame.inertia, j, pulls, k, borne, j)
+    times_bias(frame.bias, j, pulls, k, biased, j)
+    force_cross(axes, j, frame.force, j, force, j)
+    by[0] = inner(force, j, pulls, k) + inner(biased, j, swept, j) + inner(borne, j, turned, j)
+    by[1] = inner(biased, j, axes, j) + 2.0 * inner(borne, j, swept, j)
+    by[2] = inner(borne, j, axes, j)
+
+
+@part
+def _by_bodies(
+    tree: KinematicTree,
+    frame: Frame,
+    rotation: np.ndarray,
+    translation: np.ndarray,
+    pull: np.ndarray,
+    segments: np.ndarray,
+    by_bodies: np.ndarray,
+) -> None:
+    """Add the pull (b, 10) on the bodies' parameters, for one (6,) on the whole load at the ground origin."""
+    w, e, b, own, at = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
+    for body in range(len(segments)):
+        s = segments[body]
+        carrier, turn = tree.carrier[s], rotation[s]
+        if carrier < 0:
+            continue
+        in_segment(frame.velocity[carrier], frame.acceleration[carrier], turn, translation[s], w, e, b)
+        own_regressor(w, e, b, own)
+        # at the segment's origin, in its axes
+        x, y, z = translation[s, 0], translation[s, 1], translation[s, 2]
+        fx = pull[0] + pull[4] * z - pull[5] * y
+        fy = pull[1] + pull[5] * x - pull[3] * z
+        fz = pull[2] + pull[3] * y - pull[4] * x
+        for c in range(3):
+            at[c] = turn[0, c] * fx + turn[1, c] * fy + turn[2, c] * fz
+            at[3 + c] = turn[0, c] * pull[3] + turn[1, c] * pull[4] + turn[2, c] * pull[5]
+        for c in range(10):
+            for r in range(6):
+                by_bodies[body, c] += at[r] * own[r, c]

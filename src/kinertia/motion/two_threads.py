@@ -1,0 +1,58 @@
+"""Runs independent parts of a computation in two threads, where the machine has two cores for them.
+
+Compiled functions, BLAS and NumPy's larger operations leave the interpreter to others while they run. How the work is
+shared out depends on the problem alone, never on the number of threads: results are the same bit for bit.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextvars import copy_context
+from functools import cache
+from multiprocessing import parent_process
+from threading import Lock
+from typing import TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_second = Lock()
+"""Held by whoever has the second thread: nobody makes a third."""
+
+
+def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Apply a function to every item: the first half here, the others in a second thread if there is a core for it.
+
+    >>> side_by_side(abs, [-3, 2, -1])
+    [3, 2, 1]
+    """
+    here = (len(items) + 1) // 2
+    if len(items) < 2 or _cores() < 2 or not _second.acquire(blocking=False):
+        return [function(item) for item in items]
+    try:
+        there = _thread().submit(copy_context().run, lambda: [function(item) for item in items[here:]])
+        try:
+            results = [function(item) for item in items[:here]]
+        finally:
+            wait([there])
+        return results + there.result()
+    finally:
+        _second.release()
+
+
+@cache
+def _thread() -> ThreadPoolExecutor:
+    """The second thread, which is started once."""
+    return ThreadPoolExecutor(1, thread_name_prefix="kinertia")
+
+
+@cache
+def _cores() -> int:
+    """Cores that this process may use; one in a process that another one has started to share the machine."""
+    if parent_process() is not None:
+        return 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
