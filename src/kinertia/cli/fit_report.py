@@ -38,6 +38,11 @@ def report_fit(fit: Fit) -> None:
     out.print(f"total mass (kg): {masses}{beside}\n")
     if fit_summary["asymmetry"]:
         out.print(f"left and right: {'; '.join(fit_summary['asymmetry'])}\n")
+    if fit.corrections:
+        out.print("Corrections applied (apparent):")
+        for correction in fit.corrections:
+            out.print(f"- {correction}")
+        out.print()
     for warning in fit.warnings:
         show_warning(warning)
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from kinertia.estimation.attached import not_found_warnings, with_attached
 from kinertia.estimation.forces_used import forces_used
-from kinertia.estimation.free_moment_sign import free_moment_sign_warnings
+from kinertia.estimation.free_moment_sign import free_moment_sign_warnings, with_likelier_sign
 from kinertia.estimation.mirrored_free_moments import mirrored_free_moments_warning
 from kinertia.estimation.prepare import Prepared, Progress, TrialInput, prepare
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.fit import Posterior, fit_simultaneous
+from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.simultaneous.unseen_turn import unseen_turn_note
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
@@ -113,15 +113,12 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
     prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
-    signs = list(free_moment_sign_warnings(outcome.trials))
     warnings = (
         *ready.warnings,
-        *turning_warnings(ready.skeleton, ready.kinematics),
-        *signs,
+        *turning_warnings(ready.skeleton, [trial.kinematics for trial in outcome.trials]),
         *outcome.warnings,
         *([] if outcome.posterior is None else not_found_warnings(ready.attached, outcome.bsp, outcome.posterior.sd)),
-        # free moments of the wrong sign are off like mirror images, too
-        *([] if signs else _mirrored_free_moments(outcome)),
+        *_mirrored_free_moments(outcome),
         *force_warnings(
             ready.carried,
             ready.literature,
@@ -144,10 +141,12 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         notes=(
             *ready.notes,
             *_force_notes(outcome.trials, settings),
+            *outcome.notes,
             *_turn_notes(outcome.posterior, ready),
             *_movement_notes(ready),
         ),
         file=ready.file,
+        corrections=outcome.corrections,
     )
 
 
@@ -189,6 +188,8 @@ class _Outcome:
     converged: bool
     posterior: Posterior | None
     warnings: tuple[str, ...]
+    corrections: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
@@ -207,8 +208,8 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
         motion = joined([next(motions) for _ in parts])
         estimates.append(_Estimated(ready.skeleton, motion, None, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
     trials = _trial_fits(ready, result.bsp, estimates, started)
-    warnings = two_level_warnings(result)
-    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, tuple(warnings))
+    warnings = (*free_moment_sign_warnings(trials), *two_level_warnings(result))
+    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, warnings)
 
 
 def named_by_source(ready: Prepared) -> ModelUncertainty:
@@ -221,14 +222,20 @@ def named_by_source(ready: Prepared) -> ModelUncertainty:
 def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
     progress("estimate", 0.0)
     bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
-    fitted = fit_simultaneous(
-        ready.skeleton,
-        ready.prior,
-        ready.kinematics,
-        bandwidths,
-        named_by_source(ready),
-        lambda share: progress("estimate", share),
-    )
+
+    def fit(one: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
+        return fit_simultaneous(
+            one.skeleton,
+            one.prior,
+            one.kinematics,
+            bandwidths,
+            named_by_source(one),
+            lambda share: progress("estimate", share),
+            otherwise,
+        )
+
+    signed = with_likelier_sign(ready, fit)
+    fitted, ready, sign = signed.fitted, signed.ready, signed.sign
     result = fitted.result
     parts = (
         fitted.skeletons,
@@ -244,7 +251,10 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
-    return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior, fitted.warnings)
+    said = ([], []) if sign is None else (list(filter(None, [sign.correction])), list(filter(None, [sign.note])))
+    corrections, notes = (*said[0], *fitted.corrections), tuple(said[1])
+    outcome = fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior
+    return _Outcome(*outcome, fitted.warnings, corrections, notes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -201,6 +201,7 @@ class Fit:
         warnings: what the user should know before using the numbers; one sentence each.
         notes: assumptions made on the way; one sentence each.
         file: the OpenSim model that the skeleton is from, if it is.
+        corrections: apparent errors of instruments and files that the estimate has put right; one sentence each.
 
     Examples:
         >>> mass = fit.bsp[fit.bsp.parameter == "mass"]  # fit = kinertia.fit_subject("subject.toml")
@@ -221,6 +222,7 @@ class Fit:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     file: OsimModel | None = None
+    corrections: tuple[str, ...] = ()
 
     @cached_property
     def bsp(self) -> pd.DataFrame:

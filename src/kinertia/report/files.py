@@ -189,6 +189,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         "uses": [{"output": use.output, "use": use.word, "reason": use.reason} for use in uses(fit)],
         "verdicts": [verdict._asdict() for verdict in verdicts(fit)],
         "warnings": list(fit.warnings),
+        "corrections": list(fit.corrections),
         "notes": list(fit.notes),
     }
 

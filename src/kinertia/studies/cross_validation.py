@@ -8,14 +8,16 @@ compared with that of the literature's parameters, frozen in the same way.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from kinertia.errors import KinertiaError
+from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prepare import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.fit import SimultaneousFit, fit_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
@@ -68,7 +70,8 @@ def cross_validate(
 ) -> tuple[HeldOut, ...]:
     """Hold out every trial in turn.
 
-    The skeleton is calibrated on all trials at once, for both sets of parameters alike.
+    The skeleton is calibrated on all trials at once, and so is the sign of free moments found, for both sets of
+    parameters alike.
 
     Args:
         ready: the person, with two trials or more.
@@ -84,13 +87,20 @@ def cross_validate(
             f"cross-validation needs at least two trials, one to hold out; the subject has {len(trials)}; add a "
             "[[trial]], or list a long one twice with a `name` and a `window_s` for each half"
         )
-    bandwidths = dict(zip(trials, Bandwidth.of(trials, cutoff_hz), strict=True))
+    used = Bandwidth.of(trials, cutoff_hz)
+
+    def fit(one: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
+        return fit_simultaneous(one.skeleton, one.prior, one.kinematics, used, one.uncertainty, otherwise=otherwise)
+
+    ready = with_likelier_sign(ready, fit).ready
+    trials = ready.kinematics
+    bandwidths = dict(zip(trials, used, strict=True))
     held_out = []
     for k, held in enumerate(trials):
         progress("held out", k / len(trials))
         others = [other for other in trials if other is not held]
-        used = [bandwidths[other] for other in others]
-        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, used, ready.uncertainty).result.bsp
+        own = [bandwidths[other] for other in others]
+        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, own, ready.uncertainty).result.bsp
         explained = (_explained(ready, bsp, held, bandwidths[held]) for bsp in (ready.prior.mean, estimate))
         held_out.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(held_out)

@@ -217,8 +217,8 @@ def checked(subject: Path) -> list[Finding]:
 
 
 def of_fit(fit: Fit) -> list[Finding]:
-    """What `kinertia fit` doubts once it has computed."""
-    warned = [Finding("caution", sentence, "fit") for sentence in fit.warnings]
+    """What `kinertia fit` doubts or has corrected once it has computed."""
+    warned = [Finding("caution", sentence, "fit") for sentence in (*fit.warnings, *fit.corrections)]
     return warned + [Finding(*verdict, "fit") for verdict in verdicts(fit) if verdict.level != "pass"]
 
 

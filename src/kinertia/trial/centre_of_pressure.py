@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from kinertia.trial.data import LOAD_THRESHOLD_N
+from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
 
 FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
 """Below this a centre of pressure is too noisy to be judged."""
@@ -25,6 +27,14 @@ def free_moment(wrench: np.ndarray) -> np.ndarray:
     """(...) N m about the vertical through the centre of pressure of a wrench (..., 6)."""
     result: np.ndarray = (wrench[..., 3:] - np.cross(centre_of_pressure(wrench), wrench[..., :3]))[..., 1]
     return result
+
+
+def with_turned_free_moments(loads: FootLoads) -> FootLoads:
+    """The same loads with the other sign of the moment about the vertical through each centre of pressure."""
+    carried = loads.force[..., 1] >= LOAD_THRESHOLD_N
+    moment = loads.moment.copy()
+    moment[..., 1] -= np.where(carried, 2.0 * free_moment(loads.wrench), 0.0)
+    return replace(loads, moment=moment)
 
 
 def held_centre_of_pressure(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray:

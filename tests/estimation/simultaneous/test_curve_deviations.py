@@ -189,7 +189,9 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     gaussian = GaussianPrior.of(pair.instruments)
     chains, information, right = dense_pair(pair, here, gaussian)
     covariance = inverse(information)
-    static_covariance, sds = _deviations(pair, Ended(here.point, here, gaussian, True, 1, (0.0, 0.0)))
+    static_covariance, sds = _deviations(
+        pair, Ended(here.point, here, gaussian, True, 1, (0.0, 0.0)), GaussNewton.of(pair, here).under(gaussian)
+    )
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(

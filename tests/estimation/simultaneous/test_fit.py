@@ -7,6 +7,7 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.instrument_warnings import accuses
 from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
 from kinertia.synthetic.noise import camera_noise
@@ -60,12 +61,10 @@ def test_calibration_is_told_with_its_deviations(plain):
         np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd)
     )
     assert calibration["plate left foot: gain"]["prior_sd"] == PLATE_PRIOR["gain"].sd
-    assert calibration["clock: forces late by"] == {
-        "value": plain.result.clock_s[0],
-        "prior_sd": CLOCK_PRIOR_S.sd,
-        "sd": plain.result.clock_s[1],
-        "unit": "s",
-    }
+    clock = calibration["clock: forces late by"]
+    late_s, sd = plain.result.clock_s
+    assert (clock["value"], clock["prior_sd"], clock["sd"], clock["unit"]) == (late_s, CLOCK_PRIOR_S.sd, sd, "s")
+    assert clock["contradicted_by"] == ""
     for name, one in calibration.items():
         assert 0 < one["sd"] <= one["prior_sd"] * (1 + 1e-9), name
 
@@ -150,8 +149,8 @@ def test_a_displaced_plate_is_named(trial):
         loads[:, 0, 3:] += np.cross([0.0, 0.0, 0.03], loads[:, 0, :3])
 
     outcome = fitted(trial, disturb=shift)
-    (said,) = [w for w in outcome.warnings if "check the instruments" in w]
-    assert said.startswith("plate right foot: z: -")
+    (said,) = [w for w in outcome.warnings if "Check where the plate stands" in w]
+    assert said.startswith("Plate right foot: displaced mediolaterally, corrected by -")
 
 
 @pytest.mark.slow
@@ -216,7 +215,9 @@ def test_a_wrong_gain_is_named(trial):
         loads[:, 0] *= 0.9
 
     outcome = fitted(trial, disturb=weaken)
-    assert any(w.startswith("plate right foot: gain: +") and "check the instruments" in w for w in outcome.warnings)
+    assert any(w.startswith("Plate right foot: gain error in walk only, corrected by +") for w in outcome.warnings)
+    parts = [outcome.posterior.calibration[f"plate right foot: {what}"]["value"] for what in ("gain", "gain in walk")]
+    assert sum(parts) == pytest.approx(1.0 / 0.9 - 1.0, abs=0.02)
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
 
 
@@ -234,10 +235,65 @@ def test_a_horizontal_zero_is_named_and_put_right(trial, plain, axis):
     entry = outcome.posterior.calibration[f"plate left foot: zero {'xyz'[axis]}"]
     assert entry["value"] == pytest.approx(8.0, abs=3.0 * entry["sd"])
     assert entry["sd"] < 1.5
-    (warning,) = outcome.warnings
-    assert warning.startswith(f"plate left foot: zero {'xyz'[axis]}: +")
+    said = [*outcome.warnings, *outcome.corrections]
+    assert len(said) == 1
+    assert "offset of the horizontal force" in said[0]
     expected, found = (fit.foot_loads[0][10:-10, 1, axis] for fit in (plain, outcome))
     assert np.abs(found.mean() - expected.mean()) < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("disturb", "quantity"),
+    [
+        (lambda loads: loads[:, 0, 3:].__iadd__(np.cross([0.0, 0.0, 0.02], loads[:, 0, :3])), "plate right foot: z"),
+        (lambda loads: loads[:, 1].__imul__(1.05), "plate left foot: gain"),
+        (lambda loads: loads.__setitem__(slice(None), np.roll(loads, 2, axis=0)), "clock: forces late by"),
+    ],
+    ids=["20 mm", "5 %", "20 ms"],
+)
+def test_instruments_that_are_really_off_are_accused(trial, disturb, quantity):
+    """By a warning that says to check them, and by no other; sound ones are not even corrected."""
+    outcome = fitted(trial, disturb=lambda positions, loads: disturb(loads))
+    calibration = outcome.posterior.calibration
+    assert accuses(calibration[quantity])
+    assert calibration[quantity]["moved"] > 1.0
+    assert [name for name, entry in calibration.items() if "moved" in entry and accuses(entry)] == [quantity]
+    assert sum("error bars. Check" in warning for warning in outcome.warnings) == 1
+
+
+def test_of_plates_along_the_way_one_is_accused_if_not_which(trial):
+    """A short walk knows that one is off, not which: the error is shared out."""
+
+    def shift(positions, loads):
+        loads[:, 0, 3:] += np.cross([0.02, 0.0, 0.0], loads[:, 0, :3])
+
+    (said,) = [w for w in fitted(trial, disturb=shift).warnings if "plate" in w]
+    assert said.startswith("one of the plates is displaced fore-aft, by about ")
+    assert int(said.split("about ")[1].split(" mm")[0]) == pytest.approx(20, abs=4)
+
+
+@pytest.mark.slow
+def test_a_plate_that_is_off_in_one_trial_of_three_is_not_accused(trial):
+    """It has not moved in the meantime: what one says and the others contradict is apparent."""
+
+    def fit_of(*shifts_m):
+        kinematics = []
+        for seed, shift_m in enumerate(shifts_m, start=100):
+            loads = trial.foot_loads.copy()
+            loads[:, 0, 3:] += np.cross([0.0, 0.0, shift_m], loads[:, 0, :3])
+            markers = camera_noise(trial.markers, 0.002, np.random.default_rng(seed))
+            one = kinematics_of(trial, markers, loads)
+            kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
+        with threadpool_limits(1, user_api="blas"):
+            fit = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
+        return fit.posterior.calibration["plate right foot: z"]
+
+    together, apart = fit_of(0.03, 0.03, 0.03), fit_of(0.09, 0.0, 0.0)
+    assert together["contradicted_by"] == ""
+    assert accuses(together)
+    assert apart["contradicted_by"] == "another trial"
+    assert not accuses(apart)
 
 
 def test_zeros_of_a_plate_that_two_trials_share_are_each_trial_s_own(trial):
@@ -268,7 +324,7 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
     outcome = fitted(trial, disturb=crosstalk)
     entry = outcome.posterior.calibration["plate left foot: free moment"]
     assert entry["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
-    assert any(w.startswith("plate left foot: free moment: -") and "N m/kN" in w for w in outcome.warnings)
+    assert any(w.startswith("Plate left foot: vertical-moment error, corrected by -") for w in outcome.warnings)
 
 
 def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain):
@@ -288,7 +344,7 @@ def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain)
     entry = outcome.posterior.calibration["plates: turned about the vertical by"]
     assert np.degrees(entry["value"]) == pytest.approx(3.0, abs=0.8)
     assert abs(entry["value"] - np.radians(3.0)) < 3.0 * entry["sd"]
-    assert outcome.warnings[0].startswith("plates: turned about the vertical by: +")
+    assert outcome.warnings[0].startswith("Plates: turned about the vertical by +")
     assert len(outcome.warnings) == 1
     sound = plain.posterior.calibration["plates: turned about the vertical by"]
     assert abs(sound["value"]) < sound["prior_sd"]
@@ -322,7 +378,7 @@ def test_forces_of_one_of_two_trials_are_late(trial):
         assert fit.result.clock_s[0] == pytest.approx(0.0, abs=0.0005)
     assert sound.warnings == ()
     (warning,) = late.warnings
-    assert "forces later than in the other trials by: +" in warning
+    assert "lag the markers more than in the other trials by +" in warning
     # and others of the session are told of the clock, which is on time
     ours, theirs = (fit.result.instruments for fit in (sound, late))
     assert ours.information.shape == theirs.information.shape == (12, 12)

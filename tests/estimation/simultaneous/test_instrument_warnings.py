@@ -1,7 +1,11 @@
 import pytest
 
 from kinertia.estimation.mirrored_free_moments import mirrored_free_moments_warning
-from kinertia.estimation.simultaneous.instrument_warnings import instrument_warnings
+from kinertia.estimation.simultaneous.instrument_warnings import (
+    accuses,
+    instrument_corrections,
+    instrument_warnings,
+)
 
 
 def calibration(*free_nm_kn, gain=0.0):
@@ -22,13 +26,13 @@ def test_mirror_images_are_the_body_s(values):
 def test_one_plate_or_one_side_is_the_plates(values):
     sentences = instrument_warnings(calibration(*values))
     assert sentences
-    assert all("check the instruments" in sentence for sentence in sentences)
+    assert all("vertical-moment error, corrected by" in sentence for sentence in sentences)
     assert not mirrored_free_moments_warning(calibration(*values))
 
 
 def test_all_else_that_is_off_is_still_said():
     (plate,) = instrument_warnings(calibration(5.0, -5.0, gain=0.05))
-    assert plate == "plate 1: gain: +5.0 % (expected within 0.7 %); check the instruments"
+    assert plate.startswith("Plate 1: gain error, corrected by +5.0 % (usual: within 0.7)")
     assert mirrored_free_moments_warning(calibration(5.0, -5.0, gain=0.05))
 
 
@@ -52,9 +56,38 @@ def test_zeros_that_all_plates_have_alike_are_rather_a_force_that_none_measures(
 @pytest.mark.parametrize("other", [23.0, -9.0, -3.0])
 def test_zeros_of_plates_that_differ_are_theirs(other):
     said = instrument_warnings(zeros(left=-22.0, right=other))
-    assert said[0] == "plate left: zero x: -22.0 N (expected within 2.4 N); check the instruments"
+    assert said[0].startswith(
+        "Plate left: offset of the horizontal force along x by -22.0 N (usual: within 2.4), corrected"
+    )
     assert not any("all plates" in one for one in said)
 
 
 def test_the_zero_of_a_single_plate_is_its_own():
-    assert "plate left: zero x: -22.0 N" in instrument_warnings(zeros(left=-22.0))[0]
+    assert "Plate left: offset of the horizontal force along x" in instrument_warnings(zeros(left=-22.0))[0]
+
+
+PLACE = {"value": 0.02, "prior_sd": 0.0036, "sd": 0.002, "unit": "m", "moved": 3.0, "contradicted_by": ""}
+
+
+@pytest.mark.parametrize(
+    "unsupported",
+    [{"value": 0.007}, {"sd": 0.011}, {"moved": 0.9}, {"contradicted_by": "another trial"}],
+)
+def test_an_accusation_needs_support(unsupported):
+    assert accuses(PLACE)
+    assert not accuses({**PLACE, **unsupported})
+
+
+def test_what_is_not_supported_is_a_correction():
+    for changed in ({}, {"moved": 0.5}, {"sd": 0.011}, {"contradicted_by": "another trial"}):
+        entries = {"plate 1: x": {**PLACE, **changed}, "plate 2: x": {**PLACE, "value": 0.001}}
+        warned, corrected = instrument_warnings(entries), instrument_corrections(entries)
+        assert (len(warned), len(corrected)) == ((0, 1) if changed else (1, 0))
+        assert all("+20.0 mm (usual: within 3.6)" in sentence for sentence in (*warned, *corrected))
+    assert corrected[0].endswith("another trial says otherwise")
+
+
+def test_directions_are_the_person_s():
+    named = {"x": "fore-aft", "z": "mediolaterally"}
+    assert instrument_warnings({"plate 1: x": PLACE}, named)[0].startswith("Plate 1: displaced fore-aft, ")
+    assert instrument_warnings({"plate 1: z": PLACE}, named)[0].startswith("Plate 1: displaced mediolaterally, ")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty, log_chance
 
 PLATE = SoundOrFaulty(0.001, 0.015, 0.1)
 
@@ -151,3 +151,27 @@ def test_drawn_instruments_have_the_prior_s_deviation():
     drawn = np.array([PLATE.draw(rng) for _ in range(20000)])
     assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(PLATE.sd, rel=0.05)
     assert np.mean(np.abs(drawn) < 0.003) == pytest.approx(0.9 + 0.1 * 0.16, abs=0.01)
+
+
+def test_chance_of_data_is_their_mean_under_the_priors():
+    """Of two errors that are added to a common one, against sums over a fine grid."""
+    own, both = SoundOrFaulty(0.3, 2.0, 0.2), SoundOrFaulty(0.5, 1.5, 0.1)
+    priors = ErrorPriors((own, own), ((both, (0, 1)),))
+    data = np.array([[2.0, 0.5], [0.5, 1.0]])
+    grid = np.linspace(-9.0, 9.0, 181)
+
+    def density(prior):
+        parts = ((1.0 - prior.faulty_share, prior.sound_sd), (prior.faulty_share, prior.faulty_sd))
+        return sum(share / sd * np.exp(-0.5 * (grid / sd) ** 2) for share, sd in parts)
+
+    a, b, c = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
+    x, y = a + c, b + c
+    each = density(own)[:, None, None] * density(own)[None, :, None] * density(both)[None, None, :]
+
+    def summed(right):
+        square = data[0, 0] * x**2 + 2 * data[0, 1] * x * y + data[1, 1] * y**2
+        return np.log((each * np.exp(right[0] * x + right[1] * y - 0.5 * square)).sum())
+
+    rights = [np.array([3.0, -1.0]), np.array([0.2, 0.1])]
+    found = [log_chance(priors, data, right) for right in rights]
+    assert found[0] - found[1] == pytest.approx(summed(rights[0]) - summed(rights[1]), abs=0.02)

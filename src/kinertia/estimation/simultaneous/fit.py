@@ -11,15 +11,21 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.instrument_warnings import CLOCK_OF, instrument_warnings
+from kinertia.estimation.simultaneous.instrument_warnings import (
+    CLOCK_OF,
+    GAIN_IN,
+    instrument_corrections,
+    instrument_warnings,
+)
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
-from kinertia.estimation.simultaneous.observation import Observations, observe
+from kinertia.estimation.simultaneous.observation import Observations, observe, reading
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.supported import directions, with_support
 from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
@@ -50,7 +56,8 @@ class Posterior:
     Attributes:
         prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
         covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
-        calibration: per quantity its value, prior and posterior deviation, and unit.
+        calibration: per quantity its value, prior and posterior deviation, and unit; of instruments what supports an
+            accusation (`instrument_warnings.Entry`).
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
         base: which combinations of parameters these motions show, and which none ever shows.
@@ -95,7 +102,7 @@ class SimultaneousFit:
         courses: per trial, (f, c) coordinates of all frames from the first to the last of these: markers show the
             motion between measured stretches, too.
         foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
-        warnings: one sentence each.
+        warnings, corrections: one sentence each.
     """
 
     result: SimultaneousResult
@@ -107,6 +114,7 @@ class SimultaneousFit:
     courses: tuple[np.ndarray, ...]
     foot_loads: tuple[np.ndarray, ...]
     warnings: tuple[str, ...]
+    corrections: tuple[str, ...] = ()
 
 
 @one_blas_thread
@@ -117,6 +125,7 @@ def fit_simultaneous(
     bandwidths: Sequence[Bandwidth] | None = None,
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
     progress: Callable[[float], None] = lambda share: None,
+    otherwise: Sequence[Kinematics] = (),
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -127,12 +136,16 @@ def fit_simultaneous(
         bandwidths: per trial, of motion and forces; found from the trials if None.
         uncertainty: what may move beside these segments.
         progress: told the share of the estimate that is done, roughly.
+        otherwise: the same trials with other ground reactions, of which it is asked how likely they are beside
+            (`SimultaneousResult.evidence`).
     """
     used = used_skeleton(skeleton, trials, uncertainty)
-    seen = observed(used, prior, trials, bandwidths or Bandwidth.of(trials), uncertainty)
+    bandwidths = bandwidths or Bandwidth.of(trials)
+    seen = observed(used, prior, trials, bandwidths, uncertainty)
     together = seen.together
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-    result = estimate_simultaneous(used, prior, calibration, together, progress)
+    others = [reading(*each) for each in zip(together, otherwise, bandwidths, strict=True)] if otherwise else []
+    result = estimate_simultaneous(used, prior, calibration, together, progress, others)
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:
@@ -146,7 +159,11 @@ def fit_simultaneous(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, uncertainty, result, [each.trial.name for each in trials], prior.mass_kg),
+        with_support(
+            _calibration(used, uncertainty, result, [each.trial.name for each in trials], prior.mass_kg),
+            result,
+            uncertainty.instruments,
+        ),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -168,6 +185,7 @@ def fit_simultaneous(
         courses,
         loads,
         tuple(_warnings(prior, uncertainty, result, posterior, trials)),
+        tuple(instrument_corrections(posterior.calibration, directions([each.turned_deg for each in trials]))),
     )
 
 
@@ -238,7 +256,7 @@ def _calibration(
                 calibration[f"{name}: {unknown}"] = _entry(value, known.zero_n.sd, sd, unit)
     for trial, gains in zip(trials, result.gains, strict=True):
         for plate, (gain, sd) in gains.items():
-            calibration[f"{_plate(plate)}: gain in {trial}"] = _entry(gain, known.trial_gain.sd, sd, "1")
+            calibration[f"{_plate(plate)}: {GAIN_IN}{trial}"] = _entry(gain, known.trial_gain.sd, sd, "1")
     for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False):
         calibration[f"{BENDING_IN}{trial}"] = _entry(kappa, mass_kg * BENDING_PRIOR_M.sd, sd, "kg m")
     return calibration
@@ -264,8 +282,9 @@ def _warnings(
         warnings.append(
             f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
         )
-    warnings += instrument_warnings(posterior.calibration)
-    warnings += which_plate_warnings(posterior.calibration, result.instruments, uncertainty.instruments)
+    along = directions([each.turned_deg for each in trials])
+    warnings += instrument_warnings(posterior.calibration, along)
+    warnings += which_plate_warnings(posterior.calibration, result.instruments, uncertainty.instruments, along)
     for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
         if noise.wandering:
             listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)

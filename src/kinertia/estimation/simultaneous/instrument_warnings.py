@@ -1,19 +1,32 @@
-"""What a fit says of plates and clock that are off: one sentence each."""
+"""What a fit says of plates and clock that are off: warnings of those to check, and corrections that were applied.
+
+An instrument is accused where its error is beyond two prior and two posterior deviations, moves a joint moment beyond
+that moment's own error bar, and is contradicted by nobody (`instrument_support`). Any other error beyond two prior
+deviations may as well be the model's: it is corrected and called apparent.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.plates import ZERO_UNKNOWNS
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
+
+Entry = Mapping[str, float | str]
+"""What is calibrated: value, prior_sd, sd, unit; of instruments moved (by how many halves of its own 95 % interval the
+error, put back, moves the joint moment that it moves most) and contradicted_by ("" by nobody)."""
 
 _NOTABLE = 2.0
 GAIN = "gain"
+GAIN_IN = "gain in "
+"""Before the name of a trial, what a plate's gain is in it besides that in all."""
 FREE_MOMENT = "free moment"
 """What a plate adds to the vertical moment, among what is calibrated."""
 CLOCK_OF = "clock of "
 """Before the name of a trial, what it has of its own besides the clock of all."""
+ALONG: Mapping[str, str] = {"x": "along x", "z": "along z"}
+"""How the axes of the plates are called where people do not all walk along one of them."""
 _FEWEST_PLATES = 2
 """With the same gain or zero, for it to be called that of all: of a single plate it is as likely its own."""
 _ONE_SIDED = 0.5
@@ -31,28 +44,97 @@ SHOWN_UNIT = {
 """Factor and unit in which people read a calibrated quantity."""
 
 
-def instrument_warnings(calibration: Mapping[str, Mapping[str, float | str]]) -> list[str]:
-    """One sentence per plate, and one for the clock, with all that is off.
+def instrument_warnings(calibration: Mapping[str, Entry], along: Mapping[str, str] = ALONG) -> list[str]:
+    """A warning for each error that accuses an instrument.
 
     Free moments that are mirror images and a gain that all plates have alike are not the plates': others say them.
     Zeros that all have alike come first.
 
     >>> entry = {"value": 0.012, "prior_sd": 0.003, "sd": 0.002, "unit": "m"}
     >>> instrument_warnings({"plate 1: x": entry})
-    ['plate 1: x: +12.0 mm (expected within 3 mm); check the instruments']
+    ['Plate 1: displaced along x, corrected by +12.0 mm (usual: within 3). Check where the plate stands']
     """
-    off: dict[str, list[str]] = {}
-    zeros = {what: common(calibration, what) for what in ZERO_UNKNOWNS}
-    elsewhere = {FREE_MOMENT: mirrored_free_moments(calibration), GAIN: common(calibration, GAIN), **zeros}
+    zeros = [(what, common(calibration, what)) for what in ZERO_UNKNOWNS]
+    shared = [_common_zero(what, list(values.values())) for what, values in zeros if values]
+    accused = [_Error(name, entry, along) for name, entry in _own(calibration) if accuses(entry)]
+    return [*shared, *(error.warning for error in accused)]
+
+
+def instrument_corrections(calibration: Mapping[str, Entry], along: Mapping[str, str] = ALONG) -> list[str]:
+    """A sentence for each error beyond the usual that accuses nothing.
+
+    >>> entry = {"value": 0.0071, "prior_sd": 0.0023, "sd": 0.001, "unit": "s", "moved": 0.4}
+    >>> instrument_corrections({"clock: forces late by": entry})
+    ['Clock: forces apparently lag the markers by +7.1 ms (usual: within 2.3), corrected']
+    """
+    return [
+        _Error(name, entry, along).correction
+        for name, entry in _own(calibration)
+        if notable(entry) and not accuses(entry)
+    ]
+
+
+def _own(calibration: Mapping[str, Entry]) -> Iterator[tuple[str, Entry]]:
+    """Entries of instruments, without what several plates have alike."""
+    elsewhere: dict[str, dict[str, float]] = {what: common(calibration, what) for what in (GAIN, *ZERO_UNKNOWNS)}
+    elsewhere[FREE_MOMENT] = mirrored_free_moments(calibration)
     for name, entry in calibration.items():
-        instrument, colon, what = name.partition(":")
-        if colon and notable(entry) and not elsewhere.get(what.strip()):
-            scale, unit = SHOWN_UNIT[str(entry["unit"])]
-            value, sd = float(entry["value"]), float(entry["prior_sd"])
-            said = f"{what}: {value * scale:+.1f} {unit} (expected within {sd * scale:.2g} {unit})"
-            off.setdefault(instrument, []).append(said)
-    shared = [_common_zero(what, list(values.values())) for what, values in zeros.items() if values]
-    return [*shared, *(f"{instrument}:{','.join(said)}; check the instruments" for instrument, said in off.items())]
+        _, colon, what = name.partition(": ")
+        if colon and not elsewhere.get(what):
+            yield name, entry
+
+
+class _Error:
+    """An error of an instrument in words."""
+
+    def __init__(self, name: str, entry: Entry, along: Mapping[str, str]) -> None:
+        instrument, _, what = name.partition(": ")
+        factor, unit = SHOWN_UNIT[str(entry["unit"])]
+        usual = f"{factor * float(entry['prior_sd']):.2g}"
+        self._who = instrument[0].upper() + instrument[1:]
+        size = f"by {factor * float(entry['value']):+.1f} {unit} (usual: within {usual})"
+        # of a plate's own the value is what puts it right, of all else the error
+        self._size = (
+            f", corrected {size}" if what in PLATE_UNKNOWNS or what.startswith(GAIN_IN) else f" {size}, corrected"
+        )
+        self._certain, self._apparent, self._check = _words(what, along)
+        self._moved = float(entry.get("moved", 0.0))
+        self._contradicted = str(entry.get("contradicted_by", ""))
+
+    @property
+    def warning(self) -> str:
+        """What is off, what it would do, and one thing to do."""
+        effect = f". Left in, it moves joint moments by up to {self._moved:.1f} error bars" if self._moved else ""
+        return f"{self._who}: {self._certain}{self._size}{effect}. {self._check}"
+
+    @property
+    def correction(self) -> str:
+        """What was corrected, and who contradicts it."""
+        beside = f"; {self._contradicted} says otherwise" if self._contradicted else ""
+        return f"{self._who}: {self._apparent}{self._size}{beside}"
+
+
+def _words(what: str, along: Mapping[str, str]) -> tuple[str, str, str]:
+    """What an error is called where it is certain and where it is apparent, and what to check."""
+    if what in along:
+        where = f"displaced {along[what]}"
+        return where, f"apparently {where}", "Check where the plate stands"
+    if what in ZERO_UNKNOWNS:
+        offset = f"offset of the horizontal force {along[what.removeprefix('zero ')]}"
+        return offset, f"apparent {offset}", "Check that the plate is zeroed before every trial"
+    if what.startswith(GAIN_IN):
+        error = f"gain error in {what.removeprefix(GAIN_IN)} only"
+        return error, f"apparent {error}", "Check that the plate is zeroed before every trial"
+    if what == GAIN:
+        return "gain error", "apparent gain error", "Check the plate with a known weight"
+    if what == FREE_MOMENT:
+        error = "vertical-moment error"
+        return error, f"apparent {error}", "Check zero and calibration of the plate's vertical moment"
+    if what.startswith("turned"):
+        turned = "turned about the vertical"
+        return turned, f"apparently {turned}", "Check the axes of plates and cameras"
+    lag = "lag the markers more than in the other trials" if "in the other trials" in what else "lag the markers"
+    return f"forces {lag}", f"forces apparently {lag}", "Check the camera-analogue synchronisation"
 
 
 def _common_zero(what: str, values_n: list[float]) -> str:
@@ -67,7 +149,7 @@ def _common_zero(what: str, values_n: list[float]) -> str:
     )
 
 
-def mirrored_free_moments(calibration: Mapping[str, Mapping[str, float | str]]) -> dict[str, float]:
+def mirrored_free_moments(calibration: Mapping[str, Entry]) -> dict[str, float]:
     """What the plates' free moments lack, N m/N, if it is notable and goes to both sides alike; else nothing."""
     entries = {name.partition(":")[0]: e for name, e in calibration.items() if name.endswith(f": {FREE_MOMENT}")}
     lacking = {plate: float(entry["value"]) for plate, entry in entries.items()}
@@ -78,7 +160,7 @@ def mirrored_free_moments(calibration: Mapping[str, Mapping[str, float | str]]) 
     return lacking if alike else {}
 
 
-def common(calibration: Mapping[str, Mapping[str, float | str]], what: str) -> dict[str, float]:
+def common(calibration: Mapping[str, Entry], what: str) -> dict[str, float]:
     """Every plate's gain, or zero, if all are notably off to the same side and differ no more than plates do; else
     nothing.
     """
@@ -91,6 +173,13 @@ def common(calibration: Mapping[str, Mapping[str, float | str]], what: str) -> d
     return values if lowest * highest > 0.0 and highest - lowest <= usual else {}
 
 
-def notable(entry: Mapping[str, float | str]) -> bool:
+def notable(entry: Entry) -> bool:
     """Whether what a fit found is more than an instrument is usually off."""
     return abs(float(entry["value"])) > _NOTABLE * float(entry["prior_sd"])
+
+
+def accuses(entry: Entry) -> bool:
+    """Whether it is also certain, matters, and is contradicted by nobody."""
+    certain = abs(float(entry["value"])) > _NOTABLE * float(entry["sd"])
+    matters = float(entry.get("moved", np.inf)) > 1.0
+    return notable(entry) and certain and matters and not entry.get("contradicted_by")

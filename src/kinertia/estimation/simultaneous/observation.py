@@ -231,6 +231,12 @@ def _observed(
     )
 
 
+def reading(observation: Observation, kinematics: Kinematics, bandwidth: Bandwidth) -> Observation:
+    """The same frames and markers with the ground reactions of these kinematics, which differ in nothing else."""
+    ground = _ground(kinematics, observation.time, bandwidth.motion_hz, bandwidth.force)
+    return replace(observation, ground=ground)
+
+
 def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cutoff: ForceCutoff) -> FootPlates:
     loads = kinematics.trial.loads
     turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()

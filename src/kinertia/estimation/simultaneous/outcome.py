@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.evidence import Evidence
+from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.problem import MapProblem
@@ -47,6 +49,8 @@ class SimultaneousResult:
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
+        support: what supports an accusation of each instrument.
+        evidence: how likely the trials are, and the same read otherwise.
     """
 
     bsp: BodySegmentParameters
@@ -68,6 +72,8 @@ class SimultaneousResult:
     converged: bool
     iterations: int
     cost: tuple[float, float]
+    support: InstrumentSupport
+    evidence: Evidence
 
 
 class Ended(NamedTuple):
@@ -89,6 +95,8 @@ def result_of(
     motions: Sequence[np.ndarray],
     covariance: np.ndarray,
     of_curves: tuple[CurveDeviations, ...],
+    support: InstrumentSupport,
+    evidence: Evidence,
 ) -> SimultaneousResult:
     """In the user's terms, with these motions, covariance (S, S) of all that does not move, and curves' deviations."""
     point, layout = ended.point, problem.layout
@@ -128,6 +136,8 @@ def result_of(
         ended.converged,
         ended.iterations,
         ended.cost,
+        support,
+        evidence,
     )
 
 

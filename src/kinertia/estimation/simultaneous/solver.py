@@ -28,7 +28,9 @@ import numpy as np
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.clock_profile import ClockProfile
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
+from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
+from kinertia.estimation.simultaneous.instrument_support import instrument_support
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
@@ -88,9 +90,11 @@ def estimate_simultaneous(
     calibration: CalibrationPrior,
     trials: Sequence[Observation],
     progress: Callable[[float], None] = lambda share: None,
+    otherwise: Sequence[Observation] = (),
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials; `progress` is told the
-    share done, guessed from the usual number of steps.
+    share done, guessed from the usual number of steps. `otherwise` are the same trials with other ground reactions, to
+    be told how likely these would be.
     """
     problem = MapProblem(skeleton, prior, calibration, trials)
     ended = _searched(problem, progress)
@@ -100,13 +104,16 @@ def estimate_simultaneous(
     static = phases.static + clock.static - ended.point.static
     point = followed(problem, clock.here, ended.point, static)
     ended = ended._replace(here=clock.here, instruments=clock.instruments, point=point)
-    covariance, of_curves = _deviations(problem, ended)
+    model = GaussNewton.of(problem, ended.here).under(ended.instruments)
+    covariance, of_curves = _deviations(problem, ended, model)
     covariance = covariance + phases.covariance
     theta = problem.layout.theta
     covariance[theta, theta] += task_covariance(problem.segments, problem.bsp(static).mass_kg)
     of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
     motions = _through_impacts(problem, ended.point)
-    return result_of(problem, ended, motions, covariance, of_curves)
+    support = instrument_support(model, ended.point, ended.instruments, of_curves)
+    evidence = Evidence.of(model, ended.instruments, otherwise)
+    return result_of(problem, ended, motions, covariance, of_curves, support, evidence)
 
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
@@ -295,10 +302,11 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     return at.slope.point.coefficients
 
 
-def _deviations(problem: MapProblem, ended: Ended) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
+def _deviations(
+    problem: MapProblem, ended: Ended, model: GaussNewton
+) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
     """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
     here, point, layout = ended.here, ended.point, problem.layout
-    model = GaussNewton.of(problem, here).under(ended.instruments)
     root, first = model.static.root_of_covariance(), layout.in_root.stop
     of_curves = []
     for k, (motion, trial) in enumerate(zip(point.coefficients, here.trials, strict=True)):

@@ -171,6 +171,21 @@ def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndar
     return middle, second / weight - np.outer(middle, middle)
 
 
+def log_chance(priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> float:
+    """Logarithm of the mean, under these priors, of the chance exp(right x - x data x / 2) that data with this
+    information (k, k) and right-hand side (k,) give the errors x; but for a constant that the priors alone have.
+    """
+    parts = priors.of_parts
+    data, right = parts.T @ data @ parts, parts.T @ right
+    change, log_odds = _faults(priors.parts)
+    ways = _Ways.sound(priors.parts, data, right)
+    weights = [ways.log_weight]
+    while len(ways.log_weight) and ways.log_weight.max() > max(map(np.max, weights)) + _UNLIKELY:
+        ways = ways.one_fault_more(change, log_odds)
+        weights += [ways.log_weight] if len(ways.log_weight) else []
+    return float(np.logaddexp.reduce(np.concatenate(weights)))
+
+
 def _faults(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
     """(k,) what a fault of each quantity adds to its precision, and to the logarithm of a way's prior chance, with what
     the components' deviations take; no chance where there is only one component.

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instrument_warnings import notable
+from kinertia.estimation.simultaneous.instrument_warnings import ALONG, Entry, notable
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 
@@ -22,10 +22,16 @@ _FIXED_M = 1e-6
 """Plates and floor that are off alike are the same: the floor stays."""
 _HARDLY_M = 0.004
 _BETTER = 0.7
+_CERTAIN = 2.0
+"""Deviations by which plates must differ."""
+_AT_ITS_PLACE: Entry = {"value": 0.0, "prior_sd": 1.0}
 
 
 def which_plate_warnings(
-    calibration: Mapping[str, Mapping[str, float | str]], shown: InstrumentInformation, prior: InstrumentPrior
+    calibration: Mapping[str, Entry],
+    shown: InstrumentInformation,
+    prior: InstrumentPrior,
+    along: Mapping[str, str] = ALONG,
 ) -> list[str]:
     """One sentence for each direction in which a plate is found off, and another may be as well.
 
@@ -33,20 +39,26 @@ def which_plate_warnings(
         calibration: what a fit found.
         shown: what its trials say of plates and clock, without any prior.
         prior: what was known of them before.
+        along: how their axes are called.
     """
     sentences = []
     for axis in _PLACES:
-        off = [entry for name, entry in calibration.items() if name.startswith("plate ") and name.endswith(f": {axis}")]
-        checked = prior.plate[axis].faulty_share == 0.0
-        if checked or not any(map(notable, off)):
+        places = {
+            plate: calibration.get(f"plate {plate.removeprefix('plate ')}: {axis}", _AT_ITS_PLACE)
+            for plate in shown.plates
+        }
+        off = [one for one in places.values() if notable(one) and not one.get("contradicted_by")]
+        if prior.plate[axis].faulty_share == 0.0 or not off:
             continue
         apart_m, each_m = _deviations(shown, prior, axis)
-        if each_m > _HARDLY_M and apart_m < _BETTER * each_m:
+        values = [float(one["value"]) for one in places.values()]
+        differ_m = max(values) - min(values)
+        if each_m > _HARDLY_M and apart_m < _BETTER * each_m and differ_m > _CERTAIN * 2.0 * apart_m:
             sentences.append(
-                f"which of the plates is off along {axis} these trials hardly tell: they know to "
-                f"{1e3 * apart_m:.1f} mm that plates differ, and to {1e3 * each_m:.1f} mm only where all of them "
-                "stand; a walk in the other direction, fitted with these, tells, or a check of the plates' places "
-                "([instruments] plate_sd_mm), and whether horizontal zeros of several plates are off instead"
+                f"one of the plates is displaced {along[axis]}, by about {1e3 * differ_m:.0f} mm against the others, "
+                f"but these trials cannot show which (they know to {1e3 * apart_m:.1f} mm that plates differ, and to "
+                f"{1e3 * each_m:.1f} mm where all stand); add a walk in the opposite direction, or check the plates' "
+                "places ([instruments] plate_sd_mm)"
             )
     return sentences
 

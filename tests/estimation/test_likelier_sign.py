@@ -1,0 +1,153 @@
+"""Which sign of the free moments the whole estimate finds likelier, on synthetic walks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from command_line import fitted
+from kinertia.estimation.free_moment_sign import FreeMomentSign, with_likelier_sign
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.evidence import Evidence
+from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics
+from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.centre_of_pressure import free_moment
+from synthetic_walks import kinematics_of
+
+
+@dataclass(frozen=True)
+class Person:
+    """What `with_likelier_sign` needs of a prepared one."""
+
+    skeleton: Skeleton
+    literature: BodySegmentParameters
+    kinematics: tuple[Kinematics, ...]
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return walk(walking_subject(), 0.9, trapezoid=False)
+
+
+def person(trial, *factors, offset=0.0, noise_m=0.003):
+    """With one walk for each factor: free moments times it, and an offset of the left plate's in N m/N."""
+    kinematics = []
+    for seed, factor in enumerate(factors, start=100):
+        loads = trial.foot_loads.copy()
+        carried = loads[..., 1] > 20.0
+        loads[..., 4] += np.where(carried, (factor - 1.0) * free_moment(loads), 0.0)
+        loads[:, 1, 4] += offset * loads[:, 1, 1]
+        markers = camera_noise(trial.markers, noise_m, np.random.default_rng(seed))
+        one = kinematics_of(trial, markers, loads)
+        kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
+    return Person(trial.skeleton, walking_subject().literature, tuple(kinematics))
+
+
+def signed(ready):
+    """The outcome, and how many estimates it took."""
+    fits = []
+
+    def fit(one: Person, otherwise: Sequence[Kinematics]):
+        fits.append(one)
+        prior = literature_prior(one.literature)
+        return fit_simultaneous(one.skeleton, prior, one.kinematics, otherwise=otherwise)
+
+    with threadpool_limits(1, user_api="blas"):
+        return with_likelier_sign(ready, fit), len(fits)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.006, -0.006])
+def test_a_right_sign_stays_and_takes_one_estimate(trial, offset):
+    ready = person(trial, 1.0, offset=offset)
+    outcome, fits = signed(ready)
+    assert fits == 1
+    assert outcome.ready is ready
+    assert outcome.sign is None or not (outcome.sign.wrong or outcome.sign.open)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.006, -0.006])
+def test_a_wrong_sign_is_turned(trial, offset):
+    ready = person(trial, -1.0, offset=offset)
+    outcome, fits = signed(ready)
+    assert fits == 2
+    assert outcome.sign.wrong
+    assert outcome.sign.correction
+    assert not outcome.sign.note
+    (given,), (used,) = ready.kinematics, outcome.ready.kinematics
+    free, turned = (free_moment(k.trial.loads.wrench) for k in (given, used))
+    carried = given.trial.loads.force[..., 1] >= 20.0
+    np.testing.assert_allclose(turned[carried], -free[carried], atol=1e-9)
+    np.testing.assert_array_equal(used.trial.loads.force, given.trial.loads.force)
+    entry = outcome.fitted.posterior.calibration["plate left foot: free moment"]
+    assert entry["value"] == pytest.approx(offset, abs=0.002)
+
+
+def test_trials_say_it_together(trial):
+    alone, together = signed(person(trial, -1.0))[0].sign, signed(person(trial, -1.0, -1.0))[0].sign
+    assert together.wrong
+    assert together.log_odds > alone.log_odds
+
+
+@pytest.mark.parametrize("factor", [0.0, -0.02])
+def test_without_free_moments_nothing_is_asked(trial, factor):
+    outcome, fits = signed(person(trial, factor))
+    assert fits == 1
+    assert outcome.sign is None
+
+
+@pytest.mark.parametrize("found", [1.0, -1.0])
+def test_trials_that_cannot_tell_leave_it_open(trial, found):
+    """Estimates with hardly any difference between the signs, whatever was predicted."""
+    ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 30.0), Evidence(found, None)])
+    outcome = with_likelier_sign(ready, lambda *_: SimpleNamespace(result=SimpleNamespace(evidence=next(evidence))))
+    assert outcome.ready is ready
+    assert outcome.sign.log_odds == found
+    assert outcome.sign.note
+    assert not outcome.sign.correction
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "corrected"), [("walking1", True), ("walkingTO1", True), ("DJ1", False), ("static1", False)]
+)
+def test_files_whose_sign_is_wrong(measured_folder, tmp_path, name, corrected):
+    """All of one public data set, of which a jump and a person who stands show nothing."""
+    lab = measured_folder / "subject4"
+    files = {
+        "forces": f"{name}_grf.mot",
+        "loads": f"{name}_external_forces.xml",
+        "model": "addbiomechanics_scaled.osim",
+    }
+    options = [word for option, file in files.items() for word in (f"--{option}", lab / file)]
+    fit = fitted(tmp_path / "out", lab / f"{name}.trc", *options, "--calibrate", "--mass", "62.6").summary
+    said = [sentence for sentence in fit["corrections"] if "wrong sign" in sentence]
+    assert len(said) == int(corrected)
+    assert not any("wrong sign" in sentence for sentence in fit["warnings"])
+    free = [entry["value"] for key, entry in fit["calibration"].items() if key.endswith("free moment")]
+    assert np.abs(free).max() < 0.003
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["run200", "run300"])
+def test_files_whose_sign_is_right(measured_folder, tmp_path, name):
+    lab = measured_folder / "field" / "hamner_treadmill_run"
+    options = ["--forces", lab / f"{name}_grf.mot", "--model", lab / "final.osim", "--mass", "72.84", "--calibrate"]
+    fit = fitted(tmp_path / "out", lab / f"{name}.trc", *options).summary
+    assert not any("wrong sign" in sentence for sentence in fit["corrections"])
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "wrong", "left_open"),
+    [(59.0, True, False), (5.2, True, False), (1.0, False, True), (-20.0, False, False)],
+)
+def test_how_sure_one_must_be(log_odds, wrong, left_open):
+    sign = FreeMomentSign(log_odds, 2.0)
+    assert (sign.wrong, sign.open) == (wrong, left_open)
+    assert (bool(sign.correction), bool(sign.note)) == (wrong, left_open)
