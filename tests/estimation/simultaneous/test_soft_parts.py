@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.soft_parts import swing_factors
+from kinertia.estimation.simultaneous.soft_parts import SWING, swing_factors
 
 TIME = np.arange(200) / 100.0
 WEIGHT_N = 700.0
@@ -16,7 +16,7 @@ def test_who_stands_is_as_sure_as_before():
 def test_deviations_grow_with_the_force_that_accelerates_in_any_direction():
     force = np.tile([200.0, WEIGHT_N, -100.0], (200, 1))
     factors = swing_factors(TIME, force, np.ones(200, bool), WEIGHT_N, 3.5)
-    assert factors[100] == pytest.approx(np.sqrt(1.0 + (0.015 * np.hypot(200.0, 100.0) / 3.5) ** 2))
+    assert factors[100] == pytest.approx(np.sqrt(1.0 + (SWING * np.hypot(200.0, 100.0) / 3.5) ** 2))
 
 
 def test_frames_without_measured_contacts_say_nothing_of_the_body_s_acceleration():

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
@@ -88,7 +88,7 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
     every = sum(each.information for each in model.displaced)
     shared = slice(0, layout.laboratory.stop - layout.laboratory.start)
     # by chance one of twenty instruments, however many trials there are; of two, one contradicts the other
-    apart_sd = norm.isf(0.025 / (count if count > 2 else 1))
+    apart_sd = -ndtri(0.025 / (count if count > 2 else 1))
     for k, own in enumerate(model.displaced):
         alone = _posterior(prior + own.information, prior_right + rights[k], layout.in_root.stop, layout.instruments)
         rest = prior_right + sum(rights) - rights[k]

@@ -103,7 +103,9 @@ class _Error:
         self._who = instrument[0].upper() + instrument[1:]
         size = f"by {factor * float(entry['value']):+.1f} {unit} (usual: within {usual})"
         # of a plate's own the value is what puts it right, of all else the error
-        self._size = f", corrected {size}" if what in PLATE_UNKNOWNS else f" {size}, corrected"
+        self._size = (
+            f", corrected {size}" if what in PLATE_UNKNOWNS or what.startswith(GAIN_IN) else f" {size}, corrected"
+        )
         self._certain, self._apparent, self._check = _words(what, along)
         self._moved = float(entry.get("moved", 0.0))
         self._contradicted = str(entry.get("contradicted_by", ""))

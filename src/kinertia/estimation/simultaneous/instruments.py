@@ -44,7 +44,7 @@ ZERO_PRIOR_N = SoundOrFaulty(1.0, 10.0, FAULTY_SHARE)
 """Of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N; under people
 who stand still, two plates together read 2 N."""
 
-TRIAL_GAIN_PRIOR = SoundOrFaulty(0.001, 0.03, 0.2)
+TRIAL_GAIN_PRIOR = SoundOrFaulty(0.001, 0.03, 0.3)
 """Of a plate in one trial, besides that of all. One person weighed 60 kg standing and squatting, and 63.5 to 64 walking
 on the same plates of one session: two trials of seven are 4 % off the others."""
 

@@ -21,7 +21,7 @@ _ROUNDING = 1e-9
 class MotionBasis:
     """Uniform quintic B-splines over a trial's time, with knots no closer than every second frame.
 
-    The first knot is at the first frame, or a `phase` of a knot interval (0 to 1) before it.
+    The first knot is at the first frame, or a `phase` of a knot interval (0 to 1) before it; there are as many.
 
     Six splines are active at any time, and seven at a frame and the two after it.
 
@@ -34,8 +34,8 @@ class MotionBasis:
     def __init__(self, time: np.ndarray, spacing_s: float, phase: float = 0.0) -> None:
         intervals = (time[-1] - time[0]) / spacing_s * (1.0 - _ROUNDING)
         count = min(max(1, int(np.ceil(intervals))), (len(time) - 1) // 2)
-        step = (time[-1] - time[0]) / count
-        begin, count = time[0] - phase * step, count + (phase > 0.0)
+        step = (time[-1] - time[0]) / (count - phase)
+        begin = time[0] - phase * step
         knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
         self.first = np.minimum(((time - begin) / step + _ROUNDING).astype(int), count - 1)

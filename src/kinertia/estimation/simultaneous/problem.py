@@ -338,25 +338,31 @@ class MapProblem:
         loads = self.foot_loads(k, static, 0, frames)
         loaded = ground.loaded(trial.time[frames] + self.late_s(k, static))
         by_plates = ground.by_plate(loads, loaded, ground.carrier[frames], self.plates_in(k, static)).sum(axis=1)
-        return RootFrames(
+        result = RootFrames(
             skeleton,
             self.bsp(static),
             static[self.layout.theta],
             motion,
             loads.sum(axis=1),
             by_plates,
-            self.foot_loads(k, static, 1, frames).sum(axis=1),
+            self.foot_loads(k, static, 1, frames).sum(axis=1)[..., None],
             partial(self.add_by_ground, k),
             trial.root_sd(frames),
             frames,
             self.layout.in_root.stop,
             self.trunk.at(static, self.layout.trunks.start + k) if self.trunk else None,
         )
+        if self.trunk is None:
+            return result
+        return result.bent(BentTrunk(self.trunk, static[self.layout.trunks][k], self.layout.trunks.start + k))
 
-    def add_by_ground(self, k: int, by_static: np.ndarray, by_plates: np.ndarray, by_time: np.ndarray) -> None:
-        """`add_by_plates`, and those by the time by which the forces of trial k are late, (n, r)."""
+    def add_by_ground(self, k: int, by_static: np.ndarray, by_plates: np.ndarray, by_own: np.ndarray) -> None:
+        """`add_by_plates`, and those by what trial k has of its own (n, r, 1 or 2): the time by which its forces are
+        late, and how much the trunk bends.
+        """
         self.add_by_plates(k, by_static, by_plates)
-        by_static[:, :, self.layout.late(k)] += by_time[:, :, None]
+        by_static[:, :, self.layout.late(k)] += by_own[:, :, :1]
+        by_static[:, :, self.layout.trunks.start + k : self.layout.trunks.stop][..., :1] += by_own[:, :, 1:]
 
     def add_by_plates(self, k: int, by_static: np.ndarray, by_plates: np.ndarray) -> None:
         """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k to those by the static unknowns that

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,7 +40,8 @@ class RootFrames:
         theta: (10 b,) the unknowns that they are made from.
         motion: of all coordinates.
         wrench: (d, 6) sum of the ground reactions at the ground origin: N, N m.
-        by_plates, by_time: (d, 6, p, 7), (d, 6) its derivatives by what is wrong with plates, and by time.
+        by_plates, by_own: (d, 6, p, 7), (d, 6, 1 or 2) its derivatives by what is wrong with plates, and by time and by
+            how much a trunk bends.
         add_by_ground: adds such derivatives to those by static unknowns: `MapProblem.add_by_ground`.
         sd: (d, 6) deviations of the residuals.
         frames: (d,) indices.
@@ -54,7 +55,7 @@ class RootFrames:
     motion: Motion
     wrench: np.ndarray
     by_plates: np.ndarray
-    by_time: np.ndarray
+    by_own: np.ndarray
     add_by_ground: Callable[[np.ndarray, np.ndarray, np.ndarray], None]
     sd: np.ndarray
     frames: np.ndarray
@@ -89,8 +90,11 @@ class RootFrames:
         into.cost += cost
         into.static_right[: self.theta.size] -= np.einsum("bi,bij->bj", by_bodies, dynamic_jacobian(self.theta)).ravel()
         by_plates = np.einsum("nr,nrpe->pe", by_ground, self.by_plates)
-        self.add_by_ground(by_static, by_plates[None, None], np.vdot(by_ground, self.by_time).reshape(1, 1))
+        by_own = np.einsum("nr,nre->e", by_ground, self.by_own)
+        self.add_by_ground(by_static, by_plates[None, None], by_own[None, None])
         into.static_right[: self.static] += by_static[0, 0]
+        if self.trunk is not None:
+            into.static_right[self.trunk.place] -= by_bodies[self.trunk.trunk.row] @ self.trunk.trunk.parameters
 
     @property
     def _moving(self) -> _Moving:
