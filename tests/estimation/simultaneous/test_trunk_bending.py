@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.trunk_bending import BentTrunk, TrunkBending
+from kinertia.estimation.simultaneous.trunk_bending import TrunkBending
 from kinertia.model.bsp import BodySegmentParameters
 from small_problem import bending, point, small_problem
 
@@ -23,7 +23,7 @@ def test_what_stays_upright_is_not_carried_in_front_of_the_feet(problem):
 
 def test_kappa_takes_from_the_first_moment_of_the_trunk_only(problem):
     trunk, bsp = problem.trunk, problem.prior.mean
-    bent = BentTrunk(trunk, 0.5, 0).bent(bsp)
+    bent = trunk.bent(bsp, 0.5)
     before, after = (each.dynamic_parameters().reshape(-1, 10) for each in (bsp, bent))
     assert after[trunk.row, 2] == pytest.approx(before[trunk.row, 2] - 0.5)
     assert after[trunk.row, 0] == before[trunk.row, 0]

@@ -28,7 +28,7 @@ from kinertia.estimation.simultaneous.seen_markers import seen_markers
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import add_start
 from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches_of_trials
-from kinertia.estimation.simultaneous.trunk_bending import TrunkBending
+from kinertia.estimation.simultaneous.trunk_bending import BentTrunk, TrunkBending
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
 from kinertia.model.log_cholesky import (
     from_log_cholesky,
@@ -350,7 +350,6 @@ class MapProblem:
             trial.root_sd(frames),
             frames,
             self.layout.in_root.stop,
-            self.trunk.at(static, self.layout.trunks.start + k) if self.trunk else None,
         )
         if self.trunk is None:
             return result

@@ -46,7 +46,7 @@ class RootFrames:
         sd: (d, 6) deviations of the residuals.
         frames: (d,) indices.
         static: how many static unknowns they depend on.
-        trunk: how it bends; None if it is rigid.
+        trunk: that bends; None: all segments are rigid.
     """
 
     skeleton: Skeleton
@@ -62,16 +62,28 @@ class RootFrames:
     static: int
     trunk: BentTrunk | None = None
 
+    def bent(self, trunk: BentTrunk) -> RootFrames:
+        """The same with a trunk that bends."""
+        by_kappa = trunk.by_kappa(self.wrench)
+        return replace(
+            self,
+            bsp=trunk.bsp(self.bsp),
+            wrench=trunk.upright(self.wrench),
+            by_plates=trunk.upright(self.by_plates),
+            by_own=np.concatenate([trunk.upright(self.by_own), by_kappa[..., None]], axis=2),
+            trunk=trunk,
+        )
+
     def terms(self, columns: Columns) -> RootTerms:
         """Residuals and derivatives, each over its deviation; `columns` are `columns_of` the problem."""
-        by_static, wrench = np.zeros((len(self.frames), 6, self.static)), self.wrench
-        self.add_by_ground(by_static, self.by_plates, self.by_time)
-        if self.trunk:
-            wrench = self.trunk.upright(wrench, by_static)
+        by_static = np.zeros((len(self.frames), 6, self.static))
+        self.add_by_ground(by_static, self.by_plates, self.by_own)
         chain = dynamic_jacobian(self.theta)
-        left, (q, qd, qdd) = root_columns(*self._moving, wrench, chain, self.sd, columns, by_static)
-        if self.trunk:
-            self.trunk.add_by_parameters(by_static, self.theta)
+        left, (q, qd, qdd) = root_columns(*self._moving, self.wrench, chain, self.sd, columns, by_static)
+        if self.trunk is not None:
+            by_static[:, :, self.trunk.place] += by_static[:, :, self.trunk.unknowns] @ self.trunk.by_unknowns(
+                self.theta
+            )
         return RootTerms(self.frames, q, qd, qdd, by_static, left)
 
     def add_gradient(self, into: Gradient, columns: Columns, basis: MotionBasis, start: int) -> None:
@@ -79,16 +91,12 @@ class RootFrames:
         the gradient begins.
         """
         of_basis = basis.first[self.frames] - start, np.ascontiguousarray(basis.values[:, self.frames])
-        by_static, wrench = np.zeros((1, 1, self.static)), self.wrench
-        if self.trunk:
-            wrench = self.trunk.upright(wrench)
         cost, by_bodies, by_ground = add_root_gradient(
-            *self._moving, wrench, self.sd, columns, of_basis, into.right, into.static_right
+            *self._moving, self.wrench, self.sd, columns, of_basis, into.right, into.static_right
         )
-        if self.trunk:
-            by_ground = self.trunk.pulls(self.wrench, by_ground, by_bodies, by_static[0, 0])
         into.cost += cost
         into.static_right[: self.theta.size] -= np.einsum("bi,bij->bj", by_bodies, dynamic_jacobian(self.theta)).ravel()
+        by_static = np.zeros((1, 1, self.static))
         by_plates = np.einsum("nr,nrpe->pe", by_ground, self.by_plates)
         by_own = np.einsum("nr,nre->e", by_ground, self.by_own)
         self.add_by_ground(by_static, by_plates[None, None], by_own[None, None])
@@ -103,7 +111,7 @@ class RootFrames:
         return (
             skeleton.tree,
             skeleton.gravity_m_s2,
-            skeleton.bodies(self.trunk.bent(self.bsp) if self.trunk else self.bsp),
+            skeleton.bodies(self.bsp),
             axis_motion(skeleton, motion),
             skeleton.map.bends(motion.q, motion.qd, motion.qdd),
             (np.ascontiguousarray(skeleton.root.centre(motion.q)), skeleton.root.moves),

@@ -56,7 +56,7 @@ def _places(calibration: Mapping[str, Entry], result: SimultaneousResult) -> Ite
     first = clock + 1 + len(result.delays_s)
     yield from zip(zeros, range(first, first + len(zeros)), strict=True)
     gains = [name for name in rows if name.rpartition(": ")[2].startswith(GAIN_IN)]
-    yield from zip(gains, range(first + len(zeros), len(result.support.moved)), strict=False)
+    yield from zip(gains, range(first + len(zeros), first + len(zeros) + len(gains)), strict=True)
 
 
 def _same_column_says_otherwise(name: str, calibration: Mapping[str, Entry], result: SimultaneousResult) -> bool:

@@ -67,73 +67,46 @@ class TrunkBending:
         known = BENDING_PRIOR_M
         return SoundOrFaulty(self.mass_kg * known.sound_sd, self.mass_kg * known.faulty_sd, known.faulty_share)
 
-    def at(self, static: np.ndarray, place: int) -> BentTrunk:
-        """Bent as the static unknowns (S,) have it at this place."""
-        return BentTrunk(self, float(static[place]), place)
+    def bent(self, bsp: BodySegmentParameters, kappa: float) -> BodySegmentParameters:
+        """What moves like these segments with a trunk that bends; nothing that is physically possible."""
+        if not kappa:
+            return bsp
+        parameters = bsp.dynamic_parameters().reshape(-1, 10)
+        parameters[self.row] += kappa * self.parameters
+        return BodySegmentParameters.from_dynamic_parameters(bsp.segments, parameters.ravel())
 
 
 @dataclass(frozen=True, eq=False)
 class BentTrunk:
-    """A trunk that bends, in a trial.
-
-    Attributes:
-        trunk: the model's.
-        kappa: kg m.
-        place: where it stands among the static unknowns.
-    """
+    """A trunk that bends by kappa (kg m) in a trial; that unknown's place is among the static ones."""
 
     trunk: TrunkBending
     kappa: float
     place: int
 
-    @property
-    def _share(self) -> float:
-        """m."""
-        return self.kappa / self.trunk.mass_kg
+    def bsp(self, rigid: BodySegmentParameters) -> BodySegmentParameters:
+        """What moves like segments with such a trunk."""
+        return self.trunk.bent(rigid, self.kappa)
 
-    def bent(self, bsp: BodySegmentParameters) -> BodySegmentParameters:
-        """What moves like these segments with this trunk; nothing that is physically possible."""
-        if not self.kappa:
-            return bsp
-        parameters = bsp.dynamic_parameters().reshape(-1, 10)
-        parameters[self.trunk.row] += self.kappa * self.trunk.parameters
-        return BodySegmentParameters.from_dynamic_parameters(bsp.segments, parameters.ravel())
-
-    def upright(self, wrench: np.ndarray, by_static: np.ndarray | None = None) -> np.ndarray:
-        """Ground reactions (d, 6) less the moment kappa y x F / mass; by_static (d, 6, s), their derivatives, become
-        the result's.
-        """
-        moment = self._moment(wrench)
-        if by_static is not None:
-            by_static[:, 3] -= self._share * by_static[:, 2]
-            by_static[:, 5] += self._share * by_static[:, 0]
-            by_static[:, :, self.place] -= moment
-        return wrench - self.kappa * moment
-
-    def pulls(
-        self, wrench: np.ndarray, by_ground: np.ndarray, by_bodies: np.ndarray, by_static: np.ndarray
-    ) -> np.ndarray:
-        """(d, 6) pulls on the ground reactions as they are, for those (d, 6) on what `upright` makes of them.
-
-        The pull on kappa, through these and through the bodies' parameters (b, 10), goes to `by_static` (s,).
-        """
-        by_static[self.place] -= np.vdot(by_ground, self._moment(wrench))
-        by_static[self.place] -= by_bodies[self.trunk.row] @ self.trunk.parameters
-        result = by_ground.copy()
-        result[:, 2] -= self._share * by_ground[:, 3]
-        result[:, 0] += self._share * by_ground[:, 5]
+    def upright(self, loads: np.ndarray) -> np.ndarray:
+        """Ground reactions (d, 6), or their derivatives (d, 6, ...), less the moment kappa y x F / mass."""
+        result = loads.copy()
+        result[:, 3] -= self.kappa / self.trunk.mass_kg * loads[:, 2]
+        result[:, 5] += self.kappa / self.trunk.mass_kg * loads[:, 0]
         return result
 
-    def add_by_parameters(self, by_static: np.ndarray, theta: np.ndarray) -> None:
-        """Add derivatives of the root equations by kappa through the trunk's parameters to by_static (d, 6, s); they
-        come from those by the trunk's unknowns, of `theta`, which stand first.
-        """
-        own = slice(10 * self.trunk.row, 10 * self.trunk.row + 10)
-        by_unknowns = np.linalg.solve(dynamic_jacobian(theta[own])[0], self.trunk.parameters)
-        by_static[:, :, self.place] += by_static[:, :, own] @ by_unknowns
+    def by_kappa(self, loads: np.ndarray) -> np.ndarray:
+        """(d, 6) derivative of that by kappa."""
+        result = np.zeros_like(loads)
+        result[:, 3], result[:, 5] = -loads[:, 2] / self.trunk.mass_kg, loads[:, 0] / self.trunk.mass_kg
+        return result
 
-    def _moment(self, wrench: np.ndarray) -> np.ndarray:
-        """(d, 6) y x F / mass."""
-        moment = np.zeros_like(wrench)
-        moment[:, 3], moment[:, 5] = wrench[:, 2] / self.trunk.mass_kg, -wrench[:, 0] / self.trunk.mass_kg
-        return moment
+    @property
+    def unknowns(self) -> slice:
+        """Of the trunk, among the static ones."""
+        return slice(10 * self.trunk.row, 10 * self.trunk.row + 10)
+
+    def by_unknowns(self, theta: np.ndarray) -> np.ndarray:
+        """(10,) step of the trunk's unknowns, at theta (10 b,), that changes its parameters as a unit of kappa does."""
+        result: np.ndarray = np.linalg.solve(dynamic_jacobian(theta[self.unknowns])[0], self.trunk.parameters)
+        return result
