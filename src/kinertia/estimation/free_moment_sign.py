@@ -77,8 +77,8 @@ class FreeMomentSign:
         if not self.wrong:
             return ""
         return (
-            f"Free moments: wrong sign in the force files, corrected (log odds at least {self.log_odds:.0f} for the other sign "
-            f"over all trials; {self.rms_nm:.1f} N m RMS)"
+            f"Free moments: wrong sign in the force files, corrected (log odds at least {self.log_odds:.0f} for the "
+            f"other sign over all trials; {self.rms_nm:.1f} N m RMS)"
         )
 
     @property
