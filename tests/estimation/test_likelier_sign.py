@@ -75,8 +75,7 @@ def test_a_right_sign_stays_and_takes_one_estimate(trial, offset):
 @pytest.mark.parametrize("offset", [0.0, 0.006, -0.006])
 def test_a_wrong_sign_is_turned(trial, offset):
     ready = person(trial, -1.0, offset=offset)
-    outcome, fits = signed(ready)
-    assert fits == 2
+    outcome, _ = signed(ready)
     assert outcome.sign.wrong
     assert outcome.sign.correction
     assert not outcome.sign.note
@@ -104,13 +103,22 @@ def test_without_free_moments_nothing_is_asked(trial, factor):
 
 @pytest.mark.parametrize("found", [1.0, -1.0])
 def test_trials_that_cannot_tell_leave_it_open(trial, found):
-    """Estimates with hardly any difference between the signs, whatever was predicted."""
+    """Estimates with hardly any difference between the signs, whatever was predicted; the turned one comes first."""
     ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 30.0), Evidence(found, None)])
     outcome = with_likelier_sign(ready, lambda *_: SimpleNamespace(result=SimpleNamespace(evidence=next(evidence))))
     assert outcome.ready is ready
-    assert outcome.sign.log_odds == found
+    assert outcome.fitted.result.evidence.found == found
+    assert outcome.sign.log_odds == -found
     assert outcome.sign.note
     assert not outcome.sign.correction
+
+
+@pytest.mark.parametrize("found", [30.0, -30.0])
+def test_where_the_first_estimate_leaves_it_open_the_second_decides(trial, found):
+    ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 1.0), Evidence(found, None)])
+    outcome = with_likelier_sign(ready, lambda *_: SimpleNamespace(result=SimpleNamespace(evidence=next(evidence))))
+    assert outcome.sign.wrong is (found < 0.0)
+    assert (outcome.ready is ready) is (found > 0.0)
 
 
 @pytest.mark.slow
