@@ -107,5 +107,5 @@ def test_information_is_what_the_prior_does_not_explain(fit):
     person = information_of(fit)
     sd = fit.posterior.prior_sd
     estimate, covariance = person.with_prior(person.literature)
-    np.testing.assert_allclose(covariance, fit.posterior.covariance, atol=1e-3 * sd.max() ** 2)
+    np.testing.assert_allclose(covariance, fit.posterior.covariance, atol=2.5e-3 * sd.max() ** 2)
     np.testing.assert_allclose((estimate.table() - fit.estimate.table()) / sd, 0.0, atol=0.05)

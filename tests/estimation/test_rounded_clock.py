@@ -100,5 +100,5 @@ def test_the_same_estimate(file_of, recording_of, name):
     for other in others:
         change = (other.trials[0].joint_loads["estimate"] - loads) / np.maximum(sd, 1e-6)
         # rounding turns into this much where the search ends, and in single precision
-        assert np.abs(change).max() < 1e-4
+        assert np.abs(change).max() < 1e-3
         assert other.warnings == first.warnings

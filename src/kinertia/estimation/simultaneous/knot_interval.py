@@ -52,10 +52,11 @@ def to_splines(
     band: np.ndarray,
     border: np.ndarray,
     right: np.ndarray,
+    bordered: bool,
 ) -> None:
     """Weigh the terms of an interval with the splines that are active, two by two; `reach` (c, r, 2) are the runs of
-    columns of S that each coordinate meets. What is across the frames after the interval is left for the next. A border
-    without columns is left out.
+    columns of S that each coordinate meets. What is across the frames after the interval is left for the next. The
+    border is left out if not `bordered`.
     """
     n, size, c, at, most = len(first), len(band), right.shape[1], first[start], len(interval.gradient)
     own = np.zeros((1 + LATER, most, _TOGETHER))
@@ -79,7 +80,7 @@ def to_splines(
         for run in range(reach.shape[1]):
             begin, stop = reach[j, run, 0], reach[j, run, 1]
             if begin < stop:
-                for i in range(6 if border.shape[2] else 0):
+                for i in range(6 if bordered else 0):
                     _weigh(own[0, :, i], end - start, interval.across[:, j, begin:stop], border[at + i, j, begin:stop])
                 _pass_on(end - start, interval.across[:, j, begin:stop])
 
@@ -131,5 +132,5 @@ def to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarr
     """Weigh terms (c, s) of a frame with the six splines from `at` on."""
     for i in range(6):
         for j in range(across.shape[0]):
-            for s in range(border.shape[2]):
+            for s in range(across.shape[1]):
                 border[at + i, j, s] += weights[i] * across[j, s]

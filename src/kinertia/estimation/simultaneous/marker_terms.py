@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
+from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations
 from kinertia.estimation.simultaneous.seen_markers import PlacedMarkers, SeenMarkers, place_markers
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled, inlined, part
@@ -53,8 +53,8 @@ def add_markers(
         into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.right, into.static_right[columns])
         return
     static = _Static(into.static[columns, columns], into.static_right[columns], np.zeros(1))
-    border = into.border[..., columns] if into.bordered else into.border
-    _add(markers, first, values, own, still, into.band, border, into.right, static)
+    border = into.border[..., columns] if into.bordered else NO_BORDER
+    _add(markers, first, values, own, still, into.band, border, into.right, static, into.bordered)
     into.cost += 0.5 * float(static.cost[0])
 
 
@@ -69,6 +69,7 @@ def _add(
     border: np.ndarray,
     right: np.ndarray,
     static: _Static,
+    bordered: bool,
 ) -> None:
     """Frames own[0] to own[1] - 1, interval by interval, and each with the two after it; `first` and `values` are the
     motion basis'.
@@ -91,12 +92,12 @@ def _add(
         for k in range(start, end):
             if k + LATER < n:
                 place_markers(markers, k + LATER, placed)
-            _frame(markers, k, k - start, still, pairs, placed, interval, static, border.shape[2] > 0)
+            _frame(markers, k, k - start, still, pairs, placed, interval, static, bordered)
             for later in range(1, min(LATER, n - 1 - k) + 1):
                 _pair(markers, k, later, k - start, pairs, placed, interval, static)
-        to_splines(first, values, start, end, interval, reach, band, border, right)
+        to_splines(first, values, start, end, interval, reach, band, border, right, bordered)
         start = end
-    for row in range(min(LATER, n - stop)):
+    for row in range(min(LATER, n - stop) if bordered else 0):
         # of the frames after them, only what these have in common with the last
         to_border(first[stop + row], values[stop + row], interval.across[row], border)
 

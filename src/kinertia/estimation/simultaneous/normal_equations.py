@@ -15,6 +15,11 @@ SPLINES_PER_BLOCK = 6
 block."""
 
 
+NO_BORDER = np.zeros((2, 2, 2))[..., :1]
+"""For compiled functions, of the kind of array that they take: a part of a larger one. One without columns would be of
+another kind, for which they would be compiled once more."""
+
+
 @dataclass(frozen=True)
 class RootTerms:
     """Residuals of the root equations at the dynamic frames and their derivatives, each over its deviation.
@@ -149,19 +154,30 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
     if into.bordered:
         into.static[columns, columns] += flat.T @ flat
     rows = by_splines(values, root.q, root.qd, root.qdd)
-    border = into.border[..., columns] if into.bordered else into.border
+    border = into.border[..., columns] if into.bordered else NO_BORDER
     _add_intervals(
-        rows.reshape(-1, 6 * c), flat, intervals - start, 6 * np.append(begins, len(knots)), into.band, border
+        rows.reshape(-1, 6 * c),
+        flat,
+        intervals - start,
+        6 * np.append(begins, len(knots)),
+        into.band,
+        border,
+        into.bordered,
     )
 
 
 @compiled
 def _add_intervals(
-    rows: np.ndarray, static: np.ndarray, first: np.ndarray, ends: np.ndarray, band: np.ndarray, border: np.ndarray
+    rows: np.ndarray,
+    static: np.ndarray,
+    first: np.ndarray,
+    ends: np.ndarray,
+    band: np.ndarray,
+    border: np.ndarray,
+    bordered: bool,
 ) -> None:
     """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
-    unknowns (6 d, s), of intervals whose rows begin and end at `ends`, and whose splines begin at `first`; a border
-    without columns is left out.
+    unknowns (6 d, s) if `bordered`, of intervals whose rows begin and end at `ends`, and whose splines begin at `first`.
     """
     c = band.shape[2]
     for k in range(len(first)):
@@ -172,7 +188,7 @@ def _add_intervals(
                 for j in range(i, 6):
                     for column in range(c):
                         band[at + i, j - i, row, column] += square[i * c + row, j * c + column]
-        if border.shape[2] == 0:
+        if not bordered:
             continue
         across = np.dot(own.T, static[ends[k] : ends[k + 1]])
         for i in range(6):

@@ -118,7 +118,7 @@ def result_of(
     zeros = [(layout.zeros_of(k), trial.ground.plates) for k, trial in enumerate(problem.trials)]
     return SimultaneousResult(
         bsp,
-        _at_most(chain @ covariance[layout.theta, layout.theta] @ chain.T, problem.prior.sd.ravel()),
+        _at_most(chain @ covariance[layout.theta, layout.theta] @ chain.T, problem.prior.covariance),
         skeleton,
         coordinates,
         dict(zip(problem.plates, plates, strict=True)),
@@ -143,10 +143,13 @@ def result_of(
     )
 
 
-def _at_most(covariance: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """The same with deviations no larger than these: nobody knows less than before."""
-    share = np.minimum(1.0, sd / np.sqrt(np.diag(covariance)))
-    result: np.ndarray = share[:, None] * covariance * share
+def _at_most(covariance: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """The same with no combination more uncertain than in the prior's covariance: nobody knows less than before."""
+    root = np.linalg.cholesky(prior)
+    left = np.linalg.solve(root, np.linalg.solve(root, covariance).T)
+    shares, along = np.linalg.eigh(0.5 * (left + left.T))
+    along = root @ along
+    result: np.ndarray = (along * np.minimum(shares, 1.0)) @ along.T
     return result
 
 
