@@ -192,8 +192,7 @@ def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.
 def _columns(frame: Frame) -> None:
     """The derivatives `column`, from all else in the frame."""
     axes, swept, inertia, bias = frame.axes, frame.swept, frame.inertia, frame.bias
-    place, rate, acceleration = frame.column[0], frame.column[1], frame.column[2]
-    by_swept, by_turned, twice = frame.spare[0], frame.spare[1], frame.spare[2]
+    (place, rate, acceleration), (by_swept, by_turned, twice) = frame.column, frame.spare
     for j in range(len(axes)):
         force_cross(axes, j, frame.force, j, place, j)
         _bias_times(bias, j, swept, j, by_swept, j)

@@ -177,7 +177,7 @@ def _add_intervals(
     bordered: bool,
 ) -> None:
     """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
-    unknowns (6 d, s) if `bordered`, of intervals whose rows begin and end at `ends`, and whose splines begin at `first`.
+    unknowns (6 d, s) if `bordered`; rows of an interval begin and end at `ends`, its splines begin at `first`.
     """
     c = band.shape[2]
     for k in range(len(first)):
