@@ -216,6 +216,11 @@ def test_a_wrong_gain_is_named(trial):
 
     outcome = fitted(trial, disturb=weaken)
     assert any(w.startswith("Plate right foot: gain error") for w in outcome.warnings)
+    (name,) = [name for name in outcome.posterior.calibration_of("walk") if name.startswith("plate right foot: gain")]
+    entry = outcome.posterior.calibration[name]
+    assert entry["value"] == pytest.approx(1.0 / 0.9 - 1.0, abs=3.0 * entry["sd"])
+    assert entry["sd"] < 0.015
+    assert name not in outcome.posterior.calibration_of(None)
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
 
 

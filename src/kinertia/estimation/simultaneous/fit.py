@@ -82,6 +82,12 @@ class Posterior:
     prior_mean: BodySegmentParameters | None = None
     unlikeness: Unlikeness | None = None
 
+    def calibration_of(self, trial: str | None) -> dict[str, Mapping[str, float | str]]:
+        """What is calibrated of a trial alone, how much its trunk bends and the whole gains of its plates; of None, all
+        the rest.
+        """
+        return {name: entry for name, entry in self.calibration.items() if _trial_of(name) == trial}
+
     @property
     def information(self) -> np.ndarray:
         """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything; NaN for segments held."""
@@ -262,6 +268,13 @@ def _calibration(
     for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False):
         calibration[f"{BENDING_IN}{trial}"] = _entry(kappa, mass_kg * BENDING_PRIOR_M.sd, sd, "kg m")
     return calibration
+
+
+def _trial_of(quantity: str) -> str | None:
+    for before in (GAIN_IN, BENDING_IN):
+        if before in quantity:
+            return quantity.partition(before)[2]
+    return None
 
 
 def _entry(value: float, prior_sd: float, sd: float, unit: str) -> dict[str, float | str]:
