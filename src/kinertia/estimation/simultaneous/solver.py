@@ -40,7 +40,7 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.estimation.simultaneous.task_masses import task_covariance
+from kinertia.estimation.simultaneous.task_masses import across_tasks, task_direction
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.one_thread import one_blas_thread
 
@@ -105,18 +105,27 @@ def estimate_simultaneous(
     known = _Judged.known(ended.instruments)
     phases = OfPhases.of(problem, ended.point, partial(_continued, judged=known))
     clock = ClockProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
-    static = phases.static + clock.static - ended.point.static
+    model = GaussNewton.of(problem, clock.here).under(clock.instruments)
+    moved, added = _of_other_tasks(problem, model, ended.point.static)
+    static = phases.static + clock.static - ended.point.static + moved
     point = followed(problem, clock.here, ended.point, static)
     ended = ended._replace(here=clock.here, instruments=clock.instruments, point=point)
-    model = GaussNewton.of(problem, ended.here).under(ended.instruments)
     covariance, of_curves = _deviations(problem, ended, model)
-    covariance = covariance + phases.covariance
-    theta = problem.layout.theta
-    covariance[theta, theta] += task_covariance(problem.segments, problem.bsp(static).mass_kg)
+    covariance += phases.covariance + added
     of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
     motions = _through_impacts(problem, ended.point)
     support = instrument_support(model, ended.point, ended.instruments, of_curves)
     return result_of(problem, ended, motions, covariance, of_curves, support, evidence)
+
+
+def _of_other_tasks(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`across_tasks` at an estimate of the static unknowns (S,)."""
+    theta, direction = problem.layout.theta, np.zeros(len(static))
+    direction[theta] = task_direction(problem.segments, problem.bsp(static).mass_kg)
+    data = sum(each.information for each in model.displaced) @ direction
+    pull = -float(direction @ problem.prior_slope(static)[0])
+    root = model.static.root_of_covariance()
+    return across_tasks(direction, data, pull, root @ root.T)
 
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
