@@ -9,6 +9,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from command_line import fitted
+from kinertia.estimation import free_moment_sign
 from kinertia.estimation.free_moment_sign import FreeMomentSign, with_likelier_sign
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.evidence import Evidence
@@ -102,8 +103,9 @@ def test_without_free_moments_nothing_is_asked(trial, factor):
 
 
 @pytest.mark.parametrize("found", [1.0, -1.0])
-def test_trials_that_cannot_tell_leave_it_open(trial, found):
+def test_trials_that_cannot_tell_leave_it_open(trial, found, monkeypatch):
     """Estimates with hardly any difference between the signs, whatever was predicted; the turned one comes first."""
+    monkeypatch.setattr(free_moment_sign, "held_against", lambda fitted, other, trials: fitted)
     ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 30.0), Evidence(found, None)])
     outcome = with_likelier_sign(ready, lambda *_: SimpleNamespace(result=SimpleNamespace(evidence=next(evidence))))
     assert outcome.ready is ready

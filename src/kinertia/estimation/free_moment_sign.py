@@ -20,7 +20,7 @@ import numpy as np
 
 from kinertia.estimation.prepare import Prepared
 from kinertia.estimation.result import TrialFit
-from kinertia.estimation.simultaneous.fit import SimultaneousFit
+from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment, with_turned_free_moments
@@ -132,7 +132,8 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
         return Signed(fitted, first, sign)
     instead = fit(second, ())
     sign = FreeMomentSign(to_turned * (instead.result.evidence.found - found), rms_nm)
-    return Signed(fitted, first, sign) if sign.wrong is likely_wrong else Signed(instead, second, sign)
+    kept, used, beside = (fitted, first, instead) if sign.wrong is likely_wrong else (instead, second, fitted)
+    return Signed(held_against(kept, beside, used.kinematics) if sign.open else kept, used, sign)
 
 
 def _left_turned(ready: Prepared) -> float:

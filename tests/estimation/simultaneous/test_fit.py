@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.fit import fit_simultaneous, held_against
 from kinertia.estimation.simultaneous.instrument_warnings import accuses
 from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
@@ -210,7 +210,7 @@ def test_a_model_that_is_contradicted_is_called_so(trial):
     assert any("com_x of torso -" in w for w in said)
 
 
-def test_a_wrong_gain_is_named(trial):
+def test_a_wrong_gain_is_named(trial, plain):
     def weaken(positions, loads):
         loads[:, 0] *= 0.9
 
@@ -221,6 +221,15 @@ def test_a_wrong_gain_is_named(trial):
     assert entry["value"] == pytest.approx(1.0 / 0.9 - 1.0, abs=3.0 * entry["sd"])
     assert entry["sd"] < 0.015
     assert name not in outcome.posterior.calibration_of(None)
+
+    again = held_against(outcome, outcome, ())
+    assert again.warnings == outcome.warnings
+    assert again.corrections == outcome.corrections
+    alone = held_against(outcome, plain, ())
+    assert len(alone.warnings) == len(outcome.warnings) - 1
+    assert len(alone.corrections) == len(outcome.corrections) + 1
+    assert alone.posterior.calibration[name]["contradicted_by"]
+    assert not outcome.posterior.calibration[name]["contradicted_by"]
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
 
 

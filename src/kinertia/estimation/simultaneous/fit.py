@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from kinertia.estimation.simultaneous.instrument_warnings import (
     CLOCK_OF,
     GAIN,
     GAIN_IN,
+    accuses,
     instrument_corrections,
     instrument_warnings,
 )
@@ -26,7 +27,7 @@ from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.supported import directions, with_support
+from kinertia.estimation.simultaneous.supported import OTHER_SIGN, directions, with_support
 from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
@@ -193,6 +194,24 @@ def fit_simultaneous(
         loads,
         tuple(_warnings(prior, uncertainty, result, posterior, trials)),
         tuple(instrument_corrections(posterior.calibration, directions([each.turned_deg for each in trials]))),
+    )
+
+
+def held_against(fitted: SimultaneousFit, other: SimultaneousFit, trials: Sequence[Kinematics]) -> SimultaneousFit:
+    """The same, where another reading of the same trials is as likely: what only one of both accuses of an error is
+    corrected, and called apparent.
+    """
+    before, along = fitted.posterior.calibration, directions([each.turned_deg for each in trials])
+    said = other.posterior.calibration
+    alone = {name for name, each in before.items() if ": " in name and accuses(each) and not accuses(said[name])}
+    after = {name: {**each, "contradicted_by": OTHER_SIGN} if name in alone else each for name, each in before.items()}
+    accusing = instrument_warnings(before, along)
+    others = [sentence for sentence in fitted.warnings if sentence not in accusing]
+    return replace(
+        fitted,
+        posterior=replace(fitted.posterior, calibration=after),
+        warnings=(*instrument_warnings(after, along), *others),
+        corrections=tuple(instrument_corrections(after, along)),
     )
 
 

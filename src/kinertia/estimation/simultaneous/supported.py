@@ -14,6 +14,7 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 from kinertia.trial.plate_names import columns_of_several_trials
 
 ANOTHER_TRIAL = "another trial"
+OTHER_SIGN = "the estimate with free moments of the other sign"
 OTHER_PEOPLE = "the session's other people"
 
 
