@@ -154,10 +154,11 @@ def document(walks: list[Long]) -> str:
     headings += ["kinematics (s)", "estimate (s)", "steps", "ms a frame", "on the clock"]
     return f"""# Long trials
 
-A synthetic walk on a treadmill, its markers (41) at 100 Hz, 27 coordinates; seconds of processor time. Milliseconds a frame
-are those of kinematics and estimate, of the processor and on the clock of a machine with two cores. Memory is the most that
-the process has held until the data are there (the programs themselves included), until inverse kinematics and smoothing are
-done, and until the end. This page is written by `python benchmarks/long_trials.py`; do not edit it by hand.
+A synthetic walk on a treadmill, its markers (41) at 100 Hz, 27 coordinates; seconds of processor time. Milliseconds a
+frame are those of kinematics and estimate, of the processor and on the clock of a machine with two cores. Memory is the
+most that the process has held until the data are there (the programs themselves included), until inverse kinematics and
+smoothing are done, and until the end. This page is written by `python benchmarks/long_trials.py`; do not edit it by
+hand.
 
 {table(headings, rows)}
 

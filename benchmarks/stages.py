@@ -227,8 +227,9 @@ def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[
             peers.append([title, _ms(mine), _ms(theirs), f"{theirs / mine:.1f}"])
     return f"""# Speed
 
-Milliseconds per frame, both programs in the same run on the same machine: only the ratios travel to another. All but the
-estimate and the command run in one thread; these use a second one where there is a core for it. This page is written by `python benchmarks/stages.py`; do not edit it by hand.
+Milliseconds per frame, both programs in the same run on the same machine: only the ratios travel to another. All but
+the estimate and the command run in one thread; these use a second one where there is a core for it. This page is
+written by `python benchmarks/stages.py`; do not edit it by hand.
 
 ## Next to OpenSim {opensim.GetVersion().split("-")[0]}
 
