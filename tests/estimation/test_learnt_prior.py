@@ -96,7 +96,8 @@ def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
     assert informed.sum() > 10
     assert np.mean(np.abs(error) < 1.96 * learnt.mean_sd) > 0.9
     assert np.mean(np.abs(error[informed]) < 1.96 * learnt.mean_sd[informed]) > 0.9
-    assert np.sqrt(np.mean(error[informed] ** 2)) < 0.4 * np.sqrt(np.mean(shift[informed] ** 2))
+    # of thighs and pelvis a task shows less than of other segments
+    assert np.sqrt(np.mean(error[informed] ** 2)) < 0.45 * np.sqrt(np.mean(shift[informed] ** 2))
 
     adults, spread = np.zeros(len(sd)), prior.covariance / np.outer(sd, sd)
     priors = [(adults, spread), (learnt.mean, learnt.covariance), (shift, spread)]

@@ -181,7 +181,7 @@ def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_pa
     first = json.loads((folder / "fit.json").read_text())
     assert again.trial["window_s"] == pytest.approx(first["trials"][0]["window_s"])
     instruments = {name: entry for name, entry in again.summary["calibration"].items() if ":" in name}
-    assert len(instruments) == 14
+    assert len(instruments) == 15
     for name, entry in instruments.items():
         assert abs(entry["value"]) < entry["sd"], name
     for kind, unit in (("force", "N"), ("moment", "Nm")):

@@ -109,6 +109,10 @@ def application(only: str | None = None) -> typer.Typer:
     return app
 
 
+_INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line on these arguments, or on those of this process."""
     given = sys.argv[1:] if arguments is None else list(arguments)
@@ -131,6 +135,12 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
         where = "" if error.filename is None else f"{error.filename}: "
         show_error(f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk")
     except Exception as error:
+        # Ctrl-C in the middle of a compiled function, which reports it so
+        cause: BaseException | None = error
+        while isinstance(cause, SystemError):
+            cause = cause.__cause__
+        if isinstance(cause, KeyboardInterrupt | SystemExit):
+            raise SystemExit(getattr(cause, "code", _INTERRUPTED)) from None
         show_failure(error, given)
         raise SystemExit(STATUS) from None
     raise SystemExit(2)

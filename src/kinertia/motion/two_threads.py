@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextvars import copy_context
 from functools import cache
 from multiprocessing import parent_process
-from threading import Lock
+from threading import Lock, Thread
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -33,21 +32,28 @@ def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     here = (len(items) + 1) // 2
     if len(items) < 2 or _cores() < 2 or not _second.acquire(blocking=False):
         return [function(item) for item in items]
-    try:
-        there = _thread().submit(copy_context().run, lambda: [function(item) for item in items[here:]])
+    there: list[R | BaseException] = []
+
+    def second() -> None:
         try:
-            results = [function(item) for item in items[:here]]
-        finally:
-            wait([there])
-        return results + there.result()
+            there.extend([function(item) for item in items[here:]])
+        except BaseException as error:
+            there.append(error)
+
+    # a daemon: an interruption ends the process, whatever this is doing
+    thread = Thread(target=copy_context().run, args=(second,), name=THREAD, daemon=True)
+    try:
+        thread.start()
+        results = [function(item) for item in items[:here]]
     finally:
+        if thread.is_alive():
+            thread.join()
         _second.release()
-
-
-@cache
-def _thread() -> ThreadPoolExecutor:
-    """The second thread, which is started once."""
-    return ThreadPoolExecutor(1, thread_name_prefix=THREAD)
+    for result in there:
+        if isinstance(result, BaseException):
+            raise result
+        results.append(result)
+    return results
 
 
 @cache

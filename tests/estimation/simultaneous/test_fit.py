@@ -259,7 +259,7 @@ def test_a_horizontal_zero_is_named_and_put_right(trial, plain, axis):
     ("disturb", "quantity"),
     [
         (lambda loads: loads[:, 0, 3:].__iadd__(np.cross([0.0, 0.0, 0.02], loads[:, 0, :3])), "plate right foot: z"),
-        (lambda loads: loads[:, 1].__imul__(1.05), "plate left foot: gain"),
+        (lambda loads: loads[:, 1].__imul__(1.05), "plate left foot: gain in walk"),
         (lambda loads: loads.__setitem__(slice(None), np.roll(loads, 2, axis=0)), "clock: forces late by"),
     ],
     ids=["20 mm", "5 %", "20 ms"],
@@ -418,9 +418,8 @@ def test_the_only_trial_of_a_person_is_one_of_several_of_the_session(trial):
     others = tuple(fit_of(seed).result.instruments for seed in (1, 2))
     late = fit_of(0, 2, others)
     ((value, sd),) = late.result.delays_s
-    assert value == pytest.approx(2 * (trial.time[1] - trial.time[0]), abs=3.0 * sd)
-    assert late.result.clock_s[0] == pytest.approx(0.0, abs=0.001)
-    assert fit_of(0).result.delays_s == ()
+    value += late.result.clock_s[0]
+    assert value == pytest.approx(2 * (trial.time[1] - trial.time[0]), abs=3.0 * np.hypot(sd, late.result.clock_s[1]))
 
 
 @pytest.mark.slow

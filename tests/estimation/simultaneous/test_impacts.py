@@ -58,7 +58,9 @@ def clock_ms(recording_of, person, *moved_ms):
     for each in moved_ms:
         plates = replace(walk.plates, time=walk.plates.time + each / 1e3)
         fit = estimate(prepare(Subject(sex="male"), static, [TrialInput(replace(walk, plates=plates))]))
-        late[each] = 1e3 * fit.posterior.calibration["clock: forces late by"]["value"]
+        # of a single trial the clock's and its own are one
+        parts = [entry for name, entry in fit.posterior.calibration.items() if name.startswith("clock")]
+        late[each] = 1e3 * sum(entry["value"] for entry in parts)
     assert list(late.values()) == sorted(late.values())
     return late
 
