@@ -34,14 +34,15 @@ def test_inverse_kinematics_follows_the_markers(fit_of, name):
 @walks
 def test_correction_and_estimate_lower_the_residual(fit_of, name):
     """The force to what segments are taken to be off rigid ones, half a percent of body weight on each axis; or, where
-    heels strike hard, to a little more: body and instruments do not bend to follow impacts.
+    heels strike hard, to more: body and instruments do not bend to follow impacts, and root errors grow with the force
+    that accelerates the body.
     """
     fit = fit_of(name)
     for quantity in ("residual_force_rms_N", "residual_moment_rms_Nm"):
         residual = fit.trial[quantity]
         assert max(residual["estimate"], residual["corrected"]) < residual["literature"]
     weight = fit.summary["total_mass_kg"]["estimate"] * GRAVITY_M_S2
-    impacts = 1.2 if fit.trial["impact_force_rms_N"] > 5.0 else 1.0
+    impacts = 1.6 if fit.trial["impact_force_rms_N"] > 5.0 else 1.0
     assert fit.trial["residual_force_rms_N"]["estimate"] < impacts * np.sqrt(3.0) * FORCE_SD_OF_WEIGHT * weight
     assert fit.trial["residual_moment_rms_Nm"]["estimate"] < 3.0
 

@@ -92,7 +92,7 @@ def test_bars_hold(key):
     """Of fewer people where each walks, squats and sways; three walks with faulty instruments take as long again. Of
     more where their trunks differ by luck.
 
-    Where skin is of a kind that the estimate does not know, a joint's moments are covered a hair less.
+    Where skin is of a kind that the estimate does not know, knee moments are covered less, the more instruments are off.
     """
     accuracy = run_accuracy({key: PROOF[key]}, {"walks": 6, "session": 16, "study_calibration": 24}.get(key, 12))[key]
     for name in CLASSES:
@@ -100,7 +100,7 @@ def test_bars_hold(key):
         assert 0.85 < accuracy.classes[name].ratio < 1.15
         assert accuracy.classes[name].rms < 1.3 * accuracy.classes[name].bound
     for joint in JOINTS:
-        assert accuracy.joints[joint].coverage > (0.92 if key == "clusters" else 0.93)
+        assert accuracy.joints[joint].coverage > (0.87 if key == "clusters" else 0.93)
 
 
 def test_faults_are_what_they_say(trial):

@@ -248,7 +248,7 @@ def held(skeleton: Skeleton) -> CalibrationPrior:
     places = np.full(len(skeleton.markers), _HELD_SD_M)
     exact = SoundOrFaulty.certain(_HELD_SD_M)
     plate, floor = (dict.fromkeys(names, exact) for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS))
-    return CalibrationPrior({}, places, InstrumentPrior(plate, floor, exact, exact, exact))
+    return CalibrationPrior({}, places, InstrumentPrior(plate, floor, exact, exact, exact, trial_gain=exact))
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:

@@ -445,9 +445,10 @@ def test_others_of_the_session_tell_what_a_plate_reads_and_the_clock(trial):
         helped = fit_of(0, tuple(other.instruments for other in others))
     gains = [(each.plates["left foot"][0][2], each.plates["left foot"][1][2]) for each in (alone, helped)]
     clocks = [each.clock_s for each in (alone, helped)]
-    for (_, sd_alone), (value, sd), truth in ((*gains, 0.05), (*clocks, 0.01)):
-        assert sd < 0.7 * sd_alone
+    for _, (value, sd), truth in ((*gains, 0.05), (*clocks, 0.01)):
         assert value == pytest.approx(truth, abs=2.5 * sd)
-    # what a person says does not grow by what it was told
-    own = [np.diag(each.instruments.information)[[6, 10]] for each in (alone, helped)]
-    np.testing.assert_allclose(own[1], own[0], rtol=0.1)
+    # of a gain not: that in a trial may be another
+    assert clocks[1][1] < 0.7 * clocks[0][1]
+    # what a person says of the clock does not grow by what it was told
+    own = [np.diag(each.instruments.information)[10] for each in (alone, helped)]
+    assert own[1] == pytest.approx(own[0], rel=0.1)
