@@ -110,7 +110,7 @@ def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
                 within.append(np.abs(after - body) < 1.96 * deviations)
     assert 0.93 < np.mean(within) < 0.98
     by_kind = errors.reshape(3, 40, -1, 10)
-    for columns, most in ((slice(0, 1), 0.90), (slice(1, 4), 0.97), (slice(4, 7), 0.65)):
+    for columns, most in ((slice(0, 1), 0.90), (slice(1, 4), 0.985), (slice(4, 7), 0.65)):
         single, after, bound = np.sqrt(np.mean(np.square(by_kind[..., columns]), axis=(1, 2, 3)))
         assert bound < after < most * single
 

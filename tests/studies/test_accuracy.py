@@ -92,7 +92,7 @@ def test_bars_hold(key):
     """Of fewer people where each walks, squats and sways; three walks with faulty instruments take as long again. Of
     more where their trunks differ by luck.
 
-    Where skin is of a kind that the estimate does not know, knee moments are covered less, the more instruments are off.
+    Where skin is of a kind that the estimate does not know, knees are covered less, the more instruments are off.
     """
     accuracy = run_accuracy({key: PROOF[key]}, {"walks": 6, "session": 16, "study_calibration": 24}.get(key, 12))[key]
     for name in CLASSES:
