@@ -19,7 +19,7 @@ from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK,
 TOGETHER_BYTES = 2**27
 """Trials whose normal equations are together no larger, a minute of gait, are two stretches each. Beyond it memory
 counts for more than time. What is made of them takes some four times as much in passing."""
-_SHARE = 8
+_SHARE = 16
 """Of it that a stretch of longer trials takes."""
 _FRAMES_OF_GRADIENT = 2000
 """A stretch for gradients, which need less memory, has about so many frames: fewer would take longer."""
