@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.estimate import estimate_bsp
-from kinertia.estimation.prepare import TrialInput
 from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate_bsp
 from measured_data import data_folder
 from measured_trials import table
 

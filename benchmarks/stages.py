@@ -28,7 +28,6 @@ from core_speed import core_section
 from estimate_speed import speed_section, timed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import known
-from kinertia.estimation.prepare import calibrate
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
 from kinertia.io.marker_set_file import choose_marker_set
@@ -44,6 +43,7 @@ from kinertia.motion.smoothing import smooth
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.workflow.prepare import calibrate
 from measured_data import data_folder
 from measured_trials import table
 from walks import WALKS, fit_arguments

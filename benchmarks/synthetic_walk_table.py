@@ -19,7 +19,6 @@ import pandas as pd
 from scipy.optimize import minimize_scalar
 
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.prepare import calibrate
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.gait27 import build_gait27
@@ -31,6 +30,7 @@ from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_time import runs
+from kinertia.workflow.prepare import calibrate
 
 HARMONICS = 8
 STANDING = {"elbow_flex_r": 1.2, "elbow_flex_l": 1.2, "arm_add_r": -0.25, "arm_add_l": -0.25}

@@ -29,10 +29,10 @@ from distributed import Client, LocalCluster
 
 from cohort_faults import write_study
 from command_line import run
-from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.subject_file import SubjectFile
 from kinertia.studies.cohort_resources import LOG
+from kinertia.workflow.from_files import fit_subject
 
 NAMES = ("Anna", "Ben")
 

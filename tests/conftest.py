@@ -19,8 +19,6 @@ from command_line import Outcome, fitted, run
 from kinertia.cli.compiling import compile_once
 from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.synthetic_demo import Demo, run_demo
-from kinertia.estimation.estimate import estimate_bsp
-from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.result import Fit
 from kinertia.io import samples
 from kinertia.io.provenance import sha256
@@ -28,6 +26,8 @@ from kinertia.io.recording import read_recording
 from kinertia.report import extras
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate_bsp
 from measured_data import data_folder, find
 from once import once
 from quick_two_level import given_back
@@ -187,7 +187,7 @@ def demo_command(tmp_path_factory) -> tuple[Demo, Path, Outcome]:
             kept.append(run_demo(*arguments, **options))
             return kept[-1]
 
-        two_level = mock.patch("kinertia.estimation.estimate.estimate_two_level", given_back)
+        two_level = mock.patch("kinertia.workflow.estimate.estimate_two_level", given_back)
         with two_level, mock.patch("kinertia.cli.demo.run_demo", keep):
             outcome = run("demo", "-o", folder)
         assert outcome.status == 0, outcome.err

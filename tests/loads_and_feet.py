@@ -1,6 +1,6 @@
 """What is said of where loads and feet are."""
 
-from kinertia.trial.load_places import LoadPlaces
+from kinertia.diagnostics.plates.load_places import LoadPlaces
 
 
 def load_places_trouble(recording, feet):

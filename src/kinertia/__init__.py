@@ -20,14 +20,12 @@ from kinertia.trial import display
 if TYPE_CHECKING:
     __version__: str
 
-    from kinertia.checks.model import ModelCheck as ModelCheck
-    from kinertia.checks.model import check_model as check_model
-    from kinertia.checks.recording import RecordingCheck as RecordingCheck
-    from kinertia.checks.recording import check_recording as check_recording
-    from kinertia.checks.uses import Use as Use
-    from kinertia.checks.uses import uses as uses
-    from kinertia.checks.verdict import Verdict as Verdict
-    from kinertia.checks.verdict import verdicts as verdicts
+    from kinertia.diagnostics.model.model_check import ModelCheck as ModelCheck
+    from kinertia.diagnostics.model.model_check import check_model as check_model
+    from kinertia.diagnostics.result.uses import Use as Use
+    from kinertia.diagnostics.result.uses import uses as uses
+    from kinertia.diagnostics.result.verdict import Verdict as Verdict
+    from kinertia.diagnostics.result.verdict import verdicts as verdicts
     from kinertia.errors import FileError as FileError
     from kinertia.errors import KinertiaError as KinertiaError
     from kinertia.errors import MarkerSetError as MarkerSetError
@@ -36,15 +34,7 @@ if TYPE_CHECKING:
     from kinertia.errors import SettingsError as SettingsError
     from kinertia.errors import SubjectError as SubjectError
     from kinertia.errors import TrialError as TrialError
-    from kinertia.estimation.estimate import estimate as estimate
-    from kinertia.estimation.estimate import estimate_bsp as estimate_bsp
-    from kinertia.estimation.estimate import estimate_bsp_of_model as estimate_bsp_of_model
-    from kinertia.estimation.from_files import fit_subject as fit_subject
-    from kinertia.estimation.from_files import prepare_subject as prepare_subject
-    from kinertia.estimation.prepare import Prepared as Prepared
-    from kinertia.estimation.prepare import TrialInput as TrialInput
-    from kinertia.estimation.prepare import prepare as prepare
-    from kinertia.estimation.prepare_osim import prepare_osim as prepare_osim
+    from kinertia.estimation.prepared import Prepared as Prepared
     from kinertia.estimation.prior import BspPrior as BspPrior
     from kinertia.estimation.prior import literature_prior as literature_prior
     from kinertia.estimation.result import Fit as Fit
@@ -86,6 +76,16 @@ if TYPE_CHECKING:
     from kinertia.trial.data import Recording as Recording
     from kinertia.trial.data import Trial as Trial
     from kinertia.trial.plate_assignment import build_trial as build_trial
+    from kinertia.trial.trial_input import TrialInput as TrialInput
+    from kinertia.workflow.estimate import estimate as estimate
+    from kinertia.workflow.estimate import estimate_bsp as estimate_bsp
+    from kinertia.workflow.estimate import estimate_bsp_of_model as estimate_bsp_of_model
+    from kinertia.workflow.from_files import fit_subject as fit_subject
+    from kinertia.workflow.from_files import prepare_subject as prepare_subject
+    from kinertia.workflow.prepare import prepare as prepare
+    from kinertia.workflow.prepare_osim import prepare_osim as prepare_osim
+    from kinertia.workflow.recording import RecordingCheck as RecordingCheck
+    from kinertia.workflow.recording import check_recording as check_recording
 
 _ROOMS = {
     "errors": "FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",

@@ -16,9 +16,9 @@ import pytest
 from rich.console import Console
 
 from command_line import fitted, run
-from kinertia.checks.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
 from kinertia.cli import terminal
 from kinertia.cli.fit_report import report_fit
+from kinertia.diagnostics.result.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
 from synthetic_lab import synthetic_arguments
 
 
@@ -366,7 +366,7 @@ def test_trouble_with_the_disk_is_one_line(person, monkeypatch):
     def denied(*_, **__):
         raise PermissionError(13, "Permission denied", "/somewhere")
 
-    monkeypatch.setattr("kinertia.estimation.from_files.read_recording", denied)
+    monkeypatch.setattr("kinertia.workflow.from_files.read_recording", denied)
     outcome = run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", "-o", person / "out")
     assert outcome.status == 2
     assert outcome.err.splitlines()[-1].startswith("error: /somewhere: Permission denied; check")

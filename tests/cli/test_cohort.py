@@ -17,10 +17,10 @@ import pytest
 from cohort_faults import write_study
 from command_line import PROGRAM, run
 from kinertia.cli.cohort import _LOCK
-from kinertia.estimation.from_files import fit_subject
 from kinertia.io.file_lock import sole_use
 from kinertia.report.files import save_fit
 from kinertia.studies.cohort_cluster import ClusterSize, doubts_of_workers, local_cluster
+from kinertia.workflow.from_files import fit_subject
 
 
 @pytest.fixture

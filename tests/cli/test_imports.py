@@ -7,12 +7,12 @@ from command_line import loaded_after, loaded_by
 PICTURES = {"plotly", "matplotlib"}
 SLOW = {*PICTURES, "scipy.stats", "scipy.signal"}
 SYNTHETIC = {"kinertia.studies", "kinertia.synthetic"}
-OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.estimation.prepare_osim"}
+OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.workflow.prepare_osim"}
 C3D = {"ezc3d", "kinertia.io.c3d", "kinertia.io.c3d_plates"}
 SELDOM_NAMED = {
-    "kinertia.estimation.known_body",
+    "kinertia.workflow.known_body",
     "kinertia.estimation.learnt_prior",
-    "kinertia.estimation.session",
+    "kinertia.workflow.session",
     "kinertia.io.measures_file",
     "kinertia.io.population_file",
     "kinertia.io.session_file",

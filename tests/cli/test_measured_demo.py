@@ -14,13 +14,13 @@ import pandas as pd
 import pytest
 
 from command_line import fitted, run
-from kinertia.checks.verdict import stands_against, verdicts
-from kinertia.estimation.from_files import prepare_subject
+from kinertia.diagnostics.result.verdict import stands_against, verdicts
 from kinertia.estimation.simultaneous.skin import OTHER_EXPECTED_SD_M
 from kinertia.io import samples
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_sto
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.workflow.from_files import prepare_subject
 from report_page import Elements, figures_of
 
 MASS_KG, HEIGHT_M = 72.6, 1.803

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.estimation.from_files import prepare_subject
 from kinertia.estimation.person_information import information_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.io.provenance import Provenance, command_line, recordings
 from kinertia.io.subject_file import read_subject
 from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.workflow.from_files import prepare_subject
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ import pytest
 from kinertia.errors import PriorError
 from kinertia.estimation import body_measures
 from kinertia.estimation.body_measures import expected_measures, measured_body, with_measures
-from kinertia.estimation.from_files import prepare_subject
 from kinertia.estimation.prior import literature_prior
 from kinertia.io.measures_file import measures_sheet
 from kinertia.model.measures import measures
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
+from kinertia.workflow.from_files import prepare_subject
 from stadium_people import stadium_people
 from usual_build import stadium_mass_kg, stature_m
 

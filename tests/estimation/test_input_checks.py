@@ -4,11 +4,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
+from kinertia.diagnostics.subject.force_mass import force_mass
 from kinertia.errors import SettingsError, SubjectError, TrialError
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.force_mass import force_mass
 from kinertia.estimation.input_checks import check_same_person, check_trials, complete_subject
-from kinertia.estimation.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.settings import Subject
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Markers, Recording, Trial

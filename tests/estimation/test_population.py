@@ -5,8 +5,6 @@ import shutil
 import numpy as np
 import pytest
 
-from kinertia.estimation.from_files import prepare_subject
-from kinertia.estimation.known_body import with_prosthesis
 from kinertia.estimation.population import UNKNOWN_SPREAD, population_prior
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.unlike import unlikeness
@@ -18,6 +16,8 @@ from kinertia.studies.populations import RucksackAccuracy, own_prior, run_person
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walk, walking_subject
+from kinertia.workflow.from_files import prepare_subject
+from kinertia.workflow.known_body import with_prosthesis
 
 PRIOR = literature_prior(walking_subject().literature)
 SEGMENTS = PRIOR.mean.segments

@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinertia.estimation.doubts import motion_doubts, trial_doubts
-from kinertia.estimation.estimate import estimate_bsp_of_model
-from kinertia.estimation.prepare import TrialInput
+from kinertia.diagnostics.doubts import motion_doubts, trial_doubts
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.osim.reader import read_osim
@@ -16,6 +14,8 @@ from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_time import nearest_samples, span_s
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate_bsp_of_model
 from recordings import WALKS, named_here
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")

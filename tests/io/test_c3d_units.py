@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from c3d_writer import plate_parameters, write_c3d
-from kinertia.checks.recording import check_recording
 from kinertia.errors import FileError, TrialError
 from kinertia.io.c3d import read_c3d
 from kinertia.io.recording import read_recording
 from kinertia.trial.plate_assignment import assign_plates
+from kinertia.workflow.recording import check_recording
 
 
 @pytest.mark.parametrize("unit_in_file", ["", "m", "inch"])

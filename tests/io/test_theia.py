@@ -3,8 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.estimate import estimate
-from kinertia.estimation.prepare import TrialInput, prepare
 from kinertia.io.c3d import read_c3d
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.theia import POSE_SD_M
@@ -12,6 +10,9 @@ from kinertia.model.gait27 import build_gait27
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.settings import Subject
 from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate
+from kinertia.workflow.prepare import prepare
 from theia_file import plates, write_theia
 
 

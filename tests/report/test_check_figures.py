@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinertia.checks.recording import check_recording
 from kinertia.io.recording import read_recording
 from kinertia.report.check_figures import extremes_kept, force_figure, pressure_figure
 from kinertia.report.check_page import render_check
 from kinertia.report.marker_view import marker_scene
 from kinertia.report.plots import as_plotly
+from kinertia.workflow.recording import check_recording
 from report_page import figures_of, numbers
 
 

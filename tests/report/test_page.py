@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.checks.verdict import verdicts
+from kinertia.diagnostics.result.verdict import verdicts
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject

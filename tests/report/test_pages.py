@@ -12,7 +12,6 @@ from matplotlib.image import imread
 
 import study_results
 from chromium import DESKTOP, Opened, colour, playwright
-from kinertia.checks.files import PersonFiles, check_files, files_by_name
 from kinertia.report.accuracy import render_accuracy
 from kinertia.report.check_page import save_check_page
 from kinertia.report.cohort_page import PAGE, write_cohort_page
@@ -26,6 +25,7 @@ from kinertia.report.populations import render_populations
 from kinertia.report.sensitivity import render_sensitivity
 from kinertia.report.table1 import render_table1
 from kinertia.report.table1_variants import render_variants
+from kinertia.workflow.files import PersonFiles, check_files, files_by_name
 from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS_STUDY, SOUND
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")

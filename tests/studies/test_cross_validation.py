@@ -6,12 +6,13 @@ import pytest
 
 from command_line import run
 from kinertia.errors import KinertiaError
-from kinertia.estimation.prepare import TrialInput, prepare
 from kinertia.estimation.prior import literature_prior
 from kinertia.settings import Settings, Subject
 from kinertia.studies.cross_validation import cross_validate, frozen
 from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, walk, walking_subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.prepare import prepare
 
 WALK_S, RATE_HZ = 2.7, 60.0
 SUBJECT = Subject(name="walker", sex=SEX, mass_kg=MASS_KG, height_m=HEIGHT_M)

@@ -8,7 +8,6 @@ import pytest
 
 from command_line import run
 from kinertia.errors import TrialError
-from kinertia.estimation.from_files import prepare_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.report.faults import counts, faults_markdown, save_faults
 from kinertia.studies.faults import (
@@ -27,6 +26,7 @@ from kinertia.studies.faults import (
 )
 from kinertia.synthetic.measured_person import read_person, write_person
 from kinertia.synthetic.mistakes import MISTAKES, Mistake
+from kinertia.workflow.from_files import prepare_subject
 from one_process import in_one_process
 
 NOT_POSSIBLE = {

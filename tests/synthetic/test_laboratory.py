@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from kinertia.errors import TrialError
-from kinertia.estimation.from_files import read_inputs
 from kinertia.io.c3d_write import write_c3d
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.person_recordings import read_inputs
 from kinertia.io.subject_file import read_subject
 from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
 from kinertia.synthetic.walk import centre_of_pressure, walk, walking_subject

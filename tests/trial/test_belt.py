@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.diagnostics.evidence.foot_ways import belt_doubts, foot_ways
 from kinertia.errors import FileError
 from kinertia.io.belt_file import read_belt
 from kinertia.trial.belt import Belt
-from kinertia.trial.foot_ways import belt_doubts, foot_ways
 from kinertia.trial.plate_assignment import build_trial
 from walk_on_plates import ALL_STEPS, FEET, walk
 

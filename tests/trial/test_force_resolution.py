@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from kinertia.diagnostics.plates.plate_faults import loads_doubts
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.force_resolution import ringing_doubts, ringing_s, rounded_force_doubts
 from kinertia.trial.idle_plate import without_idle
-from kinertia.trial.plate_faults import loads_doubts
 
 TIME = np.arange(2000) / 1000
 

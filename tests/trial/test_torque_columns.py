@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.doubts import trial_doubts
+from kinertia.diagnostics.doubts import trial_doubts
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_table, write_table

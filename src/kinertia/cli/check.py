@@ -10,20 +10,20 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from kinertia.checks.files import PersonFiles, check_files, files_by_name, files_of_subject
-from kinertia.checks.model import ModelCheck, check_model
-from kinertia.checks.recording import RecordingCheck
-from kinertia.checks.verdict import stands_against
 from kinertia.cli.options import Force, Quiet, Sex, Verbose, number, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
+from kinertia.diagnostics.model.model_check import ModelCheck, check_model
+from kinertia.diagnostics.result.verdict import stands_against
+from kinertia.diagnostics.subject.telling_movements import missing_movements
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.subject_file import read_subject, subject_file_in
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
-from kinertia.trial.telling_movements import missing_movements
+from kinertia.workflow.files import PersonFiles, check_files, files_by_name, files_of_subject
+from kinertia.workflow.recording import RecordingCheck
 
 _LISTED = 8
 

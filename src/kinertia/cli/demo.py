@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.fit_report import report_fit, report_verdicts
 from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.diagnostics.result.verdict import stands_against, verdicts
 from kinertia.report.files import summary
 from kinertia.trial.rms import rms_length
 

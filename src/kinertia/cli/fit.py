@@ -10,19 +10,19 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.checks.verdict import stands_against, verdicts
 from kinertia.cli.fit_report import report_fit, report_verdicts
 from kinertia.cli.options import Force, Output, Quiet, Sex, Verbose, number, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, show_error, shown_progress
+from kinertia.diagnostics.result.verdict import stands_against, verdicts
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.report.files import save_fit, summary
 from kinertia.settings import Settings
+from kinertia.workflow.from_files import fit_subject
 
 
 def _methods(typed: str) -> list[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from kinertia.checks.verdict import Verdict
 from kinertia.cli.terminal import out, plain_table, show_verdicts, show_warning
+from kinertia.diagnostics.result.verdict import Verdict
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
 from kinertia.report.files import summary

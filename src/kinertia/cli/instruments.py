@@ -11,13 +11,13 @@ from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, show_warning, shown_progress
 from kinertia.errors import FileError, SessionError
-from kinertia.estimation.from_files import check_plates, fit_subject
-from kinertia.estimation.session import SessionInstruments, person_instruments, session_instruments
 from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
 from kinertia.io.session_file import read_session, session_text
 from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
+from kinertia.workflow.from_files import check_plates, fit_subject
+from kinertia.workflow.session import SessionInstruments, person_instruments, session_instruments
 
 
 def instruments(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from kinertia.estimation.from_files import fit_subject
-from kinertia.estimation.prepare import Progress
+from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.samples import SHA256, sample_walk
 from kinertia.io.subject_file import read_subject
 from kinertia.report.files import save_fit
+from kinertia.workflow.from_files import fit_subject
 
 _SUBJECT = """# OpenSim's gait2354 example: https://github.com/opensim-org/opensim-models, Pipelines/Gait2354_Simbody.
 

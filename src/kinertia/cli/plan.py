@@ -10,7 +10,6 @@ import typer
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.estimation.from_files import prepare_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.report.crossval_page import (
     CROSSVAL_HEADINGS,
@@ -22,6 +21,7 @@ from kinertia.report.crossval_page import (
 from kinertia.report.plan_page import PLAN_CAPTION, PLAN_HEADINGS, plan_rows, plan_summary, save_plan
 from kinertia.studies.cross_validation import cross_validate
 from kinertia.studies.plan import plan as plan_motions
+from kinertia.workflow.from_files import prepare_subject
 
 
 def plan(

@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from kinertia.estimation.estimate import estimate_bsp
-from kinertia.estimation.from_files import read_inputs
-from kinertia.estimation.prepare import Progress
+from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder
+from kinertia.io.person_recordings import read_inputs
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import SubjectFile, read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
@@ -26,6 +25,7 @@ from kinertia.report.files import save_fit
 from kinertia.report.truth import Truth
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
+from kinertia.workflow.estimate import estimate_bsp
 
 PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
 """Force plates at 1000 Hz, cameras at 100 Hz."""

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from kinertia.checks.verdict import Verdict
 from kinertia.cli.compiling import compile_once
+from kinertia.diagnostics.result.verdict import Verdict
 
 if TYPE_CHECKING:
     from rich.console import Capture, Console

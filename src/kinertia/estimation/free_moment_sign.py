@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.estimation.prepare import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
 from kinertia.motion.dynamics import residual

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.checks.plates import Contact
-from kinertia.checks.recording import RecordingCheck
+from kinertia.diagnostics.plates.plate_summary import Contact
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, base_layout, plain, small_multiples
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads
 from kinertia.trial.sampled_time import nearest_samples
+from kinertia.workflow.recording import RecordingCheck
 
 MOST_SAMPLES = 1200
 """Drawn per curve; the largest and smallest of those between are among them."""

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from kinertia.checks.model import ModelCheck
-from kinertia.checks.recording import RecordingCheck
+from kinertia.diagnostics.model.model_check import ModelCheck
 from kinertia.io.output_folder import complete_folder
 from kinertia.report.check_figures import MOST_CONTACTS, force_figure, pressure_figure
 from kinertia.report.figure import Figure, written
@@ -16,6 +15,7 @@ from kinertia.report.marker_view import marker_scene
 from kinertia.report.page import MOST_TRIALS, VIEW_FRAMES
 from kinertia.report.rendering import rendered
 from kinertia.report.scene import view
+from kinertia.workflow.recording import RecordingCheck
 
 
 def save_check_page(

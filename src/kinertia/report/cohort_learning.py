@@ -18,11 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.errors import KinertiaError, PriorError
-from kinertia.estimation.from_files import check_plates
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
 from kinertia.estimation.person_information import PersonInformation, information_of
-from kinertia.estimation.session import person_instruments, session_instruments
 from kinertia.io.file_names import path_from
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.population_file import population_text
@@ -36,6 +34,8 @@ from kinertia.report.saved_fit import read_saved
 from kinertia.studies.cohort_people import Person
 from kinertia.studies.cohort_record import RECORD, Place
 from kinertia.studies.parallel import in_parallel
+from kinertia.workflow.from_files import check_plates
+from kinertia.workflow.session import person_instruments, session_instruments
 
 FOLDER = "learnt"
 _DONE = "learnt.json"

@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 import traceback
 
-from kinertia.checks.verdict import verdicts
+from kinertia.diagnostics.result.verdict import verdicts
 from kinertia.errors import KinertiaError
-from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.result import Fit
 from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.provenance import VERSION, command_line, provenance_of
@@ -18,6 +17,7 @@ from kinertia.report.files import save_fit
 from kinertia.studies.cohort_cluster import Job
 from kinertia.studies.cohort_record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
 from kinertia.studies.cohort_time_limit import no_end, time_limit, was_ended
+from kinertia.workflow.from_files import fit_subject
 
 
 def fit_person(job: Job) -> Record:

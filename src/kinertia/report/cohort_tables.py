@@ -14,7 +14,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kinertia.checks.verdict import residual_verdicts, verdict_of_markers, worst_level
+from kinertia.diagnostics.result.verdict import residual_verdicts, verdict_of_markers, worst_level
 from kinertia.errors import FileError
 from kinertia.estimation.cycles import UNITS, cycle_columns
 from kinertia.estimation.result import Fit

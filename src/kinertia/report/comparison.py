@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.checks.verdict import verdicts
+from kinertia.diagnostics.result.verdict import verdicts
 from kinertia.estimation.cycles import UNITS as UNITS_OF_CURVES
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.checks.uses import uses
-from kinertia.checks.verdict import verdicts
+from kinertia.diagnostics.result.uses import uses
+from kinertia.diagnostics.result.verdict import verdicts
+from kinertia.diagnostics.result.warnings import mass_from_force_kg
 from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.estimation.warnings import mass_from_force_kg
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.provenance import VERSION, Provenance

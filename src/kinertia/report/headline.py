@@ -1,6 +1,6 @@
 """The report's first part: a fit in words, for somebody who reads nothing else.
 
-Whether numbers can be used is judged in `kinertia.checks.verdict`; here that is put beside how far the motion was
+Whether numbers can be used is judged in `diagnostics.result.verdict`; here that is put beside how far the motion was
 changed to get there, what the data say about the body, and where the estimate leaves what it started from.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.checks.uses import Use, uses
-from kinertia.checks.verdict import Level, Verdict, verdicts, worst_level
+from kinertia.diagnostics.result.uses import Use, uses
+from kinertia.diagnostics.result.verdict import Level, Verdict, verdicts, worst_level
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
@@ -36,8 +36,8 @@ class Words:
     Attributes:
         level: `level_of`.
         headline: what it means for using the numbers.
-        uses: `kinertia.checks.uses.uses`.
-        judgements: `kinertia.checks.verdict.verdicts`.
+        uses: `kinertia.diagnostics.result.uses.uses`.
+        judgements: `kinertia.diagnostics.result.verdict.verdicts`.
         motion: how far the motion was changed.
         knowledge: what the data could and could not tell about the body segment parameters.
         departures: estimates more than two prior SDs from the prior's mean.

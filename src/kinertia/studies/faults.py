@@ -16,10 +16,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.checks.files import check_files, files_of_subject
-from kinertia.checks.verdict import verdicts
+from kinertia.diagnostics.result.verdict import verdicts
 from kinertia.errors import KinertiaError
-from kinertia.estimation.from_files import fit_subject
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, PLATE_PRIOR
@@ -30,6 +28,8 @@ from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.measured_person import MeasuredPerson, read_person, write_person
 from kinertia.synthetic.mistakes import MISTAKES, Mistake
 from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.workflow.files import check_files, files_of_subject
+from kinertia.workflow.from_files import fit_subject
 
 Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
 """What became of a mistake: named; warned with another cause; moments within their deviations; neither; there is

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.prepare import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fisher_information import Information

@@ -16,9 +16,7 @@ from functools import partial
 
 import numpy as np
 
-from kinertia.estimation.attached import with_attached_prior
 from kinertia.estimation.input_checks import known
-from kinertia.estimation.known_body import with_prosthesis
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
 from kinertia.estimation.person_information import PersonInformation, person_information
 from kinertia.estimation.population import population_prior
@@ -44,6 +42,8 @@ from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticTrial, walk, walking_subject
 from kinertia.trial.rms import rms
+from kinertia.workflow.attached import with_attached_prior
+from kinertia.workflow.known_body import with_prosthesis
 
 LABORATORY = Faults("artefact", calibration=True)
 COLUMNS = {"mass": slice(0, 1), "CoM": slice(1, 4), "inertia": slice(4, 7)}

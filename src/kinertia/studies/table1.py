@@ -14,10 +14,10 @@ from functools import partial
 
 import numpy as np
 
-from kinertia.estimation.from_files import read_inputs
-from kinertia.estimation.prepare import Progress, prepare
+from kinertia.estimation.prepared import Progress
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level
+from kinertia.io.person_recordings import read_inputs
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -31,6 +31,7 @@ from kinertia.synthetic.noise import study_noise
 from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
+from kinertia.workflow.prepare import prepare
 
 CONDITIONS = {
     "no_correction_no_noise": "no correction, no noise",

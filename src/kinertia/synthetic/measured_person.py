@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.estimation.from_files import read_inputs
 from kinertia.io.c3d_write import write_c3d
 from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.person_recordings import read_inputs
 from kinertia.io.sto import write_sto
 from kinertia.io.subject_file import SubjectFile
 from kinertia.io.trc import write_trc

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from kinertia.estimation.estimate import estimate_bsp
-from kinertia.estimation.prepare import TrialInput
 from kinertia.estimation.result import Fit
 from kinertia.report.files import save_fit
 from kinertia.settings import Settings, Subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate_bsp
 
 
 def fit_of_files(recording_of, folder: str, sex: str) -> Fit:

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from kinertia.estimation.estimate import estimate
-from kinertia.estimation.prepare import TrialInput, prepare
 from kinertia.estimation.simultaneous.impacts import impact_factors
 from kinertia.settings import Subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate
+from kinertia.workflow.prepare import prepare
 
 SPACING_S, FORCE_SD = 1.0 / 30.0, 4.0
 TIME = np.arange(120) / 100.0

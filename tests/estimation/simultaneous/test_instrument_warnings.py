@@ -1,6 +1,6 @@
 import pytest
 
-from kinertia.estimation.mirrored_free_moments import mirrored_free_moments_warning
+from kinertia.diagnostics.result.mirrored_free_moments import mirrored_free_moments_warning
 from kinertia.estimation.simultaneous.instrument_warnings import (
     accuses,
     instrument_corrections,

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.checks.marker_set_match import match_labels
 from kinertia.cli.web.entries import entries, write
 from kinertia.cli.web.library import Person
+from kinertia.diagnostics.labels.marker_set_match import match_labels
 from kinertia.errors import FileError, KinertiaError, SettingsError
 from kinertia.io.marker_set_draft import known_places, marker_set_text
 from kinertia.io.marker_set_file import preset_names, read_marker_set

@@ -27,9 +27,9 @@ Progress = Callable[[str, float], None]
 
 def check(person: Person, progress: Progress) -> None:
     """What `kinertia check` does with the subject file: check.html, and its findings for the page."""
-    from kinertia.checks.files import check_files, files_of_subject
+    from kinertia.diagnostics.subject.telling_movements import missing_movements
     from kinertia.report.check_page import save_check_page
-    from kinertia.trial.telling_movements import missing_movements
+    from kinertia.workflow.files import check_files, files_of_subject
 
     recordings, mistakes = check_files(
         files_of_subject(read_subject(person.subject)), lambda share: progress("reading", share)
@@ -45,10 +45,10 @@ def check(person: Person, progress: Progress) -> None:
 
 def fit(person: Person, progress: Progress) -> None:
     """What `kinertia fit` does with the subject file: the results, and the subject file that they are of."""
-    from kinertia.estimation.from_files import fit_subject
     from kinertia.io.provenance import provenance_of
     from kinertia.report.files import save_fit
     from kinertia.report.headline import words
+    from kinertia.workflow.from_files import fit_subject
 
     begun = time.time()
     wanted = read_subject(person.subject)

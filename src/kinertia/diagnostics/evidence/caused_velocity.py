@@ -1,0 +1,101 @@
+"""How fast the body is by its markers, and how fast the forces make it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.diagnostics.evidence.markers_centre import markers_centre
+from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.motion.smoothing import SmoothingError, smooth
+from kinertia.trial.data import FloatArray, Trial
+from kinertia.trial.sampled_time import span_s, within
+
+_PELVIS_HZ = 6.0
+_LEAST_WINDOW_S = 0.4
+LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
+"""Velocities that change by less (standard deviation) say nothing of forces."""
+
+
+@dataclass(frozen=True, eq=False)
+class CausedVelocity:
+    """(n, 3) m/s over (n,) s: of the pelvis, of the markers' centre, and of a body of this mass as the forces cause
+    them.
+    """
+
+    time: FloatArray
+    pelvis: FloatArray
+    centre: FloatArray
+    caused: FloatArray
+    mass_kg: float
+
+    def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
+        """(n,) m/s that a force (k,) N over time (k,) s causes."""
+        force = np.interp(self.time, time, force)
+        impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(self.time))
+        return np.concatenate(([0.0], impulse)) / self.mass_kg
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityChanges:
+    """(n, 3) m/s: the same of all windows, one after the other, each without its trend."""
+
+    pelvis: FloatArray
+    centre: FloatArray
+    caused: FloatArray
+
+    @classmethod
+    def of(cls, parts: Sequence[CausedVelocity]) -> VelocityChanges:
+        """Of these windows."""
+        pelvis, centre, caused = (
+            np.concatenate([without_trend(part.time, getattr(part, name)) for part in parts])
+            for name in ("pelvis", "centre", "caused")
+        )
+        return cls(pelvis, centre, caused)
+
+    def times_up(self, shown: FloatArray) -> float | None:
+        """How many times as fast the forces move the body up and down as these velocities (n, 3) show; None where they
+        do not follow the forces.
+        """
+        up, caused = shown[:, 1], self.caused[:, 1]
+        if min(up.std(), caused.std()) < LEAST_CHANGE_M_S or np.corrcoef(up, caused)[0, 1] < _FOLLOWS:
+            return None
+        return float((up * caused).sum() / (up * up).sum())
+
+
+def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Values (n,) or (n, k) over times (n,) s, less a line of each column."""
+    after = time - time.mean()
+    slope, level = np.polyfit(after, values, 1)
+    result: FloatArray = values - np.multiply.outer(after, slope) - level
+    return result
+
+
+def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:
+    """Of every window in which the sum of the forces is known, if it is long enough."""
+    worn = [label for label in trial.markers.labels if owners.get(label) == "pelvis"]
+    whole = markers_centre(owners, trial.markers)
+    if not worn or whole is None:
+        return []
+    place = trial.markers.select(worn).positions.mean(axis=1)
+    seen = np.isfinite(place).all(axis=1)
+    if not seen.any():
+        return []
+    try:
+        pelvis_m, centre_m = (smooth(trial.markers.time[seen], part[seen], _PELVIS_HZ) for part in (place, whole))
+    except SmoothingError:
+        return []
+    first, last = trial.markers.time[seen][[0, -1]]
+    parts = []
+    for start, end in trial.carried_windows():
+        inside = within(trial.loads.time, max(start, first), min(end, last))
+        time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
+        if len(time) < 10 or span_s(time) < _LEAST_WINDOW_S or not force[:, 1].mean() > 0:
+            continue
+        mass_kg = float(force[:, 1].mean()) / GRAVITY_M_S2
+        impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
+        caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
+        parts.append(CausedVelocity(time, pelvis_m(time, 1), centre_m(time, 1), caused, mass_kg))
+    return parts

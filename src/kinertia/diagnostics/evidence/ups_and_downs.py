@@ -1,0 +1,76 @@
+"""Does the body go up and down as the vertical forces make it: with a delay, an ever longer one, or other gains?
+
+Vertical velocities tell these apart within two steps: a delay shifts them, a wrong rate shifts the last more than the
+first, and a wrong gain of one plate adds to them whenever that plate is stood on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
+from kinertia.trial.data import FloatArray
+
+_STEPS = 5
+
+
+@dataclass(frozen=True)
+class UpsAndDowns:
+    """Of shown(t) = factor * (caused(t + delay + growth * t) + gain * own(t)), up to a wrong zero and a level.
+
+    Attributes:
+        delay_s, growth: of the forces, in the middle, and in seconds per second.
+        gain: by which one plate reads more than the others.
+        left: what is not explained, over what there is (standard deviations).
+    """
+
+    delay_s: float
+    growth: float
+    gain: float
+    left: float
+
+
+def ups_and_downs(
+    part: CausedVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
+) -> UpsAndDowns | None:
+    """By Gauss-Newton; None where the velocities do not follow the forces.
+
+    Args:
+        part: what the forces cause, over (n,) s.
+        shown: (n, 3) m/s, of the pelvis or of the markers' centre.
+        own: (n,) m/s that one plate alone causes, if its gain may be wrong.
+        growing: whether the delay may change over time.
+    """
+    after = part.time - part.time.mean()
+    caused, accelerated = part.caused[:, 1], np.gradient(part.caused[:, 1], part.time)
+    delay = growth = 0.0
+    for _ in range(_STEPS):
+        at = part.time + delay + growth * after
+        inside = (at >= part.time[0]) & (at <= part.time[-1])
+        if inside.sum() < len(at) / 2:
+            return None
+        pushed = np.interp(at[inside], part.time, accelerated)
+        moved, since = np.interp(at[inside], part.time, caused), after[inside]
+        columns = [moved, pushed, np.ones_like(since), since]
+        columns += [since * pushed] if growing else []
+        columns += [] if own is None else [np.interp(at[inside], part.time, own)]
+        terms, wanted = np.stack(columns, axis=1), shown[inside, 1]
+        solution = np.linalg.lstsq(terms, wanted, rcond=None)[0]
+        if solution[0] <= 0.0:
+            return None
+        delay += float(solution[1] / solution[0])
+        growth += float(solution[4] / solution[0]) if growing else 0.0
+    gain = 0.0 if own is None else float(solution[-1] / solution[0])
+    left = float(np.std(wanted - terms @ solution) / max(float(np.std(wanted)), 1e-12))
+    return UpsAndDowns(delay, growth, gain, left)
+
+
+def ups_and_downs_of(
+    part: CausedVelocity, own: FloatArray | None = None, growing: bool = False
+) -> Sequence[UpsAndDowns]:
+    """By the pelvis and by the markers' centre; empty where either does not follow the forces."""
+    found = [ups_and_downs(part, shown, own, growing) for shown in (part.pelvis, part.centre)]
+    return [one for one in found if one is not None] if all(found) else []

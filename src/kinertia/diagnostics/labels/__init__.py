@@ -1,0 +1,1 @@
+"""Findings about labels: left and right, front and back, swapped markers, rigid segments."""

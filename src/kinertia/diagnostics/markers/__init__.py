@@ -1,0 +1,1 @@
+"""Findings about markers: trajectories, frames, precision, axes and floor."""

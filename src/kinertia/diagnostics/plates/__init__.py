@@ -1,0 +1,1 @@
+"""Findings about force plates: signals, zeros, gains, directions, centres of pressure, contact."""

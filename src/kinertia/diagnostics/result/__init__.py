@@ -1,0 +1,1 @@
+"""Findings about estimates: residuals, parameters, instruments as the estimate sees them."""

@@ -1,0 +1,1 @@
+"""Findings about time: sampling rates and synchronisation of forces and markers."""

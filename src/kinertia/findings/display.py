@@ -1,0 +1,101 @@
+"""SI quantities as people read them (mm, ms, degrees, %), and sentences with them filled in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from kinertia.findings.finding import Quantity, Where
+
+_FIELD = re.compile(r"\{(\w+)(?::([+%#]*))?\}")
+_LISTED = 4
+
+
+def _scaled(unit: str, size: float) -> tuple[float, str, int]:
+    """Factor, unit and digits after the point of a size in an SI unit."""
+    match unit:
+        case "m":
+            return (1e3, "mm", 0 if size >= 0.01 else 1) if size < 1.0 else (1.0, "m", 2)
+        case "s":
+            return (1e3, "ms", 0 if size >= 0.02 else 1) if size < 0.3 else (1.0, "s", 2)
+        case "rad":
+            return 180.0 / np.pi, "degrees", 1
+        case "N m/N":
+            return 1e3, "N m per kN", 1
+        case "N":
+            return 1.0, "N", 0 if size >= 10.0 else 1
+        case "kg" | "N m" | "kg/m2":
+            return 1.0, unit, 1
+        case "m/s" | "m/s2":
+            return 1.0, unit, 2
+        case "kg/m3" | "a":
+            return 1.0, "years" if unit == "a" else unit, 0
+    return 1.0, "" if unit == "1" else unit, -1
+
+
+def shown(quantity: Quantity, style: str = "") -> str:
+    """A quantity with its unit: "-23 N", "4.6 mm", "0.25, 0.31 m"; `style` "+" with its sign, "%" as a percentage,
+    "#" as a count.
+    """
+    if isinstance(quantity.value, str):
+        return quantity.value
+    values = quantity.value if isinstance(quantity.value, tuple) else (quantity.value,)
+    factor, unit, digits = _scaled(quantity.unit, max((abs(value) for value in values), default=0.0))
+    sign = "+" if "+" in style else ""
+    if "%" in style:
+        texts = [f"{100.0 * value:{sign}.3g}" for value in values]
+        unit = "%"
+    elif "#" in style:
+        texts = [f"{value:{sign}.0f}" for value in values]
+    elif digits < 0:
+        texts = [f"{value:{sign}.3g}" for value in values]
+    else:
+        texts = [f"{factor * value:{sign}.{digits}f}" for value in values]
+    return f"{', '.join(texts)} {unit}".rstrip()
+
+
+def first_few(names: Sequence[str], most: int = _LISTED) -> str:
+    """The first of a list, and how many more there are."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def filled(template: str, where: Where, evidence: Mapping[str, Quantity]) -> str:
+    """A sentence of the catalogue with evidence and places in it: `{level_n}`, `{share:%}`, `{frames:#}`, `{plate}`."""
+    places = _places(where)
+
+    def one(match: re.Match[str]) -> str:
+        name, style = match.group(1), match.group(2) or ""
+        if name in evidence:
+            return shown(evidence[name], style)
+        return places[name]() if name in places else match.group(0)
+
+    return _FIELD.sub(one, template)
+
+
+def _places(where: Where) -> dict[str, Callable[[], str]]:
+    span = where.span_s or (float("nan"), float("nan"))
+    return {
+        "file": lambda: where.file or "the file",
+        "line": lambda: str(where.line or "?"),
+        "trial": lambda: where.trial or "the trial",
+        "plate": lambda: where.plate or "all plates",
+        "axis": lambda: axis_text(where),
+        "marker": lambda: where.markers[0] if where.markers else "a marker",
+        "other": lambda: where.markers[1] if len(where.markers) > 1 else "another marker",
+        "markers": lambda: first_few(where.markers) if where.markers else "the markers",
+        "part": lambda: where.part or "the model",
+        "start": lambda: f"{span[0]:.2f} s",
+        "end": lambda: f"{span[1]:.2f} s",
+    }
+
+
+def axis_text(where: Where) -> str:
+    """The axis as the person moves, and as the file has it: "fore-aft (X)"."""
+    if where.axis and where.file_axis:
+        return f"{where.axis} ({where.file_axis})"
+    return where.axis or where.file_axis or "an axis"

@@ -1,0 +1,174 @@
+"""Things that are not body: a rucksack, a held weight, an orthosis, an exoskeleton, shoes.
+
+Each becomes a segment of its own, welded to the one that it moves with: it enters the dynamics, the error bars and the
+exported model as every segment does. What its mass, place and size are known by is its prior. The motion cannot tell
+it from the segment that carries it, but the scale can: the body was weighed with it, or without. The masses of the
+body's segments are shares of what the scale leaves for the body, so they are lighter the heavier the thing that was
+weighed with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.errors import PriorError
+from kinertia.estimation.carried_mass import mass_of
+from kinertia.estimation.input_checks import known
+from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covariance
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Joint, Skeleton
+from kinertia.settings import Attached
+
+_UNKNOWN_SIZE_SD = 0.5
+"""Relative deviation of the second moments of something whose size is not given."""
+_WATER_KG_M3 = 1000.0
+_GROUND = "ground"
+_TOLD_SD = 2.0
+"""Deviations of its mass by which something is told from nothing."""
+
+
+def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
+    """A prepared person with segments for `ready.attached`, after the body's own; one who has them stays as it is.
+
+    Args:
+        ready: the person.
+        by_itself: segments whose prior masses are no shares of the body's.
+
+    Raises:
+        PriorError: no such segment, or a name that is taken.
+    """
+    if not ready.attached or ready.prior.weighed is not None:
+        return ready
+    scale_kg = known(ready.subject.mass_kg)
+    skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, scale_kg, by_itself)
+    # the literature's own body, which need not be the prior's mean, and segments that are held after all others
+    body, own = len(ready.prior.mean.segments), ready.literature
+    names = (*prior.mean.segments, *own.segments[body:])
+    table = np.concatenate([own.table()[:body], prior.mean.table()[body:], own.table()[body:]])
+    return replace(
+        ready,
+        skeleton=skeleton,
+        prior=prior,
+        literature=BodySegmentParameters.from_table(names, table),
+        notes=(*ready.notes, *(_note(one, scale_kg) for one in ready.attached)),
+    )
+
+
+def with_attached_prior(
+    skeleton: Skeleton,
+    prior: BspPrior,
+    attached: Sequence[Attached],
+    scale_kg: float,
+    by_itself: Collection[str] = (),
+) -> tuple[Skeleton, BspPrior]:
+    """A skeleton with what is attached welded to it, and the prior of the whole.
+
+    Args:
+        skeleton, prior: of the body alone.
+        attached: in the order of the new segments.
+        scale_kg: what the scale said.
+        by_itself: segments whose prior masses are no shares of the body's.
+
+    Raises:
+        PriorError: no such segment, or a name that is taken.
+    """
+    _check(skeleton, attached)
+    joints = tuple(Joint(one.segment, one.name, np.eye(3), np.zeros(3), ()) for one in attached)
+    return replace(skeleton, joints=(*skeleton.joints, *joints)), _extended(prior, attached, scale_kg, by_itself)
+
+
+def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:
+    taken = list(skeleton.segments)
+    for one in attached:
+        if one.segment not in skeleton.segments:
+            raise PriorError(
+                f"[[attached]] {one.name}: the model has no segment '{one.segment}'; it has "
+                f"{', '.join(skeleton.segments)}"
+            )
+        if one.name == _GROUND:
+            raise PriorError(f"[[attached]] {_GROUND}: OpenSim calls the laboratory so; give it another name")
+        if one.name in taken:
+            raise PriorError(f"[[attached]] {one.name}: there is a segment of this name already; give it another")
+        taken.append(one.name)
+
+
+def _extended(prior: BspPrior, attached: Sequence[Attached], scale_kg: float, by_itself: Collection[str]) -> BspPrior:
+    """The prior with rows for what is attached: of what was weighed with the body, the body has the less the more."""
+    tables, blocks = zip(*(_expected(one, *mass_of(one, scale_kg)) for one in attached), strict=True)
+    names = (*prior.mean.segments, *(one.name for one in attached))
+    size = len(prior.covariance)
+    covariance = np.zeros((10 * len(names),) * 2)
+    covariance[:size, :size] = prior.covariance
+    for k, block in enumerate(blocks):
+        rows = slice(size + 10 * k, size + 10 * k + 10)
+        covariance[rows, rows] = block
+        if attached[k].on_scale:
+            mass_kg, sd_kg = mass_of(attached[k], scale_kg)
+            less, more = _less_body(prior, by_itself), _by_mass(tables[k], mass_kg)
+            covariance[:size, :size] += sd_kg**2 * np.outer(less, less)
+            covariance[:size, rows] = sd_kg**2 * np.outer(less, more)
+            covariance[rows, :size] = covariance[:size, rows].T
+    mean = BodySegmentParameters.from_table(names, np.concatenate([prior.mean.table(), *tables]))
+    weighed = (*(True,) * len(prior.mean.segments), *(one.on_scale for one in attached))
+    # the body's own rows are those of a person who was weighed without what was on the scale with him
+    on_scale = sum(mass_of(one, scale_kg)[0] for one in attached if one.on_scale)
+    return replace(prior, mean=mean, covariance=covariance, mass_kg=prior.mass_kg + on_scale, weighed=weighed)
+
+
+def _expected(attached: Attached, mass_kg: float, sd_kg: float) -> tuple[np.ndarray, np.ndarray]:
+    """(1, 10) row of the table and (10, 10) covariance: inertia in proportion to mass, and a deviation of its own."""
+    if attached.size_mm is None:
+        radius = (3.0 * mass_kg / (4.0 * np.pi * _WATER_KG_M3)) ** (1.0 / 3.0)
+        second, own_sd = np.full(3, 0.2 * mass_kg * radius**2), _UNKNOWN_SIZE_SD
+    else:
+        second, own_sd = mass_kg / 12.0 * np.square(1e-3 * np.array(attached.size_mm)), SECOND_MOMENT_SD
+    inertia = np.diag(second.sum() - second)
+    one = BodySegmentParameters(
+        (attached.name,), np.array([mass_kg]), 1e-3 * np.array([attached.com_mm]), inertia[None]
+    )
+    table = one.table()
+    covariance = np.zeros((10, 10))
+    covariance[1:4, 1:4] = np.square(1e-3 * attached.com_sd_mm) * np.eye(3)
+    covariance[4:, 4:] = (own_sd / SECOND_MOMENT_SD) ** 2 * inertia_covariance(one)[0]
+    by_mass = _by_mass(table, mass_kg)
+    return table, covariance + sd_kg**2 * np.outer(by_mass, by_mass)
+
+
+def _by_mass(table: np.ndarray, mass_kg: float) -> np.ndarray:
+    """(10,) change of a thing's row (1, 10) with its mass."""
+    result: np.ndarray = np.r_[1.0, np.zeros(3), table[0, 4:] / mass_kg]
+    return result
+
+
+def _less_body(prior: BspPrior, by_itself: Collection[str]) -> np.ndarray:
+    """(10 s,) change of the body's rows with a kilogram on the scale that is none of it."""
+    change = -prior.mean.table() / prior.mean.total_mass_kg
+    change[:, 1:4] = 0.0
+    change[[name in by_itself for name in prior.mean.segments]] = 0.0
+    return change.ravel()
+
+
+def not_found_warnings(attached: Sequence[Attached], estimate: BodySegmentParameters, sd: np.ndarray) -> list[str]:
+    """One sentence for each thing of unknown mass of which nothing is found; `sd` (s, 10) of the estimate's table."""
+    warnings = []
+    for one in attached:
+        row = estimate.segments.index(one.name)
+        mass_kg, sd_kg = float(estimate.mass_kg[row]), float(sd[row, 0])
+        if one.mass_kg is None and mass_kg < _TOLD_SD * sd_kg:
+            weighed = "" if one.on_scale else ", is mass_kg under [subject] without it, and are the plates' gains right"
+            warnings.append(
+                f"[[attached]] {one.name}: {mass_kg:.2f} kg are found, with a deviation of {sd_kg:.2f} kg, which is "
+                f"not to be told from nothing; was it there{weighed}? A known mass would help (mass_kg)"
+            )
+    return warnings
+
+
+def _note(attached: Attached, scale_kg: float) -> str:
+    mass_kg, sd_kg = mass_of(attached, scale_kg)
+    mass = "of unknown mass, which is estimated" if attached.mass_kg is None else f"{mass_kg:.4g} +- {sd_kg:.2g} kg"
+    weighed = "weighed with the person" if attached.on_scale else "not on the scale"
+    return f"attached to {attached.segment}: {attached.name}, {mass}, {weighed}"

@@ -1,0 +1,372 @@
+"""The whole way from recordings to body segment parameters: `estimate_bsp` and its steps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.diagnostics.result.mirrored_free_moments import mirrored_free_moments_warning
+from kinertia.diagnostics.result.unseen_turn import unseen_turn_note
+from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
+from kinertia.diagnostics.subject.telling_movements import TellingMovements, missing_movements
+from kinertia.estimation.forces_used import forces_used
+from kinertia.estimation.free_moment_sign import free_moment_sign_warnings, with_likelier_sign
+from kinertia.estimation.prepared import Prepared, Progress
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
+from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
+from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.model.anatomy import segment_of
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.gait27 import VIRTUAL_TRUNK
+from kinertia.model.imported import OsimModel
+from kinertia.model.marker_set import MarkerSet
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, inverse_dynamics, joined, residual
+from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, measured_reactions
+from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.smoothing import interpolate
+from kinertia.settings import Attached, Settings, Subject
+from kinertia.trial.data import Recording
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.attached import not_found_warnings, with_attached
+from kinertia.workflow.prepare import prepare
+
+
+@one_blas_thread
+def estimate_bsp(
+    subject: Subject,
+    static: Recording,
+    inputs: Sequence[TrialInput],
+    settings: Settings | None = None,
+    marker_set: MarkerSet | None = None,
+    progress: Progress = lambda stage, share: None,
+    prior: BspPrior | None = None,
+    attached: Sequence[Attached] = (),
+) -> Fit:
+    """Body segment parameters of a person from a static trial and one or more gait trials.
+
+    Args:
+        subject: mass and height may be None where a recording carries them.
+        static: the person standing.
+        inputs: the gait trials.
+        settings: defaults if None.
+        marker_set: found from the static trial's labels if None.
+        progress: called as the work goes on.
+        prior: of the body segment parameters, for the simultaneous estimate; the literature's if None.
+        attached: what the person wore or carried in all gait trials.
+
+    Raises:
+        KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
+    """
+    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached)
+    return estimate(ready if prior is None else replace(ready, prior=prior), progress)
+
+
+@one_blas_thread
+def estimate_bsp_of_model(
+    subject: Subject,
+    model: OsimModel,
+    inputs: Sequence[TrialInput],
+    settings: Settings | None = None,
+    calibrate: bool = False,
+    progress: Progress = lambda stage, share: None,
+    attached: Sequence[Attached] = (),
+) -> Fit:
+    """Body segment parameters of a person whose scaled OpenSim model is known, by the simultaneous estimate.
+
+    Args:
+        subject: mass may be None where a recording carries it.
+        model: as `kinertia.io.osim.reader.read_osim` reads it.
+        inputs: the trials.
+        settings: defaults if None.
+        calibrate: let markers and joint centres move; else they stay where the model has them.
+        progress: called as the work goes on.
+        attached: what the person wore or carried in all trials.
+
+    Raises:
+        KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
+    """
+    from kinertia.workflow.prepare_osim import prepare_osim
+
+    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached)
+    return estimate(ready, progress)
+
+
+@one_blas_thread
+def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) -> Fit:
+    """Body segment parameters of a prepared person: the last step of `estimate_bsp`, with the settings of the others.
+
+    Args:
+        ready: as `prepare` or `prepare_osim` makes it.
+        progress: called as the work goes on.
+
+    Raises:
+        KinertiaError: the trials contradict each other, or the scale.
+    """
+    settings, ready = ready.settings, with_attached(ready)
+    estimator = _two_level if settings.method == "two-level" else _simultaneous
+    outcome = estimator(ready, settings, time.perf_counter(), progress)
+    prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
+    warnings = (
+        *ready.warnings,
+        *turning_warnings(ready.skeleton, [trial.kinematics for trial in outcome.trials]),
+        *outcome.warnings,
+        *([] if outcome.posterior is None else not_found_warnings(ready.attached, outcome.bsp, outcome.posterior.sd)),
+        *_mirrored_free_moments(outcome),
+        *force_warnings(
+            ready.carried,
+            ready.literature,
+            outcome.trials,
+            ready.skeleton,
+            None if outcome.posterior is None else outcome.posterior.calibration,
+        ),
+        *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
+    )
+    return Fit(
+        subject=ready.subject,
+        settings=settings,
+        skeleton=outcome.skeleton,
+        literature=ready.literature,
+        estimate=outcome.bsp,
+        trials=outcome.trials,
+        converged=outcome.converged,
+        posterior=outcome.posterior,
+        warnings=tuple(dict.fromkeys(warnings)),
+        notes=(
+            *ready.notes,
+            *_force_notes(outcome.trials, settings),
+            *outcome.notes,
+            *_turn_notes(outcome.posterior, ready),
+            *_movement_notes(ready),
+        ),
+        file=ready.file,
+        corrections=outcome.corrections,
+    )
+
+
+def _mirrored_free_moments(outcome: _Outcome) -> list[str]:
+    """What is left of free moments once plates and signs that are wrong have been named."""
+    if outcome.posterior is None:
+        return []
+    return list(filter(None, [mirrored_free_moments_warning(outcome.posterior.calibration)]))
+
+
+def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
+    """Per trial, which ground reactions the joint moments are from."""
+    return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
+
+
+def _turn_notes(posterior: Posterior | None, ready: Prepared) -> list[str]:
+    """Turned plates that these trials would not show."""
+    note = "" if posterior is None else unseen_turn_note(posterior.instruments, ready.uncertainty.instruments)
+    return [note] if note else []
+
+
+def _movement_notes(ready: Prepared) -> list[str]:
+    """What the trials lack that would tell more."""
+    labels: dict[str | None, list[str]] = {}
+    for marker in ready.skeleton.markers:
+        labels.setdefault(segment_of(marker.segment), []).append(marker.label)
+    pelvis, torso = (labels.get(name, []) for name in ("pelvis", "torso"))
+    lacking = missing_movements(TellingMovements.of(k.trial.markers, pelvis, torso) for k in ready.kinematics)
+    return [] if lacking is None else [lacking]
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """What an estimator makes of a prepared person."""
+
+    skeleton: Skeleton
+    bsp: BodySegmentParameters
+    trials: tuple[TrialFit, ...]
+    converged: bool
+    posterior: Posterior | None
+    warnings: tuple[str, ...]
+    corrections: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+    cut = [_stretches(k) for k in ready.kinematics]
+    result = estimate_two_level(
+        ready.skeleton,
+        ready.literature,
+        [part for parts in cut for part in parts],
+        symmetric=settings.symmetry,
+        progress=lambda share: progress("estimate", share),
+    )
+    motions = iter(result.motions)
+    estimates = []
+    for k, parts in zip(ready.kinematics, cut, strict=True):
+        smoothed = ground_reactions(k, k.cutoff_hz, k.cutoff_hz)
+        motion = joined([next(motions) for _ in parts])
+        estimates.append(_Estimated(ready.skeleton, motion, None, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
+    trials = _trial_fits(ready, result.bsp, estimates, started)
+    warnings = (*free_moment_sign_warnings(trials), *two_level_warnings(result))
+    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, warnings)
+
+
+def named_by_source(ready: Prepared) -> ModelUncertainty:
+    """The uncertainty with the source of what the estimate leans on: the prior, where more is known than the start."""
+    expected = ready.uncertainty.whole(ready.prior.mean).table()
+    known = not np.array_equal(expected, ready.literature.table())
+    return replace(ready.uncertainty, source="the prior") if known else ready.uncertainty
+
+
+def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+    progress("estimate", 0.0)
+    bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
+
+    def fit(one: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
+        return fit_simultaneous(
+            one.skeleton,
+            one.prior,
+            one.kinematics,
+            bandwidths,
+            named_by_source(one),
+            lambda share: progress("estimate", share),
+            otherwise,
+        )
+
+    signed = with_likelier_sign(ready, fit)
+    fitted, ready, sign = signed.fitted, signed.ready, signed.sign
+    result = fitted.result
+    parts = (
+        fitted.skeletons,
+        fitted.motions,
+        fitted.courses,
+        bandwidths,
+        fitted.foot_loads,
+        result.reactions,
+        result.curve_deviations,
+    )
+    estimates = [
+        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), sd)
+        for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
+    ]
+    trials = _trial_fits(ready, fitted.bsp, estimates, started)
+    said = ([], []) if sign is None else (list(filter(None, [sign.correction])), list(filter(None, [sign.note])))
+    corrections, notes = (*said[0], *fitted.corrections), tuple(said[1])
+    outcome = fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior
+    return _Outcome(*outcome, fitted.warnings, corrections, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimated:
+    """One trial as estimated.
+
+    Attributes:
+        skeleton: with the markers where they are in it.
+        motion: in the measured frames.
+        course: (f, c) coordinates, as in `TrialFit`.
+        motion_hz: bandwidth of the motion.
+        foot_loads: (w, 2, 6) of the motion's bandwidth.
+        reactions, before: for the joint moments after and before the estimate.
+        deviations: of the curves, or None.
+    """
+
+    skeleton: Skeleton
+    motion: Motion
+    course: np.ndarray | None
+    motion_hz: float
+    foot_loads: np.ndarray
+    reactions: GroundReactions
+    before: GroundReactions
+    deviations: CurveDeviations | None
+
+
+def _trial_fits(
+    ready: Prepared, bsp: BodySegmentParameters, estimates: Sequence[_Estimated], started: float
+) -> tuple[TrialFit, ...]:
+    """Every trial before and after."""
+    spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
+    rows = zip(ready.kinematics, ready.seconds, estimates, strict=True)
+    trials = []
+    for k, seconds, after in rows:
+        timing = {**seconds, "estimate": spent * len(k.time)}
+        timing["total"] = sum(timing.values())
+        trials.append(_trial_fit(ready.skeleton, ready.literature, k, bsp, after, timing))
+    return tuple(trials)
+
+
+def _trial_fit(
+    before: Skeleton,
+    literature: BodySegmentParameters,
+    k: Kinematics,
+    bsp: BodySegmentParameters,
+    after: _Estimated,
+    seconds: Mapping[str, float],
+) -> TrialFit:
+    wrench = k.foot_loads.sum(axis=1)
+    corrected = joined([correct_pelvis(before, literature, part) for part in _stretches(k)])
+    stages = {
+        "literature": (before, literature, k.motion),
+        "corrected": (before, literature, corrected),
+    }
+    measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
+    motion = _as_opensim(k, after)
+    narrow = {name: residual(*stage, wrench) for name, stage in stages.items()}
+    narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
+    full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
+    full["estimate"] = residual(after.skeleton, bsp, motion, delivered.sum(axis=1))
+    return TrialFit(
+        kinematics=k,
+        skeleton=after.skeleton,
+        motion=motion,
+        course=after.course,
+        motion_hz=after.motion_hz,
+        reactions=after.reactions,
+        residuals=narrow,
+        full_residuals=full,
+        joint_loads={
+            "literature": inverse_dynamics(before, literature, k.motion, measured),
+            "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
+        },
+        deviations=after.deviations,
+        marker_errors_m={
+            "ik": _of_worn(k, k.ik.errors_m[k.frames]),
+            "final": _marker_errors(after.skeleton, k, after.motion),
+        },
+        seconds=seconds,
+    )
+
+
+def _as_opensim(k: Kinematics, estimated: _Estimated) -> Motion:
+    """The motion that OpenSim's tools read from a file of the estimated coordinates, in the measured frames."""
+    if estimated.course is None:
+        return joined([_interpolated(k.time[part], estimated.motion.q[part]) for part in k.stretches])
+    return _interpolated(k.course_time, estimated.course).cut(k.frames - k.frames[0])
+
+
+def _interpolated(time: np.ndarray, q: np.ndarray) -> Motion:
+    spline = interpolate(time, q)
+    return Motion(*(spline(time, order) for order in range(3)))
+
+
+def _stretches(k: Kinematics) -> list[Window]:
+    """The measured stretches of a trial, in parts over which the pelvis can be corrected."""
+    wrench = k.foot_loads.sum(axis=1)
+    return [part for own in k.stretches for part in stretches(Window(k.time[own], k.motion.cut(own), wrench[own]))]
+
+
+def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -> np.ndarray:
+    labels = kinematics.ik.labels
+    used = skeleton.with_markers([m for m in skeleton.markers if m.label in labels])
+    modelled = used.marker_positions(used.pose(motion.q))
+    measured = kinematics.trial.markers.select(used.labels).positions[kinematics.frames]
+    result: np.ndarray = np.linalg.norm(measured - modelled, axis=-1)
+    return _of_worn(kinematics, result)
+
+
+def _of_worn(k: Kinematics, errors_m: np.ndarray) -> np.ndarray:
+    """Marker errors (w, m) without those of a trunk that no marker shows."""
+    virtual = np.array([label in {marker.label for marker in VIRTUAL_TRUNK} for label in k.ik.labels])
+    return np.where(virtual, np.nan, errors_m)

@@ -1,0 +1,152 @@
+"""From a subject file to the recordings that it names, to what an estimator needs, and to a `Fit`.
+
+What only some subject files name is imported where it is read: all of it together takes as long as reading a trial.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinertia.errors import PriorError, SessionError, SettingsError
+from kinertia.estimation.prepared import Prepared, Progress
+from kinertia.estimation.result import Fit
+from kinertia.io.person_recordings import read_inputs, read_trials
+from kinertia.io.provenance import command_line, recordings
+from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
+from kinertia.workflow.attached import with_attached
+from kinertia.workflow.estimate import estimate
+from kinertia.workflow.prepare import prepare
+
+if TYPE_CHECKING:
+    from kinertia.estimation.learnt_prior import LearntPrior
+    from kinertia.io.measures_file import BodyMeasures
+    from kinertia.io.session_file import PersonInstruments
+
+
+def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Prepared:
+    """All that an estimator needs of the person in a subject file: everything read, calibrated, solved and smoothed.
+
+    Args:
+        subject: the file, or what `read_subject` made of it.
+        progress: called as the work goes on.
+
+    Raises:
+        KinertiaError: a file is missing or broken, or something in it cannot be used.
+    """
+    wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
+    known = wanted.instruments
+    _expect_no_mirrored_prosthesis(wanted)
+    session = _session(wanted)
+    measures = _measures(wanted)
+    ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted, measures))
+    if known.model_copy(update={"date": None}) == InstrumentsFiles():
+        return ready
+    if wanted.settings.method == "two-level":
+        return replace(
+            ready, notes=(*ready.notes, "[instruments] is not used: two-level takes plates and clock as exact")
+        )
+    from kinertia.workflow.session import with_instruments
+
+    return with_instruments(ready, known, session, recordings(wanted))
+
+
+def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
+    names = [name for name, segment in wanted.segments.items() if segment.prosthesis]
+    if names and wanted.settings.method == "two-level" and wanted.settings.symmetry:
+        raise SettingsError(
+            f"{', '.join(names)}: a prosthesis is no mirror image of the other side, as two-level with symmetry = true "
+            "has it; use the default method, or symmetry = false under [settings]"
+        )
+
+
+def _session(wanted: SubjectFile) -> tuple[PersonInstruments, ...]:
+    """What is known of the instruments from the others of their session, whose plates this person's are."""
+    if wanted.instruments.session is None:
+        return ()
+    from kinertia.io.session_file import read_session
+
+    session = read_session(wanted.instruments.session)
+    if session:
+        check_plates(wanted)
+    return session
+
+
+def _measures(wanted: SubjectFile) -> BodyMeasures | None:
+    """The sheet of girths and lengths, read before anything is computed."""
+    if wanted.prior.measures is None:
+        return None
+    from kinertia.io.measures_file import read_measures
+    from kinertia.model.stadium_body import expect_yeadon
+
+    expect_yeadon()
+    return read_measures(wanted.prior.measures)
+
+
+def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasures | None) -> Prepared:
+    if wanted.prior == PriorFiles() and not wanted.segments:
+        return ready
+    if wanted.settings.method == "two-level":
+        return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
+    from kinertia.io.bsp_file import read_bsp
+    from kinertia.workflow.known_body import with_known_body
+
+    earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
+    group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
+    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group, measures)
+
+
+def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
+    """What was learnt of the person's group, unless the person was in it."""
+    from kinertia.estimation.learnt_prior import LearntPrior
+    from kinertia.io.population_file import read_population
+
+    file = read_population(path)
+    if set(recordings(wanted)) & set(file.files):
+        raise PriorError(
+            f"{path.name} was learnt from these trials, too, which would count twice; write one for this person: "
+            f"kinertia population ... {command_line(['--without', wanted.subject.name])}"
+        )
+    return LearntPrior.from_file(file)
+
+
+def check_plates(wanted: SubjectFile) -> None:
+    """The plates of this person are those of the session, by their names.
+
+    Raises:
+        SessionError: they are columns of force files, and nobody has said that those are plates.
+    """
+    files = [trial.forces for trial in wanted.trials if trial.forces is not None]
+    if files and not wanted.instruments.same_plates:
+        raise SessionError(
+            f"{files[0].name}: columns of force files need not be plates (some laboratories sort steps into them, a "
+            "column for each foot); if the same columns are the same plate in all files of the session, say so in the "
+            "subject file: same_plates = true under [instruments]"
+        )
+
+
+def _prepared(wanted: SubjectFile, progress: Progress) -> Prepared:
+    if wanted.model.osim is not None:
+        from kinertia.io.osim.reader import read_osim
+        from kinertia.workflow.prepare_osim import prepare_osim
+
+        model, trials = read_osim(wanted.model.osim), read_trials(wanted, progress)
+        calibrate, attached = wanted.model.calibrate, wanted.attached
+        return prepare_osim(wanted.subject, model, trials, wanted.settings, calibrate, progress, attached)
+    static, inputs, marker_set = read_inputs(wanted, progress)
+    return prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress, wanted.attached)
+
+
+def fit_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:
+    """Body segment parameters of the person in a subject file: what `kinertia fit` does, in one call.
+
+    Args:
+        subject: the file, or what `read_subject` made of it.
+        progress: called as the work goes on, with a stage's name and the share of it that is done.
+
+    Raises:
+        KinertiaError: a file is missing or broken, or something in it cannot be used.
+    """
+    wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
+    return estimate(prepare_subject(wanted, progress), progress)

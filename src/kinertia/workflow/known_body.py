@@ -1,0 +1,220 @@
+"""What is known of this person's body besides the tables: measured segments, and the estimate of an earlier session.
+
+An earlier estimate takes the place of the literature's values and deviations; correlations stay the literature's, for
+a table of deviations has none. Measured parameters are then added as what they are, measurements with errors of their
+own: the mean moves towards them by how well each is known, and what goes with them (the other side, the trunk that a
+thigh is cut from) moves along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.errors import PriorError
+from kinertia.estimation.body_measures import with_measures
+from kinertia.estimation.carried_mass import body_sd_kg
+from kinertia.estimation.gaussian_update import updated
+from kinertia.estimation.input_checks import known as known_value
+from kinertia.estimation.learnt_prior import LearntPrior
+from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.prior import BspPrior, literature_prior, with_symmetry
+from kinertia.io.bsp_file import BspTable
+from kinertia.io.measures_file import BodyMeasures
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.measures import measures as all_measures
+from kinertia.settings import Attached, KnownSegment, PriorSettings
+from kinertia.workflow.attached import with_attached
+
+_UNLIKE_SD = 3.0
+"""Deviations from the tables beyond which the user is asked to look again."""
+_PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
+"""Relative deviation of a prosthesis' mass, and the factor on the tables' other deviations."""
+_KEPT_SHARE = 1e-3
+"""Deviation of a mass that is kept, over its prior's."""
+
+
+def with_known_body(
+    ready: Prepared,
+    settings: PriorSettings,
+    earlier: BspTable | None,
+    segments: Mapping[str, KnownSegment],
+    group: LearntPrior | None = None,
+    measures: BodyMeasures | None = None,
+) -> Prepared:
+    """A prepared person of whom more is known than mass, height and sex.
+
+    Args:
+        ready: with the literature's prior.
+        settings: of the prior.
+        earlier: an estimate with deviations, in place of the literature's.
+        segments: measured parameters by segment.
+        group: what was learnt of the person's group, in place of the literature's.
+        measures: girths and lengths of the person.
+
+    Raises:
+        PriorError: both an earlier estimate and a group, a segment that the model has not, either of another model, or
+            measures that cannot be used.
+    """
+    body = len(ready.prior.mean.segments)
+    ready = with_attached(*_leaning_on(ready, settings, earlier, segments, group))
+    prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
+    if measures is not None:
+        prior = _with_measures(ready, prior, segments, measures, notes, warnings)
+    measured = _measured(prior, segments)
+    for (row, column), (value, sd) in measured.items():
+        k = 10 * row + column
+        name = f"{prior.mean.segments[row]} {PARAMETERS[column]}"
+        expected, own = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
+        away = (value - expected) / np.hypot(own, sd)
+        source = segments[prior.mean.segments[row]].source or "no source given"
+        notes.append(f"known: {name} {value:.4g} +- {sd:.2g} ({source}); the prior says {expected:.4g} +- {own:.2g}")
+        if abs(away) > _UNLIKE_SD:
+            warnings.append(
+                f"{name}, given as {value:.4g} +- {sd:.2g}, is {abs(away):.1f} deviations from what the prior expects, "
+                f"{expected:.4g} +- {own:.2g}; is its unit right, and the segment cut at the joint?"
+            )
+    if settings.masses_kept:
+        kept = _kept(prior, body, ready.attached)
+        measured = {**kept, **measured}
+        notes.append("prior: the masses are kept")
+    return replace(ready, prior=_given(prior, measured), notes=tuple(notes), warnings=tuple(warnings))
+
+
+def _leaning_on(
+    ready: Prepared,
+    settings: PriorSettings,
+    earlier: BspTable | None,
+    segments: Mapping[str, KnownSegment],
+    group: LearntPrior | None,
+) -> tuple[Prepared, Collection[str]]:
+    """The person with the prior that measurements then move, and segments whose masses are no shares of the body's."""
+    prior, notes = ready.prior, list(ready.notes)
+    if group is not None:
+        if earlier is not None:
+            raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
+        if ready.file is not None:
+            raise PriorError(
+                "[prior] population is learnt of the built-in model's segments; OpenSim models have others"
+            )
+        prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
+        notes.append(f"prior: learnt from {group.people} people in place of the literature's")
+    if earlier is not None:
+        prior = _from_earlier(prior, earlier)
+        notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")
+    if settings.sides_correlation is not None:
+        covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
+        prior = replace(prior, covariance=covariance)
+    artificial = [name for name, known in segments.items() if known.prosthesis]
+    for name in artificial:
+        prior = with_prosthesis(prior, name)
+        notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
+    by_itself = artificial if earlier is None else prior.mean.segments
+    return replace(ready, prior=prior, notes=tuple(notes)), by_itself
+
+
+def _kept(prior: BspPrior, body: int, attached: Sequence[Attached]) -> dict[tuple[int, int], tuple[float, float]]:
+    """Masses of the body's segments, the first ones, and their deviations when they are kept; as `_measured`."""
+    if unknown := [one.name for one in attached if one.mass_kg is None and one.on_scale]:
+        raise PriorError(
+            f"masses_kept = true under [prior], but {unknown[0]}, of unknown mass, was weighed with the person, so "
+            "that the body's masses are not known either; weigh one of the two alone, or leave masses_kept out"
+        )
+    masses = zip(prior.mean.mass_kg[:body].tolist(), prior.sd[:body, 0].tolist(), strict=True)
+    return {(k, 0): (mass, _KEPT_SHARE * own) for k, (mass, own) in enumerate(masses)}
+
+
+def _with_measures(
+    ready: Prepared,
+    prior: BspPrior,
+    segments: Mapping[str, KnownSegment],
+    measures: BodyMeasures,
+    notes: list[str],
+    warnings: list[str],
+) -> BspPrior:
+    """The prior that girths and lengths have moved; adds to notes and warnings."""
+    if ready.file is not None:
+        raise PriorError("[prior] measures are of the built-in model's segments, which OpenSim models cut elsewhere")
+    body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
+    artificial = [name for name, known in segments.items() if known.prosthesis]
+    body_sd = body_sd_kg(known_value(ready.subject.mass_kg), ready.attached)
+    prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial, body_sd)
+    total = f"{body.total_kg:.1f} +- {body.total_sd_kg:.1f} kg"
+    notes.append(
+        f"girths and lengths: {len(measures.values)} of {len(all_measures())} from {measures.name}, the others as "
+        f"expected of this mass, height and them; Yeadon's body of these has {total}, the person {body_kg:.1f} kg"
+    )
+    warnings += [f"{measures.name}: {doubt}" for doubt in body.doubts]
+    if abs(body.total_kg - body_kg) > _UNLIKE_SD * np.hypot(body.total_sd_kg, body_sd):
+        warnings.append(
+            f"{measures.name}: Yeadon's body of these girths and lengths has {total}, the person {body_kg:.1f} kg; are "
+            "all of them in cm, and of this person?"
+        )
+    return prior
+
+
+def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
+    """The prior with the mean and the deviations of an earlier estimate; of what it held, the prior's own."""
+    names = prior.mean.segments
+    if missing := [name for name in names if name not in earlier.segments]:
+        raise PriorError(
+            f"{earlier.name} has no {', '.join(missing)}; it has {', '.join(earlier.segments)}: was it estimated with "
+            "another model?"
+        )
+    rows = [earlier.segments.index(name) for name in names]
+    held = ~earlier.sd[rows].any(axis=1, keepdims=True)
+    own = prior.sd.ravel()
+    sd = np.where(held, prior.sd, earlier.sd[rows]).ravel()
+    return replace(
+        prior,
+        mean=BodySegmentParameters.from_table(names, np.where(held, prior.mean.table(), earlier.estimate[rows])),
+        covariance=prior.covariance / np.outer(own, own) * np.outer(sd, sd),
+    )
+
+
+def with_prosthesis(prior: BspPrior, segment: str) -> BspPrior:
+    """The prior of a segment that is none of the body's: wide, and independent of all others.
+
+    The side of a below-knee prosthesis is often some 2 kg lighter than the other (Smith & Martin 2011, J Prosthet
+    Orthot 23:114), which is 40 % of shank and foot; its centre of mass is further up by an amount for which there are
+    no numbers.
+    """
+    row = _row(prior, segment)
+    rows = slice(10 * row, 10 * row + 10)
+    factor = np.full(10, _PROSTHESIS_SPREAD)
+    factor[0] = max(_PROSTHESIS_MASS_SD * prior.mean.mass_kg[row] / prior.sd[row, 0], 1.0)
+    covariance = prior.covariance.copy()
+    own = covariance[rows, rows] * np.outer(factor, factor)
+    covariance[rows, :] = covariance[:, rows] = 0.0
+    covariance[rows, rows] = own
+    return replace(prior, covariance=covariance)
+
+
+def _row(prior: BspPrior, segment: str) -> int:
+    if segment not in prior.mean.segments:
+        raise PriorError(f"[segment.{segment}]: the model has no such segment; it has {', '.join(prior.mean.segments)}")
+    return prior.mean.segments.index(segment)
+
+
+def _measured(prior: BspPrior, segments: Mapping[str, KnownSegment]) -> dict[tuple[int, int], tuple[float, float]]:
+    """Value and deviation, SI, by row and column of the table."""
+    result = {}
+    for name, known in segments.items():
+        row = _row(prior, name)
+        for parameter, (value, sd) in known.parameters().items():
+            result[row, PARAMETERS.index(parameter)] = value, sd
+    return result
+
+
+def _given(prior: BspPrior, measured: Mapping[tuple[int, int], tuple[float, float]]) -> BspPrior:
+    """The prior once these parameters were measured."""
+    if not measured:
+        return prior
+    at = [10 * row + column for row, column in measured]
+    values, sd = np.array(list(measured.values())).T
+    seen = np.eye(prior.mean.table().size)[at]
+    table, covariance = updated(prior.mean.table().ravel(), prior.covariance, seen, values, np.diag(np.square(sd)))
+    mean = BodySegmentParameters.from_table(prior.mean.segments, table)
+    return replace(prior, mean=mean, covariance=covariance)

@@ -1,0 +1,141 @@
+"""Plates and clock of a session: what the trials of several people say of them, and what a fit makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from kinertia.errors import SessionError
+from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.io.session_file import PersonInstruments
+from kinertia.settings import Instruments
+
+InstrumentValues: TypeAlias = dict[str, dict[str, tuple[float, float, str]]]
+_APART_SD = 3.0
+
+
+@dataclass(frozen=True)
+class SessionInstruments:
+    """What all trials of a session together say.
+
+    Attributes:
+        people: what each person's trials say.
+        values: per instrument, per unknown its value, posterior deviation and unit, SI.
+        contradictions: one sentence for each unknown of which a person says what the others do not.
+    """
+
+    people: tuple[PersonInstruments, ...]
+    values: InstrumentValues
+    contradictions: tuple[str, ...] = ()
+
+
+def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
+    """What a fit says of plates and clock, for others of the session.
+
+    Args:
+        fit: of the simultaneous estimate.
+        files: SHA-256 of every file that it is from.
+
+    Raises:
+        SessionError: it is of the two-level estimate, which takes instruments as exact.
+    """
+    if fit.posterior is None:
+        problem = 'the two-level estimate takes plates and clock as exact; use method = "simultaneous"'
+        raise SessionError(f"{fit.subject.name}: {problem}")
+    shown = fit.posterior.instruments
+    return PersonInstruments(
+        name=fit.subject.name,
+        files=tuple(files),
+        plates=shown.plates,
+        information=tuple(map(tuple, shown.information.tolist())),
+        right=tuple(shown.right.tolist()),
+    )
+
+
+def session_instruments(people: Sequence[PersonInstruments], stated: Instruments) -> SessionInstruments:
+    """All that the people of a session say together, under what the laboratory states."""
+    apart = []
+    # of two, one contradicts the other
+    for person in people if len(people) > 2 else people[: len(people) - 1]:
+        rest = _values([other for other in people if other is not person], stated)
+        for instrument, unknowns in _values([person], stated).items():
+            for unknown, (value, sd, unit) in unknowns.items():
+                other, other_sd, _ = rest.get(instrument, {}).get(unknown, (value, sd, unit))
+                if abs(value - other) > _APART_SD * np.hypot(sd, other_sd):
+                    factor, shown = SHOWN_UNIT[unit]
+                    apart.append(
+                        f"{instrument}: {unknown}: {value * factor:+.1f} {shown} by the trials of {person.name}, "
+                        f"{other * factor:+.1f} by those of the others; were all measured with the same instruments?"
+                    )
+    return SessionInstruments(tuple(people), _values(people, stated), tuple(apart))
+
+
+def _values(people: Sequence[PersonInstruments], stated: Instruments) -> InstrumentValues:
+    plates = tuple(dict.fromkeys(name for person in people for name in person.plates))
+    prior = InstrumentPrior.stated(stated, [_information(person) for person in people])
+    shown, unknowns = prior.of_session(plates), prior.of_unknowns(plates)
+    before = GaussianPrior.of(unknowns)
+    covariance = np.linalg.inv(shown.information + before.precision)
+    after = before.updated(unknowns, covariance @ (shown.right + before.pull), covariance)
+    covariance = np.linalg.inv(shown.information + after.precision)
+    mean = covariance @ (shown.right + after.pull)
+    # plate and floor together are what a foot stands on
+    to_plates, each = plates_with_floor(len(plates)), len(PLATE_ERRORS)
+    values = to_plates @ mean[:-1]
+    sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
+    units = list(PLATE_UNKNOWNS.items())
+    by_instrument = {
+        name: {unknown: (float(values[i + j]), float(sd[i + j]), unit) for j, (unknown, unit) in enumerate(units)}
+        for i, name in zip(range(0, len(values), each), plates, strict=True)
+    }
+    by_instrument["plates"] = {"turned about the vertical": (float(values[-1]), float(sd[-1]), "rad")}
+    by_instrument["clock"] = {"late": (float(mean[-1]), float(np.sqrt(covariance[-1, -1])), "s")}
+    return by_instrument
+
+
+def with_instruments(
+    ready: Prepared, stated: Instruments, session: Sequence[PersonInstruments] = (), files: Sequence[str] = ()
+) -> Prepared:
+    """A prepared person whose instruments are known as the laboratory states it, and as others have shown.
+
+    Args:
+        ready: with the literature's deviations.
+        stated: by the laboratory.
+        session: what people measured with the same instruments say.
+        files: SHA-256 of this person's files: who shares one of them is the same person, and says nothing new.
+
+    Raises:
+        SessionError: none of the others stood on any of this person's plates.
+    """
+    others = [person for person in session if not set(person.files) & set(files)]
+    own = {plate for k in ready.kinematics for plate in k.trial.loads.plates}
+    theirs = {name for person in others for name in person.plates}
+    if others and not own & theirs:
+        raise SessionError(
+            f"none of the session's plates ({', '.join(sorted(theirs))}) is among this person's "
+            f"({', '.join(sorted(own))}); plates are told by their names"
+        )
+    prior = InstrumentPrior.stated(stated, [_information(person) for person in others])
+    notes = ready.notes
+    if session:
+        left_out = [person.name for person in session if person not in others]
+        of = f"plates and clock are known from {_listed([p.name for p in others])}" if others else "nothing of others"
+        own_trials = f"; what {_listed(left_out)} said is left out: the same files are in this fit" if left_out else ""
+        notes = (*notes, f"session: {of}{own_trials}")
+    return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), notes=notes)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{len(names)} {'person' if len(names) == 1 else 'people'} ({', '.join(names)})"
+
+
+def _information(person: PersonInstruments) -> InstrumentInformation:
+    return InstrumentInformation(person.plates, np.array(person.information), np.array(person.right))

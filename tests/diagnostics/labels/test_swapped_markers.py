@@ -1,0 +1,141 @@
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generic_static import generic_model, smooth_motion
+from kinertia.diagnostics.labels.swapped_markers import check_labels
+from kinertia.errors import TrialError
+from kinertia.estimation.calibration import sampled
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.model.gait27 import ARM_ROTATIONS, build_gait27
+from kinertia.trial.data import Markers
+from recordings import is_here
+
+SUBJECT4 = Path(__file__).parents[1] / "subject4.toml"
+TRIALS = {
+    "synthetic": ("synthetic/static.trc", "synthetic/walk.trc", 1.803),
+    "synthetic_c3d": ("synthetic/static.c3d", "synthetic/walk.c3d", 1.803),
+    "synthetic_run": ("synthetic/static.trc", "synthetic/run.trc", 1.803),
+    "synthetic_squats": ("synthetic/static.trc", "synthetic/squats.trc", 1.803),
+    "gait2354": ("gait2354/subject01_static.trc", "gait2354/subject01_walk1.trc", 1.803),
+    "rajagopal": ("rajagopal_walk/static_walk_1.trc", "rajagopal_walk/motion_capture_walk.trc", 1.83),
+    "pig_a": ("pig_c3d/subject_a_static.c3d", "pig_c3d/subject_a_walk.c3d", 1.61),
+    "pig_b": ("pig_c3d/subject_b_static.c3d", "pig_c3d/subject_b_walk.c3d", 1.505),
+    "subject4_walk1": ("subject4/static1.trc", "subject4/walking1.trc", 1.7),
+    "subject4_walk2": ("subject4/static1.trc", "subject4/walking2.trc", 1.7),
+    "subject4_squats": ("subject4/static1.trc", "subject4/squats1.trc", 1.7),
+}
+WALKS = {name: trial for name, trial in TRIALS.items() if is_here(trial[:2])}
+CLINIC = [
+    ("R.Heel", "L.Heel"),
+    ("R.ASIS", "L.ASIS"),
+    ("R.Shank.Upper", "R.Shank.Front"),
+    ("R.Shank.Upper", "L.Shank.Upper"),
+    ("Sternum", "R.Acromium"),
+    ("R.Heel", "R.Toe.Tip"),
+]
+PLUG_IN_GAIT = [
+    *[("RKNE", "LKNE"), ("RASI", "LASI"), ("RHEE", "RTOE"), ("C7", "CLAV"), ("RTHI", "RKNE")],
+    *[("RHEE", "LHEE"), ("RKNE", "RANK"), ("RPSI", "LPSI"), ("RTIB", "LTIB"), ("RELB", "LELB")],
+]
+SWAPS = {
+    "synthetic": CLINIC,
+    "synthetic_c3d": PLUG_IN_GAIT,
+    "synthetic_run": CLINIC,
+    "gait2354": CLINIC,
+    "rajagopal": [
+        ("R.ASIS", "L.ASIS"),
+        ("R.Knee", "R.Ankle"),
+        ("L.TH1", "L.TH3"),
+        ("R.SH1", "R.SH3"),
+        ("R.Clavicle", "L.Clavicle"),
+    ],
+    "pig_a": PLUG_IN_GAIT[:5],
+    "pig_b": PLUG_IN_GAIT[5:],
+    "subject4_walk1": [("r.ASIS", "L.ASIS"), ("r_sh3", "r_sh4"), ("R_Sternum", "L_Sternum")],
+}
+
+
+@pytest.fixture(scope="module")
+def walk(recording_of):
+    known = {}
+
+    def read(name):
+        if name not in known:
+            static_path, walk_path, height = WALKS[name]
+            static = recording_of(static_path)
+            labels = static.markers.labels
+            marker_set = read_marker_set(SUBJECT4) if name.startswith("subject4") else choose_marker_set(labels)
+            skeleton = build_gait27(static, marker_set, height, "male").skeleton.free(ARM_ROTATIONS)
+            known[name] = skeleton, sampled(recording_of(walk_path).markers)
+        return known[name]
+
+    return read
+
+
+def exchanged(markers: Markers, first: str, second: str) -> Markers:
+    order = [{first: second, second: first}.get(label, label) for label in markers.labels]
+    return Markers(markers.time, markers.labels, markers.select(order).positions)
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_sound_trials_raise_no_alarm(walk, name):
+    check_labels(*_arguments(walk, name))
+
+
+def _arguments(walk, name):
+    skeleton, markers = walk(name)
+    return skeleton, name, markers
+
+
+@pytest.mark.parametrize(
+    ("name", "pair"), [(name, pair) for name, pairs in SWAPS.items() if name in WALKS for pair in pairs]
+)
+def test_swapped_markers_are_named(walk, name, pair):
+    skeleton, markers = walk(name)
+    with pytest.raises(TrialError) as caught:
+        check_labels(skeleton, name, exchanged(markers, *pair))
+    assert set(re.findall(r"'([^']*)'", str(caught.value))) == {name, *pair}
+    assert "look swapped" in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def made():
+    skeleton = generic_model().skeleton
+    time, motion = smooth_motion(skeleton, n=20, rate_hz=10.0)
+    return skeleton, Markers(time, skeleton.labels, skeleton.marker_positions(skeleton.pose(motion.q)))
+
+
+def test_made_markers_pass_and_their_swaps_do_not(made):
+    skeleton, markers = made
+    check_labels(skeleton, "made", markers)
+    with pytest.raises(TrialError, match=r"trial 'made': the markers 'R\.Knee\.Lat' and 'L\.Knee\.Lat' look swapped"):
+        check_labels(skeleton, "made", exchanged(markers, "R.Knee.Lat", "L.Knee.Lat"))
+
+
+def test_another_unit_is_no_swap(made):
+    skeleton, markers = made
+    inches = Markers(markers.time, markers.labels, markers.positions / 0.0254 * 0.1)
+    with pytest.raises(TrialError, match=r"misses the markers by \d+ mm RMS.*check labels, units"):
+        check_labels(skeleton, "made", inches)
+
+
+def test_arms_never_shown_do_not_hinder(made):
+    skeleton, markers = made
+    arm = [m.label for m in skeleton.markers if m.segment in ("upper_arm_r", "forearm_r")]
+    bare = markers.select([label for label in markers.labels if label not in arm])
+    check_labels(skeleton, "bare", bare)
+    with pytest.raises(TrialError, match=r"'R\.Heel' and 'L\.Heel' look swapped"):
+        check_labels(skeleton, "bare", exchanged(bare, "L.Heel", "R.Heel"))
+
+
+def test_no_complete_frame_names_the_rarest_coordinates(made):
+    skeleton, markers = made
+    positions = markers.positions.copy()
+    for frames, segment in ((slice(0, 12), "foot_r"), (slice(8, 20), "forearm_l")):
+        columns = [i for i, m in enumerate(skeleton.markers) if m.segment == segment]
+        positions[frames, columns] = np.nan
+    with pytest.raises(TrialError, match=r"in none of the 20 frames.*ankle_angle_r"):
+        check_labels(skeleton, "made", Markers(markers.time, markers.labels, positions))

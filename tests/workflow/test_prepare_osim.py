@@ -1,0 +1,252 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.errors import OsimError, SubjectError, TrialError
+from kinertia.estimation.prior import MASS_SD, OTHER_MASS_SD
+from kinertia.io.osim.exporter import export_osim
+from kinertia.io.osim.reader import read_osim
+from kinertia.io.trc import read_trc
+from kinertia.model.centre_offsets import centre_offsets
+from kinertia.model.imported import OsimModel
+from kinertia.motion.inverse_kinematics import solve_ik
+from kinertia.settings import Settings, Subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.prepare_osim import at_mass, kind_of, parted, prepare_osim, with_centre_offsets
+from recordings import here
+from users_model import WITHOUT
+
+SUBJECT = Subject(name="A", mass_kg=72.6)
+
+
+MODELS = here(["synthetic/users.osim", "rajagopal_walk/scaled.osim"])
+
+
+@pytest.fixture(scope="module")
+def model(file_of) -> OsimModel:
+    return read_osim(file_of("synthetic/users.osim"))
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def other_model(request, file_of) -> OsimModel:
+    return read_osim(file_of(request.param))
+
+
+@pytest.fixture(scope="module")
+def walk(recording_of):
+    return recording_of(*(f"synthetic/walk{end}" for end in (".trc", "_grf.mot", "_grf.xml")))
+
+
+@pytest.fixture(scope="module")
+def prepared(model, walk):
+    return prepare_osim(SUBJECT, model, [TrialInput(walk)], Settings(), False)
+
+
+def without(recording, labels):
+    kept = [label for label in recording.markers.labels if label not in labels]
+    return replace(recording, markers=recording.markers.select(kept))
+
+
+def noted(notes, start: str) -> str:
+    (note,) = [note for note in notes if note.startswith(start)]
+    return note
+
+
+def test_what_no_marker_shows_is_locked_at_its_default_and_said(prepared, model):
+    assert prepared.skeleton.locked == {"mtp_angle_r": 0.0, "mtp_angle_l": 0.0}
+    assert "mtp_angle_r (0 deg), mtp_angle_l (0 deg)" in noted(prepared.notes, "no marker shows")
+
+
+def test_a_default_other_than_zero_is_kept(model, walk):
+    joints = tuple(
+        replace(joint, coordinates=tuple(replace(c, default=0.1) for c in joint.coordinates)) for joint in model.joints
+    )
+    ready = prepare_osim(SUBJECT, replace(model, joints=joints), [TrialInput(walk)], Settings(), False)
+    assert ready.skeleton.locked == {"mtp_angle_r": 0.1, "mtp_angle_l": 0.1}
+
+
+def test_markers_of_either_side_only_are_listed(prepared):
+    left_out = noted(prepared.notes, "walk: markers that the model does not have")
+    assert WITHOUT in left_out
+    absent = noted(prepared.notes, "walk: markers of the model that it does not have")
+    assert "R.Knee.Med" in absent
+
+
+def test_the_trial_is_not_turned_and_markers_stay(prepared, model, walk):
+    (kinematics,) = prepared.kinematics
+    assert kinematics.turned_deg == 0.0
+    np.testing.assert_array_equal(kinematics.trial.markers.positions, walk.markers.positions)
+    np.testing.assert_array_equal(prepared.skeleton.marker_locals, model.skeleton.marker_locals)
+    assert prepared.uncertainty.marker_sd_m is None
+    assert not prepared.uncertainty.centres
+
+
+def test_loads_act_on_the_heaviest_body_of_each_foot(prepared):
+    assert prepared.skeleton.feet == ("calcn_r", "calcn_l")
+
+
+def test_light_bodies_are_held_and_all_are_kept(prepared, model):
+    light = [f"{kind}_{side}" for side in "rl" for kind in ("patella", "talus", "toes")]
+    assert prepared.uncertainty.held.segments == (*light, "hand_r", "hand_l")
+    assert set(prepared.prior.mean.segments) | set(prepared.uncertainty.held.segments) == set(model.bsp.segments)
+    assert "talus_r (tibia_r), toes_r (calcn_r), patella_l (tibia_l)" in noted(
+        prepared.notes, "bodies that weigh less than 0.5 kg"
+    )
+    assert prepared.prior.mass_kg + prepared.uncertainty.held_kg == pytest.approx(72.6)
+
+
+def test_of_bodies_that_move_as_one_the_heaviest_is_estimated(other_model):
+    """Subtalar and toe joints are locked in this model, wrists too; a hand weighs 0.52 kg."""
+    prior, held = parted(other_model.skeleton, other_model.bsp)
+    assert {"talus_r", "toes_r", "hand_r", "patella_r"} <= set(held.segments)
+    assert {"calcn_r", "radius_r", "ulna_r", "femur_r"} <= set(prior.mean.segments)
+
+
+def test_prior_deviations_go_by_the_names_of_bodies(other_model):
+    prior, _ = parted(other_model.skeleton, other_model.bsp)
+    share = dict(zip(prior.mean.segments, prior.sd[:, 0] / prior.mean.mass_kg, strict=True))
+    for body, kind in (("femur_l", "thigh"), ("calcn_r", "foot"), ("ulna_r", "forearm"), ("torso", "torso")):
+        assert kind_of(body) == kind
+        assert share[body] == pytest.approx(MASS_SD[kind])
+    renamed = tuple(name.replace("torso", "backpack") for name in other_model.bsp.segments)
+    strange = replace(other_model.bsp, segments=renamed)
+    skeleton = replace(
+        other_model.skeleton,
+        joints=tuple(
+            replace(j, parent=j.parent.replace("torso", "backpack"), child=j.child.replace("torso", "backpack"))
+            for j in other_model.skeleton.joints
+        ),
+        markers=(),
+    )
+    prior, _ = parted(skeleton, strange)
+    row = prior.mean.segments.index("backpack")
+    assert prior.sd[row, 0] / prior.mean.mass_kg[row] == pytest.approx(OTHER_MASS_SD)
+
+
+def test_masses_are_those_of_the_person(model, walk):
+    scaled, factor = at_mass(model.bsp, 80.0)
+    assert factor == pytest.approx(80.0 / 72.6)
+    assert scaled.total_mass_kg == pytest.approx(80.0)
+    np.testing.assert_allclose(scaled.inertia_kgm2, model.bsp.inertia_kgm2 * factor)
+    np.testing.assert_array_equal(scaled.com_m, model.bsp.com_m)
+    ready = prepare_osim(SUBJECT.model_copy(update={"mass_kg": 75.0}), model, [TrialInput(walk)], Settings(), False)
+    assert "multiplied by 1.033" in noted(ready.notes, "the model weighs 72.6 kg, the person 75.0 kg")
+    assert ready.literature.total_mass_kg == pytest.approx(75.0)
+
+
+def test_calibration_moves_markers_and_frees_joint_centres(model, walk):
+    ready = prepare_osim(SUBJECT, model, [TrialInput(walk)], Settings(), True)
+    joints = [f"to_{body}" for body in ("femur_r", "femur_l", "torso", "humerus_r", "humerus_l")]
+    assert set(ready.uncertainty.centres) == {f"{j}/offset_{a}" for j in joints for a in "xyz"}
+    assert ready.kinematics[0].ik.marker_rms_m < 0.010
+    assert ready.uncertainty.marker_sd_m > 0
+
+
+def test_offsets_move_a_joint_along_its_parents_axes(other_model):
+    """The frames of the synthetic model's shoulders and hips are turned in their parents."""
+    names = dict(zip(other_model.skeleton.segments, (joint.name for joint in other_model.joints), strict=True))
+    shoulder, hip = names["humerus_r"], names["femur_l"]
+    skeleton = with_centre_offsets(other_model, other_model.skeleton)
+    frame = skeleton.joints[skeleton.segments.index("humerus_r")].rotation
+    assert np.allclose(frame, np.eye(3)) == (other_model.path.name != "users.osim")
+    shift = np.array([0.01, -0.02, 0.03])
+    moved = skeleton.lock({f"{shoulder}/offset_{axis}": v for axis, v in zip("xyz", shift, strict=True)})
+    q = np.random.default_rng(0).uniform(-0.5, 0.5, (3, len(skeleton.coordinates)))
+    before, after = skeleton.pose(q), moved.pose(q)
+    torso, arm = (skeleton.segments.index(name) for name in ("torso", "humerus_r"))
+    np.testing.assert_allclose(
+        after.translation[:, arm] - before.translation[:, arm], before.rotation[:, torso] @ shift
+    )
+    np.testing.assert_allclose(after.translation[:, torso], before.translation[:, torso])
+    np.testing.assert_allclose(centre_offsets(moved)[shoulder], shift)
+    np.testing.assert_array_equal(centre_offsets(moved)[hip], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("file", "trial"),
+    here(
+        [
+            ("synthetic/users.osim", "synthetic/walk.trc"),
+            ("subject4/addbiomechanics_scaled.osim", "subject4/squats1.trc"),
+        ]
+    ),
+)
+def test_arms_do_not_turn_over(file_of, file, trial):
+    """With the arm turned by half a turn and the elbow bent backwards, its markers fit nearly as well."""
+    skeleton = read_osim(file_of(file)).skeleton
+    ik = solve_ik(skeleton.lock({"mtp_angle_r": 0.0, "mtp_angle_l": 0.0}), read_trc(file_of(trial)))
+    elbows = ik.q[:, [ik.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
+    assert elbows.min() > 0.0
+    assert elbows.max() < 2.7
+    assert np.abs(np.diff(ik.q, axis=0)).max() < 0.2
+    assert ik.marker_rms_m < 0.011
+
+
+def test_a_model_without_markers(model, walk, tmp_path):
+    export_osim(tmp_path / "bare.osim", replace(model.skeleton, markers=()), model.bsp)
+    with pytest.raises(OsimError, match="no markers in it; scale the model") as error:
+        prepare_osim(SUBJECT, read_osim(tmp_path / "bare.osim"), [TrialInput(walk)], Settings(), False)
+    assert "bare.osim" in str(error.value)
+
+
+def test_a_model_without_feet(model, walk):
+    joints = tuple(j for j in model.skeleton.joints if not j.child.startswith(("talus", "calcn", "toes")))
+    markers = tuple(m for m in model.skeleton.markers if not m.segment.startswith("calcn"))
+    footless = replace(model, skeleton=replace(model.skeleton, joints=joints, markers=markers))
+    with pytest.raises(OsimError, match="no body of the right foot; expected one named calcn_r"):
+        prepare_osim(SUBJECT, footless, [TrialInput(walk)], Settings(), False)
+
+
+def test_a_trial_without_markers_of_a_foot(model, walk):
+    left = [m.label for m in model.skeleton.markers if m.segment == "calcn_l"]
+    with pytest.raises(TrialError, match="no marker of the left foot is in the file"):
+        prepare_osim(SUBJECT, model, [TrialInput(without(walk, left))], Settings(), False)
+
+
+def test_mass_is_needed_and_nothing_else(model, walk):
+    with pytest.raises(SubjectError, match="--mass"):
+        prepare_osim(Subject(name="A"), model, [TrialInput(walk)], Settings(), False)
+
+
+def test_somebody_old_is_warned_of_with_a_model_too(model, walk):
+    old = SUBJECT.model_copy(update={"age_years": 72.0})
+    warnings = prepare_osim(old, model, [TrialInput(walk)], Settings(), False).warnings
+    assert any(one.startswith("population: elderly (72 years)") for one in warnings)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0])
+def test_mass_without_inertia_is_refused(model, walk, factor):
+    """It ended in a matrix that is not positive definite."""
+    bsp = model.bsp
+    inertia = np.where((np.array(bsp.segments) == "femur_r")[:, None, None], factor, 1.0) * bsp.inertia_kgm2
+    bad = replace(model, bsp=replace(bsp, inertia_kgm2=inertia))
+    with pytest.raises(OsimError, match=r"inertia of zero or less for bodies that have mass: femur_r \([0-9.]+ kg\)"):
+        prepare_osim(SUBJECT, bad, [TrialInput(walk)], Settings(), False)
+
+
+def test_inertias_too_small_for_the_mass_are_said(model, walk, prepared):
+    assert not any("denser" in warning for warning in prepared.warnings)
+    small = replace(model, bsp=replace(model.bsp, inertia_kgm2=0.1 * model.bsp.inertia_kgm2))
+    warnings = prepare_osim(SUBJECT, small, [TrialInput(walk)], Settings(), False).warnings
+    assert any("users.osim: moments of inertia too small for the mass" in one for one in warnings)
+
+
+def test_joints_that_do_not_mirror_each_other_are_said(model, walk, prepared):
+    assert not any("mirror" in warning for warning in prepared.warnings)
+    joints = tuple(
+        replace(j, translation=j.translation + np.array([0.03, 0.0, 0.0])) if j.child == "talus_r" else j
+        for j in model.skeleton.joints
+    )
+    moved = replace(model, skeleton=replace(model.skeleton, joints=joints))
+    warnings = prepare_osim(SUBJECT, moved, [TrialInput(walk)], Settings(), False).warnings
+    (warning,) = [one for one in warnings if "mirror" in one]
+    assert warning.startswith("users.osim: left and right do not mirror each other in the places")
+    assert "talus_r and talus_l (30 mm)" in warning
+
+
+def test_markers_in_millimetres_are_refused(model, walk):
+    skeleton = model.skeleton.with_places(1000.0 * model.skeleton.marker_locals)
+    m = 1000.0 * np.linalg.norm(model.skeleton.marker_locals[model.skeleton.labels.index("Top.Head")])
+    with pytest.raises(OsimError, match=rf"users\.osim: the distance of marker 'Top\.Head' .* is {m:.0f} m; exp"):
+        prepare_osim(SUBJECT, replace(model, skeleton=skeleton), [TrialInput(walk)], Settings(), False)
