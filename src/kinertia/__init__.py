@@ -40,6 +40,13 @@ if TYPE_CHECKING:
     from kinertia.estimation.result import Fit as Fit
     from kinertia.estimation.result import TrialFit as TrialFit
     from kinertia.estimation.simultaneous.fit import Posterior as Posterior
+    from kinertia.findings.finding import Finding as Finding
+    from kinertia.findings.finding import Quantity as Quantity
+    from kinertia.findings.finding import Severity as Severity
+    from kinertia.findings.finding import Where as Where
+    from kinertia.findings.finding import finding as finding
+    from kinertia.findings.rule import Rule as Rule
+    from kinertia.findings.rule import rule as rule
     from kinertia.io.marker_set_file import choose_marker_set as choose_marker_set
     from kinertia.io.marker_set_file import read_marker_set as read_marker_set
     from kinertia.io.osim.reader import read_osim as read_osim
@@ -89,9 +96,12 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "errors": "FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
+    "findings.finding": "Finding Quantity Severity Where finding",
+    "findings.rule": "Rule rule",
     "settings": "Attached Instruments Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",
+    "trial.trial_input": "TrialInput",
     "model.anthropometry": "BodyGeometry literature_bsp",
     "model.bsp": "BodySegmentParameters",
     "model.imported": "OsimModel",
@@ -102,17 +112,18 @@ _ROOMS = {
     "io.osim.reader": "read_osim",
     "io.recording": "read_recording",
     "io.subject_file": "SubjectFile read_subject",
-    "estimation.estimate": "estimate estimate_bsp estimate_bsp_of_model",
-    "estimation.from_files": "fit_subject prepare_subject",
-    "estimation.prepare": "Prepared TrialInput prepare",
-    "estimation.prepare_osim": "prepare_osim",
+    "estimation.prepared": "Prepared",
     "estimation.prior": "BspPrior literature_prior",
     "estimation.result": "Fit TrialFit",
     "estimation.simultaneous.fit": "Posterior",
-    "checks.model": "ModelCheck check_model",
-    "checks.recording": "RecordingCheck check_recording",
-    "checks.uses": "Use uses",
-    "checks.verdict": "Verdict verdicts",
+    "diagnostics.model.model_check": "ModelCheck check_model",
+    "diagnostics.result.uses": "Use uses",
+    "diagnostics.result.verdict": "Verdict verdicts",
+    "workflow.estimate": "estimate estimate_bsp estimate_bsp_of_model",
+    "workflow.from_files": "fit_subject prepare_subject",
+    "workflow.prepare": "prepare",
+    "workflow.prepare_osim": "prepare_osim",
+    "workflow.recording": "RecordingCheck check_recording",
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",

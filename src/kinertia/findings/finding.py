@@ -38,7 +38,7 @@ class Quantity:
 
     Attributes:
         value: a number, several, or text.
-        unit: "m", "s", "N", "N m", "N m/N", "kg", "kg m2", "rad", "Hz", "m/s" ...; "1" of shares and counts, "" of text.
+        unit: "m", "s", "N", "N m", "N m/N", "kg", "kg m2", "rad", "Hz" ...; "1" of shares and counts, "" of text.
         limit: beyond which the rule fires.
         usual: range on fault-free recordings.
         sd: standard deviation.

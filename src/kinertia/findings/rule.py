@@ -95,7 +95,8 @@ def family_title(family: str) -> str:
 
 
 def _rule(code: str, entry: dict[str, Any]) -> Rule:
-    return Rule(code, **{name: tuple(value) if isinstance(value, list) else value for name, value in entry.items()})
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in entry.items()}
+    return Rule(code, **named)
 
 
 @cache
