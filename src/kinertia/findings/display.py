@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from kinertia.findings.finding import Quantity, Where
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 
 _FIELD = re.compile(r"\{(\w+)(?::([+%#]*))?\}")
 _LISTED = 4
