@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from kinertia.diagnostics.result.verdict import Verdict as Verdict
     from kinertia.diagnostics.result.verdict import verdicts as verdicts
     from kinertia.diagnostics.runner import Overrule as Overrule
+    from kinertia.errors import BlockedError as BlockedError
     from kinertia.errors import FileError as FileError
     from kinertia.errors import KinertiaError as KinertiaError
     from kinertia.errors import MarkerSetError as MarkerSetError
@@ -96,7 +97,7 @@ if TYPE_CHECKING:
     from kinertia.workflow.recording import check_recording as check_recording
 
 _ROOMS = {
-    "errors": "FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
+    "errors": "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
     "findings.finding": "Finding Severity finding",
     "findings.quantity": "Quantity",
     "findings.rule": "Rule rule",
