@@ -97,7 +97,9 @@ if TYPE_CHECKING:
     from kinertia.workflow.recording import check_recording as check_recording
 
 _ROOMS = {
-    "errors": "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
+    "errors": (
+        "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError"
+    ),
     "findings.finding": "Finding Severity finding",
     "findings.quantity": "Quantity",
     "findings.rule": "Rule rule",

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -92,7 +92,7 @@ class FileError(KinertiaError):
             >>> FileError.found("walk.mot", "F142", force=Quantity("ground_force_v")).finding.code
             'F142'
         """
-        made = finding(code, replace(at or Where(), file=Path(path).name, line=line), **evidence)
+        made = with_evidence(code, replace(at or Where(), file=Path(path).name, line=line), evidence)
         return cls(path, problem_of(made), line).with_finding(made)
 
 
@@ -144,7 +144,7 @@ class TrialError(KinertiaError):
             at: plate, markers or time that it is about.
             evidence: what was measured, the headline first.
         """
-        made = finding(code, replace(at or Where(), trial=trial), **evidence)
+        made = with_evidence(code, replace(at or Where(), trial=trial), evidence)
         return cls(trial, problem_of(made)).with_finding(made)
 
 

@@ -146,4 +146,15 @@ def finding(
         causes: likeliest first, where they depend on what was measured.
         evidence: what was measured, the headline first.
     """
-    return Finding(code, where or Where(), evidence, severity or Severity[rule(code).severity], causes)
+    return with_evidence(code, where or Where(), evidence, severity, causes)
+
+
+def with_evidence(
+    code: str,
+    where: Where,
+    evidence: Mapping[str, Quantity],
+    severity: Severity | None = None,
+    causes: tuple[str, ...] = (),
+) -> Finding:
+    """The same of evidence that is a mapping."""
+    return Finding(code, where, evidence, Severity[rule(code).severity] if severity is None else severity, causes)
