@@ -15,6 +15,8 @@ from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
 from kinertia.io.session_file import PersonInstruments
 from kinertia.settings import Instruments
 
@@ -124,13 +126,13 @@ def with_instruments(
             f"({', '.join(sorted(own))}); plates are told by their names"
         )
     prior = InstrumentPrior.stated(stated, [_information(person) for person in others])
-    notes = ready.notes
+    findings = ready.findings
     if session:
         left_out = [person.name for person in session if person not in others]
         of = f"plates and clock are known from {_listed([p.name for p in others])}" if others else "nothing of others"
         own_trials = f"; what {_listed(left_out)} said is left out: the same files are in this fit" if left_out else ""
-        notes = (*notes, f"session: {of}{own_trials}")
-    return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), notes=notes)
+        findings = (*findings, finding("S408", source=Quantity(f"session: {of}{own_trials}")))
+    return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), findings=findings)
 
 
 def _listed(names: Sequence[str]) -> str:
