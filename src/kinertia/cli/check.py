@@ -29,6 +29,7 @@ from kinertia.workflow.files import files_by_name, read_files
 from kinertia.workflow.person import Person, read_person
 from kinertia.workflow.recording import RecordingCheck
 
+
 @dataclass(frozen=True, eq=False)
 class _Checked:
     """Everything that was asked for."""
@@ -68,9 +69,7 @@ def check(
         typer.Option(parser=number, metavar="M", help="Stature, m, to compare models with the literature."),
     ] = None,
     sex: Sex = None,
-    static: Annotated[
-        Path | None, typer.Option(help="Static trial; found among the files if left out.")
-    ] = None,
+    static: Annotated[Path | None, typer.Option(help="Static trial; found among the files if left out.")] = None,
     markers: Annotated[
         str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
     ] = None,

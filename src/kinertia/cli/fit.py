@@ -191,12 +191,7 @@ def _fitted(one: _Run) -> Fit:
 def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
     """The command line that repeats this run."""
     given = {**options, "--method": method, "-o": output}
-    words = [
-        str(word)
-        for name, value in given.items()
-        if value is not None
-        for word in _words(name, value)
-    ]
+    words = [str(word) for name, value in given.items() if value is not None for word in _words(name, value)]
     return command_line(["kinertia", "fit", str(trial), *words])
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model import questions as model_questions

@@ -36,7 +36,16 @@ _UNLIKE_SD = 3.0
 """Deviations from the tables beyond which the user is asked to look again."""
 _PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
 """Relative deviation of a prosthesis' mass, and the factor on the tables' other deviations."""
-_UNITS = {"mass": "kg", "com": "m", "ixx": "kg m2", "iyy": "kg m2", "izz": "kg m2", "ixy": "kg m2", "ixz": "kg m2", "iyz": "kg m2"}
+_UNITS = {
+    "mass": "kg",
+    "com": "m",
+    "ixx": "kg m2",
+    "iyy": "kg m2",
+    "izz": "kg m2",
+    "ixy": "kg m2",
+    "ixz": "kg m2",
+    "iyz": "kg m2",
+}
 _KEPT_SHARE = 1e-3
 """Deviation of a mass that is kept, over its prior's."""
 
@@ -163,9 +172,7 @@ def _with_measures(
     ]
     if abs(body.total_kg - body_kg) > _UNLIKE_SD * np.hypot(body.total_sd_kg, body_sd):
         yeadon = Quantity(body.total_kg, "kg", sd=body.total_sd_kg)
-        found.append(
-            finding("S404", Where(file=measures.name), yeadon_kg=yeadon, stated_kg=Quantity(body_kg, "kg"))
-        )
+        found.append(finding("S404", Where(file=measures.name), yeadon_kg=yeadon, stated_kg=Quantity(body_kg, "kg")))
     return prior, found
 
 

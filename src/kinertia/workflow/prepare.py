@@ -33,7 +33,7 @@ from kinertia.model.gait27 import (
 )
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.kinematics import facing, solve_kinematics
+from kinertia.motion.kinematics import facing
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.upright_trunk import with_upright_trunk
 from kinertia.settings import Attached, Settings, Subject

@@ -100,9 +100,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     expected = population_prior(prior, subject.model_copy(update={"sex": None}), total.body_kg)
     prior = expected.prior
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
-    uncertainty = ModelUncertainty(
-        centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values"
-    )
+    uncertainty = ModelUncertainty(centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values")
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
     for k in solved.kinematics:
         found += [one.in_trial(k.trial.name) for one in range_findings(skeleton, k.ik)]

@@ -44,7 +44,9 @@ class RecordingCheck:
         trial = context.trial
         telling = None
         if used is not None:
-            telling = TellingMovements.of(recording.markers, *(used.segments.get(one, ()) for one in ("pelvis", "torso")))
+            telling = TellingMovements.of(
+                recording.markers, *(used.segments.get(one, ()) for one in ("pelvis", "torso"))
+            )
         return cls(
             context,
             match_labels(recording.markers.labels, used)[0],

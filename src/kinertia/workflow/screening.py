@@ -116,7 +116,9 @@ def screen(person: Person) -> Screened:
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
     found += _of_person(context, found)
-    return Screened(person, context, more_statics, tuple(_overruled(explained(found), person.overrule, person.overrule_of)))
+    return Screened(
+        person, context, more_statics, tuple(_overruled(explained(found), person.overrule, person.overrule_of))
+    )
 
 
 def person_context(person: Person) -> PersonContext:
@@ -128,9 +130,7 @@ def person_context(person: Person) -> PersonContext:
         for item in person.trials
     ]
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
-    return PersonContext(
-        stated, trials, static, label_set, person.model, person.calibrate, total
-    )
+    return PersonContext(stated, trials, static, label_set, person.model, person.calibrate, total)
 
 
 def _label_set(person: Person) -> MarkerSet | None:
@@ -174,9 +174,7 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
     return asked(PERSON_QUESTIONS, sound, of_person)
 
 
-def _overruled(
-    findings: Sequence[Finding], whole: Overrule, of_trials: Mapping[str, Overrule]
-) -> list[Finding]:
+def _overruled(findings: Sequence[Finding], whole: Overrule, of_trials: Mapping[str, Overrule]) -> list[Finding]:
     return list(
         chain.from_iterable(
             overruled([one], whole + of_trials.get(one.where.trial or "", Overrule())) for one in findings
