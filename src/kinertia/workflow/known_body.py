@@ -27,7 +27,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.bsp_file import BspTable
 from kinertia.io.measures_file import BodyMeasures
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
 from kinertia.model.measures import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings
 from kinertia.workflow.attached import with_attached
@@ -36,16 +36,6 @@ _UNLIKE_SD = 3.0
 """Deviations from the tables beyond which the user is asked to look again."""
 _PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
 """Relative deviation of a prosthesis' mass, and the factor on the tables' other deviations."""
-_UNITS = {
-    "mass": "kg",
-    "com": "m",
-    "ixx": "kg m2",
-    "iyy": "kg m2",
-    "izz": "kg m2",
-    "ixy": "kg m2",
-    "ixz": "kg m2",
-    "iyz": "kg m2",
-}
 _KEPT_SHARE = 1e-3
 """Deviation of a mass that is kept, over its prior's."""
 
@@ -83,7 +73,7 @@ def with_known_body(
         k = 10 * row + column
         segment, parameter = prior.mean.segments[row], PARAMETERS[column]
         expected, own = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
-        unit = _UNITS[parameter.partition("_")[0]]
+        unit = UNITS[column]
         stated = Quantity(value, unit, sd=sd)
         source = segments[segment].source or "no source given"
         found.append(_leans_on(f"{segment} {parameter}, {shown(stated)} +- {sd:.2g} ({source})"))

@@ -44,9 +44,8 @@ class RecordingCheck:
         trial = context.trial
         telling = None
         if used is not None:
-            telling = TellingMovements.of(
-                recording.markers, *(used.segments.get(one, ()) for one in ("pelvis", "torso"))
-            )
+            pelvis, torso = (used.segments.get(name, ()) for name in ("pelvis", "torso"))
+            telling = TellingMovements.of(recording.markers, pelvis, torso)
         return cls(
             context,
             match_labels(recording.markers.labels, used)[0],
