@@ -37,7 +37,9 @@ class Prepared:
         findings: what was found so far, with what explains and what overrules each.
         notes: how the trials were prepared, one sentence each.
         attached: what the person wore or carried.
-        overrule: what the user overrules.
+        overrule, overrule_of: what the user overrules, everywhere and in single trials.
+        left_out: names of the trials that could not be used.
+        rules: how many rules were asked so far.
 
     Examples:
         >>> ready = kinertia.prepare_subject("lab/subject.toml")
@@ -58,6 +60,9 @@ class Prepared:
     notes: tuple[str, ...]
     attached: tuple[Attached, ...] = ()
     overrule: Overrule = field(default_factory=Overrule)
+    overrule_of: Mapping[str, Overrule] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+    rules: int = 0
 
     @property
     def carried(self) -> CarriedMass:

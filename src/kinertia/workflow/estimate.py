@@ -33,7 +33,7 @@ from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, 
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import interpolate
-from kinertia.settings import Attached, Settings, Subject
+from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.attached import not_found_warnings, with_attached
@@ -50,6 +50,7 @@ def estimate_bsp(
     progress: Progress = lambda stage, share: None,
     prior: BspPrior | None = None,
     attached: Sequence[Attached] = (),
+    overrule: Overrule | None = None,
 ) -> Fit:
     """Body segment parameters of a person from a static trial and one or more gait trials.
 
@@ -62,11 +63,12 @@ def estimate_bsp(
         progress: called as the work goes on.
         prior: of the body segment parameters, for the simultaneous estimate; the literature's if None.
         attached: what the person wore or carried in all gait trials.
+        overrule: findings that do not block, or are not shown.
 
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
-    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached)
+    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached, overrule)
     return estimate(ready if prior is None else replace(ready, prior=prior), progress)
 
 
@@ -79,6 +81,7 @@ def estimate_bsp_of_model(
     calibrate: bool = False,
     progress: Progress = lambda stage, share: None,
     attached: Sequence[Attached] = (),
+    overrule: Overrule | None = None,
 ) -> Fit:
     """Body segment parameters of a person whose scaled OpenSim model is known, by the simultaneous estimate.
 
@@ -90,13 +93,14 @@ def estimate_bsp_of_model(
         calibrate: let markers and joint centres move; else they stay where the model has them.
         progress: called as the work goes on.
         attached: what the person wore or carried in all trials.
+        overrule: findings that do not block, or are not shown.
 
     Raises:
         KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
     """
     from kinertia.workflow.prepare_osim import prepare_osim
 
-    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached)
+    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached, overrule)
     return estimate(ready, progress)
 
 

@@ -144,10 +144,13 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         file=None,
         kinematics=solved.kinematics,
         seconds=solved.seconds,
-        findings=tuple(screened.overruled([*screened.findings, *findings])),
+        findings=(after := tuple(screened.overruled([*screened.findings, *findings]))),
         notes=(f"marker set: {marker_set.name}", *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
         overrule=person.overrule,
+        overrule_of=person.overrule_of,
+        left_out=screened.left_out_by(after),
+        rules=screened.rules,
     )
 
 

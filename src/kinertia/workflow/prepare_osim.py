@@ -115,10 +115,13 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
         file=model,
         kinematics=solved.kinematics,
         seconds=solved.seconds,
-        findings=tuple(screened.overruled([*screened.findings, *findings])),
+        findings=(after := tuple(screened.overruled([*screened.findings, *findings]))),
         notes=(f"OpenSim model: {model.path.name}", *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
         overrule=person.overrule,
+        overrule_of=person.overrule_of,
+        left_out=screened.left_out_by(after),
+        rules=screened.rules,
     )
 
 

@@ -81,7 +81,11 @@ class Screened:
     @cached_property
     def left_out(self) -> tuple[str, ...]:
         """Names of the trials that cannot be used."""
-        names = {one.where.trial for one in blocking(self.findings)}
+        return self.left_out_by(self.findings)
+
+    def left_out_by(self, findings: Sequence[Finding]) -> tuple[str, ...]:
+        """The same by these findings."""
+        names = {one.where.trial for one in blocking(findings)}
         unread = {one.where.trial for one in self.person.unread if one.where.trial is not None}
         return tuple(dict.fromkeys([*sorted(unread), *(one.name for one in self.context.trials if one.name in names)]))
 
