@@ -118,23 +118,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
     settings, ready = ready.settings, with_attached(ready)
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
-    prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
-    warnings = (
-        *ready.warnings,
-        *turning_warnings(ready.skeleton, [trial.kinematics for trial in outcome.trials]),
-        *outcome.warnings,
-        *([] if outcome.posterior is None else not_found_warnings(ready.attached, outcome.bsp, outcome.posterior.sd)),
-        *_mirrored_free_moments(outcome),
-        *force_warnings(
-            ready.carried,
-            ready.literature,
-            outcome.trials,
-            ready.skeleton,
-            None if outcome.posterior is None else outcome.posterior.calibration,
-        ),
-        *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
-    )
-    return Fit(
+    fit = Fit(
         subject=ready.subject,
         settings=settings,
         skeleton=outcome.skeleton,
@@ -143,45 +127,14 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         trials=outcome.trials,
         converged=outcome.converged,
         posterior=outcome.posterior,
-        warnings=tuple(dict.fromkeys(warnings)),
-        notes=(
-            *ready.notes,
-            *_force_notes(outcome.trials, settings),
-            *outcome.notes,
-            *_turn_notes(outcome.posterior, ready),
-            *_movement_notes(ready),
-        ),
+        findings=ready.findings,
+        notes=ready.notes,
         file=ready.file,
-        corrections=outcome.corrections,
+        left_out=ready.left_out,
+        rules=ready.rules + RULES,
     )
-
-
-def _mirrored_free_moments(outcome: _Outcome) -> list[str]:
-    """What is left of free moments once plates and signs that are wrong have been named."""
-    if outcome.posterior is None:
-        return []
-    return list(filter(None, [mirrored_free_moments_warning(outcome.posterior.calibration)]))
-
-
-def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
-    """Per trial, which ground reactions the joint moments are from."""
-    return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
-
-
-def _turn_notes(posterior: Posterior | None, ready: Prepared) -> list[str]:
-    """Turned plates that these trials would not show."""
-    note = "" if posterior is None else unseen_turn_note(posterior.instruments, ready.uncertainty.instruments)
-    return [note] if note else []
-
-
-def _movement_notes(ready: Prepared) -> list[str]:
-    """What the trials lack that would tell more."""
-    labels: dict[str | None, list[str]] = {}
-    for marker in ready.skeleton.markers:
-        labels.setdefault(segment_of(marker.segment), []).append(marker.label)
-    pelvis, torso = (labels.get(name, []) for name in ("pelvis", "torso"))
-    lacking = missing_movements(TellingMovements.of(k.trial.markers, pelvis, torso) for k in ready.kinematics)
-    return [] if lacking is None else [lacking]
+    found = explained([*ready.findings, *judged(ResultContext(fit, ready))])
+    return replace(fit, findings=tuple(overruled(found, ready.overrule, ready.overrule_of)))
 
 
 @dataclass(frozen=True, eq=False)

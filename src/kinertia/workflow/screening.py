@@ -6,10 +6,9 @@ out; one of the person, or of the static trial, stops everything.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.labels import questions as labels
@@ -91,7 +90,7 @@ class Screened:
 
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
         """Findings, those here or more of them, with what explains and what overrules each."""
-        return _overruled(explained(findings), self.person.overrule, self.person.overrule_of)
+        return overruled(explained(findings), self.person.overrule, self.person.overrule_of)
 
     @cached_property
     def usable(self) -> list[RecordingContext]:
@@ -176,11 +175,3 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]
     return asked(PERSON_QUESTIONS, sound, of_person)
-
-
-def _overruled(findings: Sequence[Finding], whole: Overrule, of_trials: Mapping[str, Overrule]) -> list[Finding]:
-    return list(
-        chain.from_iterable(
-            overruled([one], whole + of_trials.get(one.where.trial or "", Overrule())) for one in findings
-        )
-    )
