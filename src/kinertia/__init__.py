@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from kinertia.diagnostics.result.uses import uses as uses
     from kinertia.diagnostics.result.verdict import Verdict as Verdict
     from kinertia.diagnostics.result.verdict import verdicts as verdicts
+    from kinertia.diagnostics.runner import Overrule as Overrule
+    from kinertia.errors import BlockedError as BlockedError
     from kinertia.errors import FileError as FileError
     from kinertia.errors import KinertiaError as KinertiaError
     from kinertia.errors import MarkerSetError as MarkerSetError
@@ -41,12 +43,12 @@ if TYPE_CHECKING:
     from kinertia.estimation.result import TrialFit as TrialFit
     from kinertia.estimation.simultaneous.fit import Posterior as Posterior
     from kinertia.findings.finding import Finding as Finding
-    from kinertia.findings.finding import Quantity as Quantity
     from kinertia.findings.finding import Severity as Severity
-    from kinertia.findings.finding import Where as Where
     from kinertia.findings.finding import finding as finding
+    from kinertia.findings.quantity import Quantity as Quantity
     from kinertia.findings.rule import Rule as Rule
     from kinertia.findings.rule import rule as rule
+    from kinertia.findings.where import Where as Where
     from kinertia.io.marker_set_file import choose_marker_set as choose_marker_set
     from kinertia.io.marker_set_file import read_marker_set as read_marker_set
     from kinertia.io.osim.reader import read_osim as read_osim
@@ -95,9 +97,13 @@ if TYPE_CHECKING:
     from kinertia.workflow.recording import check_recording as check_recording
 
 _ROOMS = {
-    "errors": "FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError",
-    "findings.finding": "Finding Quantity Severity Where finding",
+    "errors": (
+        "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError"
+    ),
+    "findings.finding": "Finding Severity finding",
+    "findings.quantity": "Quantity",
     "findings.rule": "Rule rule",
+    "findings.where": "Where",
     "settings": "Attached Instruments Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",
@@ -117,6 +123,7 @@ _ROOMS = {
     "estimation.result": "Fit TrialFit",
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
+    "diagnostics.runner": "Overrule",
     "diagnostics.result.uses": "Use uses",
     "diagnostics.result.verdict": "Verdict verdicts",
     "workflow.estimate": "estimate estimate_bsp estimate_bsp_of_model",

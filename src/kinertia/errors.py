@@ -7,11 +7,25 @@ attributes. The command line prints the message as one line and exits with statu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Self
+
+from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+
+def problem_of(found: Finding) -> str:
+    """Code, message and remedy of a finding, as an error says them."""
+    return f"{found.code} {found.message} {found.remedy}"
 
 
 class KinertiaError(Exception):
     """Base of all errors raised on purpose; `str(error)` is one complete sentence for the user.
+
+    Attributes:
+        finding: the rule of the catalogue that it is of, with its evidence; None of what has no code.
 
     Examples:
         >>> try:
@@ -20,6 +34,13 @@ class KinertiaError(Exception):
         ...     print(type(error).__name__)
         FileError
     """
+
+    finding: Finding | None = None
+
+    def with_finding(self, found: Finding) -> Self:
+        """The same error, of this finding."""
+        self.finding = found
+        return self
 
     def __reduce__(self) -> tuple[object, ...]:
         """Back from another process as it was: errors are not made anew of their message alone."""
@@ -52,6 +73,27 @@ class FileError(KinertiaError):
         self.problem = problem
         where = f"{self.path}" if line is None else f"{self.path}, line {line}"
         super().__init__(f"{where}: {problem}")
+
+    @classmethod
+    def found(
+        cls, path: str | Path, code: str, line: int | None = None, *, at: Where | None = None, **evidence: Quantity
+    ) -> Self:
+        """The error of a rule of the catalogue, with its evidence.
+
+        Args:
+            path: the file.
+            code: of the rule.
+            line: one-based.
+            at: plate, markers or time that it is about.
+            evidence: what was measured, the headline first.
+
+        Examples:
+            >>> from kinertia import FileError, Quantity
+            >>> FileError.found("walk.mot", "F142", force=Quantity("ground_force_v")).finding.code
+            'F142'
+        """
+        made = with_evidence(code, replace(at or Where(), file=Path(path).name, line=line), evidence)
+        return cls(path, problem_of(made), line).with_finding(made)
 
 
 class MarkerSetError(KinertiaError):
@@ -91,6 +133,19 @@ class TrialError(KinertiaError):
         self.trial = trial
         self.problem = problem
         super().__init__(f"trial '{trial}': {problem}")
+
+    @classmethod
+    def found(cls, trial: str, code: str, *, at: Where | None = None, **evidence: Quantity) -> Self:
+        """The error of a rule of the catalogue, with its evidence.
+
+        Args:
+            trial: the trial's name.
+            code: of the rule.
+            at: plate, markers or time that it is about.
+            evidence: what was measured, the headline first.
+        """
+        made = with_evidence(code, replace(at or Where(), trial=trial), evidence)
+        return cls(trial, problem_of(made)).with_finding(made)
 
 
 class SubjectError(KinertiaError):
@@ -157,3 +212,21 @@ class OsimError(FileError):
         self.element = element
         self.kind = kind
         super().__init__(path, problem, line)
+
+
+class BlockedError(KinertiaError):
+    """Findings that stop a fit: all ERRORs of all trials at once.
+
+    Attributes:
+        findings: all of them, what did not stop it included.
+
+    Examples:
+        >>> issubclass(kinertia.BlockedError, kinertia.KinertiaError)
+        True
+    """
+
+    def __init__(self, findings: Sequence[Finding], blocking: Sequence[Finding]) -> None:
+        self.findings = tuple(findings)
+        self.blocking = tuple(blocking)
+        self.finding = self.blocking[0] if self.blocking else None
+        super().__init__("\n".join(f"{one.line()} {one.remedy}" for one in self.blocking))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from kinertia.findings.finding import Quantity, Where
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 
 _FIELD = re.compile(r"\{(\w+)(?::([+%#]*))?\}")
 _UNIT_SUFFIX = re.compile(r"_(?:m_s|nm_n|kg_m3|kg|nm|rad|hz|sd|n|m|s)$")

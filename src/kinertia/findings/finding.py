@@ -13,7 +13,9 @@ from enum import IntEnum
 from typing import Any, Literal
 
 from kinertia.findings.display import filled
+from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import Rule, rule
+from kinertia.findings.where import Where
 
 Status = Literal["open", "waived", "ignored"]
 
@@ -30,88 +32,6 @@ class Severity(IntEnum):
     CORRECTED = 1
     WARNING = 2
     ERROR = 3
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A measured quantity in SI units, with the limit that it exceeds.
-
-    Attributes:
-        value: a number, several, or text.
-        unit: "m", "s", "N", "N m", "N m/N", "kg", "kg m2", "rad", "Hz" ...; "1" of shares and counts, "" of text.
-        limit: beyond which the rule fires.
-        usual: range on fault-free recordings.
-        sd: standard deviation.
-
-    Examples:
-        >>> kinertia.Quantity(-23.1, "N", limit=15.0).value
-        -23.1
-    """
-
-    value: float | tuple[float, ...] | str
-    unit: str = ""
-    limit: float | None = None
-    usual: tuple[float, float] | None = None
-    sd: float | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON: value and unit, and the others where they are known."""
-        others = {"limit": self.limit, "usual": self.usual, "sd": self.sd}
-        value = list(self.value) if isinstance(self.value, tuple) else self.value
-        return {"value": value, "unit": self.unit} | {
-            name: list(each) if isinstance(each, tuple) else each for name, each in others.items() if each is not None
-        }
-
-
-@dataclass(frozen=True)
-class Where:
-    """Where something was found; what is None, or empty, means all of it.
-
-    Attributes:
-        file, line: of text files, the one-based line.
-        trial: name of the trial, or of the static trial.
-        plate: name of the force plate.
-        axis: direction of the person's walk: "fore-aft", "vertical" or "mediolateral".
-        file_axis: the same axis as the file calls it, "X", "Y" or "Z".
-        markers: labels.
-        part: segment, joint, coordinate or parameter.
-        span_s: start and end, s.
-
-    Examples:
-        >>> kinertia.Where(trial="walk", plate="plate 1").overlaps(kinertia.Where(trial="walk"))
-        True
-    """
-
-    file: str | None = None
-    line: int | None = None
-    trial: str | None = None
-    plate: str | None = None
-    axis: str | None = None
-    file_axis: str | None = None
-    markers: tuple[str, ...] = ()
-    part: str | None = None
-    span_s: tuple[float, float] | None = None
-
-    def overlaps(self, other: Where) -> bool:
-        """Whether both may be about the same: equal or unstated in each respect, with a common marker and time."""
-        for name in ("trial", "plate", "axis", "part"):
-            own, others = getattr(self, name), getattr(other, name)
-            if own is not None and others is not None and own != others:
-                return False
-        if self.markers and other.markers and not set(self.markers) & set(other.markers):
-            return False
-        if self.span_s is None or other.span_s is None:
-            return True
-        return self.span_s[0] <= other.span_s[1] and other.span_s[0] <= self.span_s[1]
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON: what is stated."""
-        stated = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in stated.items()
-            if value not in (None, ())
-        }
 
 
 @dataclass(frozen=True)
@@ -226,4 +146,15 @@ def finding(
         causes: likeliest first, where they depend on what was measured.
         evidence: what was measured, the headline first.
     """
-    return Finding(code, where or Where(), evidence, severity or Severity[rule(code).severity], causes)
+    return with_evidence(code, where or Where(), evidence, severity, causes)
+
+
+def with_evidence(
+    code: str,
+    where: Where,
+    evidence: Mapping[str, Quantity],
+    severity: Severity | None = None,
+    causes: tuple[str, ...] = (),
+) -> Finding:
+    """The same of evidence that is a mapping."""
+    return Finding(code, where, evidence, Severity[rule(code).severity] if severity is None else severity, causes)

@@ -76,6 +76,11 @@ def upright_along_z(positions: FloatArray) -> FloatArray | None:
     return _rotation(2, 1) if upright and on_floor else None
 
 
+def ground_rotation(vertical: str) -> FloatArray:
+    """The rotation (3, 3) from axes of which this one is up, "+Z" or the like, to ground axes."""
+    return _rotation(*_AXES[vertical])
+
+
 def _seen(positions: FloatArray) -> BoolArray:
     """(n, m) True where all three coordinates are there."""
     return np.asarray(np.isfinite(positions).all(axis=2))

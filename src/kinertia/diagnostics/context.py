@@ -1,0 +1,161 @@
+"""What questions are asked of: one recording, or one person with all recordings, with evidence computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from kinertia.diagnostics.axes import Axes, AxisNames
+from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
+from kinertia.diagnostics.evidence.foot_ways import FootWay, foot_ways
+from kinertia.diagnostics.evidence.load_contacts import Contact, contacts_of
+from kinertia.errors import KinertiaError
+from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.findings.finding import Finding
+from kinertia.findings.where import Where
+from kinertia.model.imported import OsimModel
+from kinertia.model.marker_set import MarkerSet
+from kinertia.settings import Subject
+from kinertia.trial.data import Markers, PlateLoads, Recording, Trial
+from kinertia.trial.ground_contact import FootMarkers
+from kinertia.trial.marker_quality import Travel, travel
+from kinertia.trial.plate_assignment import build_trial
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingContext:
+    """One recording as its questions see it.
+
+    Attributes:
+        recording: in ground axes, SI units; its name is the trial's.
+        marker_set: which label is which landmark, or the markers of an OpenSim model; None where none fits.
+        static: the static trial that goes with it; None for the static trial itself, and without one.
+        is_static: it is given as the static trial, or the only one in which the person stands.
+        window_s: the window that the user vouches for.
+        height_m: stature, where it is known.
+        mass_kg: stated mass, where it is known.
+    """
+
+    recording: Recording
+    marker_set: MarkerSet | None = None
+    static: RecordingContext | None = None
+    is_static: bool = False
+    window_s: tuple[float, float] | None = None
+    height_m: float | None = None
+    mass_kg: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the trial."""
+        return self.recording.name
+
+    @property
+    def all_markers(self) -> Markers:
+        """Every marker of the file."""
+        return self.recording.markers
+
+    @property
+    def plates(self) -> PlateLoads | None:
+        """Force plates, if there are any."""
+        return self.recording.plates
+
+    @cached_property
+    def markers(self) -> Markers:
+        """Those of the marker set; all where no set fits."""
+        if self.marker_set is None:
+            return self.recording.markers
+        present = set(self.recording.markers.labels)
+        return self.recording.markers.select([label for label in self.marker_set.labels if label in present])
+
+    @cached_property
+    def travel(self) -> Travel:
+        """What the person does: walks, stands still, or moves on the spot."""
+        return travel(self.markers)
+
+    @cached_property
+    def axes(self) -> Axes:
+        """What the ground axes are called."""
+        return Axes.of(self.recording.vertical, self.markers)
+
+    @cached_property
+    def feet(self) -> FootMarkers | None:
+        """Labels on each foot, "r" and "l"; None unless both have one."""
+        if self.marker_set is None:
+            return None
+        present = set(self.recording.markers.labels)
+        feet = {side: [one for one in own if one in present] for side, own in self.marker_set.foot_labels().items()}
+        return feet if all(feet.values()) else None
+
+    @cached_property
+    def segment_of_label(self) -> Mapping[str, str]:
+        """Segment of each label of the marker set."""
+        if self.marker_set is None:
+            return {}
+        return {label: name for name, labels in self.marker_set.segments.items() for label in labels}
+
+    @cached_property
+    def foot_trajectories(self) -> tuple[FootWay, FootWay] | None:
+        """Right and left foot; None where a foot is hardly seen."""
+        return None if self.feet is None else foot_ways(self.recording.markers, self.feet, self.recording.belt)
+
+    @cached_property
+    def contacts(self) -> Sequence[Contact]:
+        """Every load on a plate, with where it is on the feet; none without plates or feet."""
+        if self.plates is None or self.foot_trajectories is None:
+            return ()
+        return contacts_of(self.plates, self.foot_trajectories)
+
+    @cached_property
+    def loaded(self) -> Trial | KinertiaError | None:
+        """The trial with its loads sorted by foot, the error where that is impossible, None without plates or feet."""
+        if self.plates is None or self.feet is None:
+            return None
+        try:
+            return build_trial(self.recording, self.feet, self.window_s)
+        except KinertiaError as error:
+            return error
+
+    @property
+    def trial(self) -> Trial | None:
+        """The trial with its loads sorted by foot, in the laboratory's axes; None where that is impossible."""
+        return self.loaded if isinstance(self.loaded, Trial) else None
+
+    @cached_property
+    def velocities(self) -> Sequence[CausedVelocity]:
+        """How fast the body is by markers and by forces, one entry per measured window."""
+        return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
+
+    def at(self, **where: Any) -> Where:
+        """A place in this recording: `at(plate="plate 1", **self.along(2))`."""
+        return Where(trial=self.name, **where)
+
+    def along(self, ground_axis: int) -> AxisNames:
+        """Names of ground axis 0, 1 or 2, as arguments of `at`."""
+        return self.axes.named(ground_axis)
+
+
+@dataclass(frozen=True, eq=False)
+class PersonContext:
+    """One person with all recordings.
+
+    Attributes:
+        subject: as stated, with what files add.
+        trials: recordings of motions.
+        static: the static trial; None with an OpenSim model, or without one.
+        marker_set: which label is which landmark, or the markers of the model.
+        model: the OpenSim model, where there is one.
+        calibrated: markers and joints of the model are to move.
+        total_mass: what was stated of the body and of what was worn; None where no mass is known.
+        found: findings of the recordings themselves, where a question depends on them.
+    """
+
+    subject: Subject
+    trials: Sequence[RecordingContext]
+    static: RecordingContext | None = None
+    marker_set: MarkerSet | None = None
+    model: OsimModel | None = None
+    calibrated: bool = False
+    total_mass: CarriedMass | None = None
+    found: Sequence[Finding] = field(default=())

@@ -1,0 +1,134 @@
+"""Asks questions, lets causes explain their consequences, and applies what the user overrules.
+
+A question returns all findings that apply, or fits every hypothesis and returns the best. Nothing hides a finding but
+the relation `supersedes` of the catalogue: there is no order of evaluation that matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.rule import matching, rule
+
+Context = TypeVar("Context")
+
+
+@dataclass(frozen=True)
+class Question(Generic[Context]):
+    """One question, answered by one function.
+
+    Attributes:
+        code: its first three characters, "P21".
+        ask: what answers it.
+        unless: codes, questions or families whose ERROR leaves it without meaning: then it is not asked.
+    """
+
+    code: str
+    ask: Callable[[Context], Iterable[Finding]]
+    unless: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Overrule:
+    """What a user overrules: codes, questions or families.
+
+    Attributes:
+        waive: ERRORs that do not block; shown as waived in every output.
+        ignore: findings below ERROR that are not shown and lower no verdict.
+
+    Examples:
+        >>> kinertia.Overrule(waive=("P244",)).waive
+        ('P244',)
+    """
+
+    waive: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+
+    def __add__(self, other: Overrule) -> Overrule:
+        return Overrule((*self.waive, *other.waive), (*self.ignore, *other.ignore))
+
+
+def asked(
+    questions: Iterable[Question[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
+) -> list[Finding]:
+    """Findings of these questions, each asked unless what was found before leaves it without meaning.
+
+    Args:
+        questions: in the order in which they are asked.
+        context: what they are asked of.
+        found: what was found before.
+        trial: name of the trial that findings are of which name none.
+    """
+    result: list[Finding] = []
+    for question in questions:
+        errors = {one.code for one in (*found, *result) if one.severity is Severity.ERROR}
+        if any(code.startswith(unless) for code in errors for unless in question.unless):
+            continue
+        for one in question.ask(context):
+            result.append(one if trial is None or one.where.trial is not None else one.in_trial(trial))
+    return result
+
+
+def explained(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings with those muted that another one explains; a cause takes over the severity of its consequences.
+
+    A correction of the estimate that resolves an earlier warning mutes it, and leaves it a correction.
+    """
+    result = list({(one.code, one.where): one for one in reversed(list(findings))}.values())[::-1]
+    muted_by: dict[int, int] = {}
+    for k, cause in enumerate(result):
+        consequences = {code for each in cause.rule.supersedes for code in matching(each)}
+        for j, other in enumerate(result):
+            if j != k and other.code in consequences and cause.where.overlaps(other.where):
+                muted_by.setdefault(j, k)
+    severities = [one.severity for one in result]
+    for j in muted_by:
+        k = j
+        while k in muted_by:
+            k = muted_by[k]
+        severities[k] = max(severities[k], result[j].severity)
+    explained_ = [
+        replace(one, severity=severities[k], muted_by=result[muted_by[k]].code if k in muted_by else None)
+        for k, one in enumerate(result)
+    ]
+    return [_resolved(one, explained_) for one in explained_]
+
+
+def _resolved(one: Finding, findings: Sequence[Finding]) -> Finding:
+    """A warning whose quantity the estimate has corrected."""
+    if one.severity is not Severity.WARNING or one.muted_by is not None:
+        return one
+    for correction in findings:
+        resolves = {code for each in correction.rule.resolves for code in matching(each)}
+        if one.code in resolves and correction.severity is Severity.CORRECTED and correction.where.overlaps(one.where):
+            return replace(one, severity=Severity.CORRECTED, muted_by=correction.code)
+    return one
+
+
+def overruled(findings: Iterable[Finding], overrule: Overrule) -> list[Finding]:
+    """Findings with the status that the user gives them: ERRORs are waived unless nothing can be computed, others
+    ignored."""
+    waived = {code for each in overrule.waive for code in matching(each)}
+    ignored = {code for each in overrule.ignore for code in matching(each)}
+
+    def one(finding: Finding) -> Finding:
+        if finding.severity is Severity.ERROR:
+            return replace(finding, status="waived") if finding.code in waived and not finding.rule.hard else finding
+        return replace(finding, status="ignored") if finding.code in ignored else finding
+
+    return [one(finding) for finding in findings]
+
+
+def blocking(findings: Iterable[Finding]) -> list[Finding]:
+    """Open ERRORs that no other finding explains: what stops the next stage."""
+    return [one for one in findings if one.severity is Severity.ERROR and one.is_open]
+
+
+def unknown_codes(overrule: Overrule) -> list[str]:
+    """What of it is no code, question or family of the catalogue, or cannot be waived."""
+    unknown = [each for each in (*overrule.waive, *overrule.ignore) if not matching(each)]
+    hard = [each for each in overrule.waive if len(each) == 4 and matching(each) and rule(each).hard]
+    return [*unknown, *hard]
