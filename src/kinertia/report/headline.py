@@ -73,7 +73,7 @@ def impossible(fit: Fit) -> bool:
 
 
 def purposes(outputs: Sequence[Use], no_body: bool) -> tuple[Purpose, ...]:
-    """Three purposes from the five outputs: moments in the clinic, parameters in print, and the next step in OpenSim."""
+    """Three purposes from the five outputs: moments in the clinic, parameters in print, the next step in OpenSim."""
     of = {one.output: one for one in outputs}
     moments, motion = of["joint moments"], of["motion"]
     segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
