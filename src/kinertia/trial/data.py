@@ -126,12 +126,14 @@ class IdleReading(NamedTuple):
         peak_n: the largest vertical force of the whole recording, N.
         rings_s: for how long the vertical force is below zero just before feet land and just after they leave, s; 0
             where it does not do both.
+        like_steps: the vertical force comes and goes as under feet, of whatever size.
     """
 
     level_n: tuple[float, float, float]
     drift_n: float
     peak_n: float
     rings_s: float
+    like_steps: bool = False
 
 
 class TorqueColumns(NamedTuple):
