@@ -27,7 +27,7 @@ plates' zeros right?".
 | severity | what it means |
 |---|---|
 | ERROR | the result would be wrong, or cannot be computed: the trial, or the person, is not used |
-| WARNING | may change a result beyond its error bar and is not corrected: the outputs that it affects are to be used with care |
+| WARNING | may change a result beyond its error bar, and is not corrected: what it affects is to be used with care |
 | CORRECTED | found and corrected; its size and SD are shown, and nothing else needs to be done for this result |
 | INFO | an assumption, or advice |
 

@@ -13,7 +13,6 @@ NO_EVIDENCE = {"code", "where", "severity", "causes"}
 """Arguments of `finding`: evidence cannot have these names."""
 
 
-
 def explained(code):
     """Codes whose findings are said to be a consequence of this one's."""
     return {one for entry in rule(code).supersedes for one in matching(entry)}

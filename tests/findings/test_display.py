@@ -3,7 +3,8 @@
 import pytest
 
 from kinertia.findings.display import axis_text, filled, first_few, names_in, outlined, shown
-from kinertia.findings.finding import Quantity, Where
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 
 
 @pytest.mark.parametrize(
@@ -65,8 +66,7 @@ def test_a_sentence_is_filled_with_evidence_and_places():
         "{level_n} {level_n:+} {share:%} {frames:#} {unknown}"
     )
     assert filled(template, where, evidence) == (
-        "walk.c3d 7 walk plate 1 fore-aft (X) RKNE LKNE RKNE, LKNE shank 0.50 s 1.25 s "
-        "-23 N -23 N 25 % 12 {unknown}"
+        "walk.c3d 7 walk plate 1 fore-aft (X) RKNE LKNE RKNE, LKNE shank 0.50 s 1.25 s -23 N -23 N 25 % 12 {unknown}"
     )
 
 

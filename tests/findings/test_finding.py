@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinertia.findings.finding import Quantity, Severity, Where, finding
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import all_rules, rule
+from kinertia.findings.where import Where
 
 _LABELS = st.lists(st.sampled_from("ABCD"), max_size=3, unique=True).map(tuple)
 _SPANS = st.tuples(st.floats(0, 9), st.floats(0, 9)).map(lambda ends: tuple(sorted(ends)))
@@ -85,10 +87,10 @@ def test_sentences_are_the_rules_filled_in():
 
 def test_the_dictionary_is_json_in_si_units():
     content = json.loads(json.dumps(ZERO.in_trial("walk").to_dict(), allow_nan=False))
-    assert content["where"] == {
-        "file": "walk.c3d", "trial": "walk", "plate": "plate 1", "axis": "vertical", "file_axis": "Z"
-    }  # fmt: skip
-    assert content["evidence"]["level_n"] == {"value": -23.1, "unit": "N", "limit": 15.0, "usual": [-3.0, 3.0], "sd": 0.4}
+    places = {"file": "walk.c3d", "trial": "walk", "plate": "plate 1", "axis": "vertical", "file_axis": "Z"}
+    assert content["where"] == places
+    level = {"value": -23.1, "unit": "N", "limit": 15.0, "usual": [-3.0, 3.0], "sd": 0.4}
+    assert content["evidence"]["level_n"] == level
     assert (content["code"], content["severity"], content["status"]) == ("P213", "WARNING", "open")
     assert content["muted_by"] is None
     assert content["causes"] == list(rule("P213").causes)

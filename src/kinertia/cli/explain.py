@@ -109,8 +109,8 @@ def overruling(one: Rule) -> str:
         waived = "cannot be waived, since nothing can be computed"
     else:
         waived = (
-            f'--waive {one.code}, or waive = ["{one.code}"] under [diagnostics] in the subject file, lets the fit go on, '
-            "whose outputs are then to be used with care at best"
+            f'--waive {one.code}, or waive = ["{one.code}"] under [diagnostics] in the subject file, lets the fit go '
+            "on, whose outputs are then to be used with care at best"
         )
     if one.severity == "ERROR":
         return waived
@@ -118,4 +118,5 @@ def overruling(one: Rule) -> str:
 
 
 def _content(one: Rule) -> dict[str, Any]:
-    return asdict(one) | {"question": one.question, "asks": questions(one.code[0])[one.question], "page": page(one.code)}
+    asks = questions(one.code[0])[one.question]
+    return asdict(one) | {"question": one.question, "asks": asks, "page": page(one.code)}

@@ -11,6 +11,7 @@ from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
 from kinertia.diagnostics.evidence.foot_ways import FootWay, foot_ways
 from kinertia.diagnostics.evidence.load_contacts import Contact, contacts_of
+from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding
@@ -121,6 +122,11 @@ class RecordingContext:
     def trial(self) -> Trial | None:
         """The trial with its loads sorted by foot, in the laboratory's axes; None where that is impossible."""
         return self.loaded if isinstance(self.loaded, Trial) else None
+
+    @cached_property
+    def adult_share(self) -> float:
+        """Body weight over an adult's, at most 1: limits in newtons, which are those of adults, are times this."""
+        return adult_share(self.plates, self.mass_kg)
 
     @cached_property
     def velocities(self) -> Sequence[CausedVelocity]:

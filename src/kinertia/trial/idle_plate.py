@@ -15,7 +15,7 @@ import numpy as np
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading
 from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
@@ -27,6 +27,8 @@ _BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
 _IDLE_BLOCK_N, _STEADY_BLOCK_N = 150.0, 15.0
 """In a tenth of a second in which nobody steps on or off, a plate reads less than the first, and varies by less than
 the second."""
+_RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
+"""Between 20 and 50 % of its range a force under feet is for less than a tenth of the time, noise for two fifths."""
 _GAUSSIAN = 1.4826
 """Deviation of Gaussian noise over its median absolute deviation."""
 
@@ -66,21 +68,36 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
 
 def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
     """What a plate reads (k, 3) N while nobody stands on it: in tenths of a second in which little changes."""
-    peak_n, rings_s = float(np.abs(force[:, 1]).max(initial=0.0)), ringing_s(time, force[:, 1])
+    peak_n = float(np.abs(force[:, 1]).max(initial=0.0))
+    course = ringing_s(time, force[:, 1]), _like_steps(time, force[:, 1])
     every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
     count = len(time) // every
     if not count:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, rings_s)
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
     blocks = force[: count * every].reshape(count, every, 3)
     low, high = np.percentile(blocks[..., 1], (5, 95), axis=1)
     level = np.median(blocks, axis=1)
     idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < _IDLE_BLOCK_N)
     if idle.sum() < _FEWEST_BLOCKS:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, rings_s)
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
     x, y, z = (float(value) for value in np.median(level[idle], axis=0))
     when = time[: count * every].reshape(count, every).mean(axis=1)[idle]
     drift_n = float(np.polyfit(when - when.mean(), level[idle, 1], 1)[0]) * float(time[-1] - time[0])
-    return IdleReading((x, y, z), drift_n, peak_n, rings_s)
+    return IdleReading((x, y, z), drift_n, peak_n, *course)
+
+
+def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
+    """Whether a force (k,) of whatever unit is either next to nothing or nearly all there, and stays so for a while.
+
+    Noise, drift and hum are at a third of their range as often as elsewhere, or leave the upper half at once.
+    """
+    if len(time) < _FEWEST_IDLE:
+        return False
+    low, high = np.percentile(vertical, _RANGE_PERCENT)
+    share = (vertical - low) / max(float(high - low), 1e-12)
+    between = float(((share > _RISING[0]) & (share < _RISING[1])).mean())
+    lasts = [span_s(time, first, last) for first, last in runs(share > _RISING[1])]
+    return between < _MOST_RISING and max(lasts, default=0.0) >= _SHORTEST_STEP_S
 
 
 def load_threshold_n(vertical: FloatArray) -> float:

@@ -1,4 +1,4 @@
-"""The hum of the mains in the forces: a cable without shield, a ground loop.
+"""Mains interference in the forces: a cable without shield, a ground loop.
 
 On 26 recordings of nine laboratories the forces have 0.9 N at most at 50 or 60 Hz, and there at most 3.4 times as much
 as 10 to 16 Hz beside them (0.2 N at least are counted): impacts have all frequencies alike.
@@ -6,8 +6,13 @@ as 10 to 16 Hz beside them (0.2 N at least are counted): impacts have all freque
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import FloatArray, PlateLoads
 from kinertia.trial.sampled_time import runs
@@ -20,36 +25,24 @@ _LOUD_N = 15.0
 _SHORTEST_S, _SAMPLES_PER_PERIOD, _SLOW_ORDER = 0.2, 3.0, 6
 
 
-def hum_trouble(plates: PlateLoads) -> str:
-    """A hum so loud that loads seem to begin and end; empty where there is none."""
-    return _sentence(plates, _LOUD_N)
-
-
-def hum_doubts(plates: PlateLoads) -> list[str]:
-    """A hum that is heard, if `hum_trouble` found none."""
-    heard = _sentence(plates, _HUM_N)
-    return [heard] if heard else []
-
-
-def _sentence(plates: PlateLoads, least_n: float) -> str:
-    loudest: tuple[float, str] = (0.0, "")
-    for p, name in enumerate(plates.names):
-        stretch = _longest_load(plates, p)
-        if stretch is None:
+def mains_interference(context: RecordingContext) -> Iterator[Finding]:
+    """P107, of every plate and axis, at the frequency that is louder."""
+    plates = context.plates
+    for p, name in enumerate(() if plates is None else plates.names):
+        assert plates is not None
+        rows = _longest_load(plates, p)
+        if rows is None:
             continue
-        for mains_hz in _MAINS_HZ:
-            frequencies = mains_hz + np.array([0.0, *_BESIDE_HZ])
-            hum, *beside = _amplitudes(plates.time[stretch], plates.force[stretch, p], frequencies)
-            stands_out = hum > _STANDS_OUT * np.max([*beside, np.full(3, _BESIDE_N)], axis=0)
-            for axis in np.flatnonzero(stands_out):
-                loudest = max(loudest, (float(hum[axis]), f"{mains_hz:g} Hz ({name}, along {'XYZ'[axis]})"))
-    hum_n, where = loudest
-    if not hum_n > least_n:
-        return ""
-    return (
-        f"the forces hum with {hum_n:.0f} N at {where}: the mains, which a cable or amplifier picks up; find the "
-        "ground loop or the bare cable, or take that frequency out (a notch filter that does not delay) before export"
-    )
+        hums = np.array([_hum_n(plates.time[rows], plates.force[rows, p], mains_hz) for mains_hz in _MAINS_HZ])
+        for axis, (amplitude_n, mains_hz) in enumerate(zip(hums.max(axis=0), hums.argmax(axis=0), strict=True)):
+            if amplitude_n > _HUM_N:
+                yield finding(
+                    "P107",
+                    context.at(plate=name, **context.along(axis)),
+                    Severity.ERROR if amplitude_n > _LOUD_N else None,
+                    amplitude_n=Quantity(float(amplitude_n), "N", limit=_HUM_N, usual=(0.0, 0.9)),
+                    frequency_hz=Quantity(_MAINS_HZ[mains_hz], "Hz"),
+                )
 
 
 def _longest_load(plates: PlateLoads, p: int) -> slice | None:
@@ -62,6 +55,13 @@ def _longest_load(plates: PlateLoads, p: int) -> slice | None:
         return None
     first, last = max(loads, key=lambda one: one[1] - one[0])
     return slice(first, last + 1) if (last - first) / rate_hz >= _SHORTEST_S else None
+
+
+def _hum_n(time: FloatArray, force: FloatArray, mains_hz: float) -> FloatArray:
+    """(3,) N at this frequency in a force (k, 3), 0 along axes on which it does not stand out of those beside it."""
+    hum, *beside = _amplitudes(time, force, mains_hz + np.array([0.0, *_BESIDE_HZ]))
+    stands_out = hum > _STANDS_OUT * np.max([*beside, np.full(3, _BESIDE_N)], axis=0)
+    return np.where(stands_out, hum, 0.0)
 
 
 def _amplitudes(time: FloatArray, forces: FloatArray, frequencies_hz: FloatArray) -> FloatArray:
