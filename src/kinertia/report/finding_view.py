@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from kinertia.findings.display import axis_text, first_few, outlined, shown
 from kinertia.findings.finding import Finding, Severity
@@ -185,3 +186,24 @@ def asks(one: Rule) -> str:
 def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[str]:
     """Open findings from this severity on, one line each, equal ones together."""
     return [group.line for group in grouped(in_order(one for one in findings if one.is_open and one.severity >= least))]
+
+
+def digest(overview: Overview) -> dict[str, Any]:
+    """Verdict and findings for the page in the browser: one entry for equal findings, assumptions left out."""
+    shown_ = [one for one in overview.findings if one.severity > Severity.INFO and one.muted_by is None]
+    groups = grouped(in_order(one for one in shown_ if one.status != "ignored"))
+    return {
+        "verdict": overview.verdict,
+        "line": overview.line,
+        "findings": [
+            {
+                "code": group.first.code,
+                "severity": group.first.severity.name,
+                "status": group.first.status,
+                "trial": group.first.where.trial,
+                "message": group.message,
+                "remedy": group.first.remedy,
+            }
+            for group in groups
+        ],
+    }

@@ -36,8 +36,8 @@ from kinertia.workflow.from_files import fit_subject
 from kinertia.workflow.person import read_person
 
 Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
-"""What became of a fault: identified; other findings are new; moments within their deviations; neither; nothing is there
-to make it with."""
+"""What became of a fault: identified; other findings are new; moments within their deviations; neither; there is
+nothing to make it with."""
 _WALK_S, _PLATE_RATE_HZ, _START, _SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _CHANGED_SD = 3.0
 """By which the size of a finding differs from that in the fault-free files before it counts as new."""
