@@ -9,6 +9,7 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -189,7 +190,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         "rules_run": fit.rules,
         "trials_left_out": list(fit.left_out),
         "findings": [one.to_dict() for one in fit.findings],
-        "suitability": [{"output": use.output, "use": use.word, "reason": use.reason} for use in suitability(fit)],
+        "suitability": [asdict(one) for one in suitability(fit)],
         "warnings": list(fit.warnings),
         "corrections": list(fit.corrections),
         "notes": list(fit.notes),

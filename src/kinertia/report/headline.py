@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.result.suitability import Use, suitability
+from kinertia.diagnostics.result.suitability import Suitability, suitability
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.findings.finding import Severity
@@ -29,16 +29,25 @@ _EVIDENCE = {
     "informed": "partly informed by the data",
     "assumed": "not informed by the data, not to be read as this person's",
 }
-_IMPOSSIBLE = "R202"
+IMPOSSIBLE = "R202"
+"""The code of bodies that cannot exist."""
 _WORST_FIRST = (DO_NOT_USE, WITH_CARE, USE)
 
 
 class Purpose(NamedTuple):
-    """What people do with a result, whether they may with this one ("use", "use with care", "do not use"), and why."""
+    """What people do with a result, whether they may with this one, why, and codes of what stands against it.
+
+    Attributes:
+        name: of the purpose.
+        use: "use", "use with care" or "do not use".
+        reason: with a number.
+        codes: of the findings that lower it.
+    """
 
     name: str
-    word: str
+    use: str
     reason: str
+    codes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,7 @@ class Words:
     """
 
     purposes: tuple[Purpose, ...]
-    outputs: tuple[Use, ...]
+    outputs: tuple[Suitability, ...]
     motion: tuple[str, ...]
     knowledge: tuple[str, ...]
     departures: tuple[str, ...]
@@ -69,29 +78,31 @@ def words(fit: Fit) -> Words:
 
 def impossible(fit: Fit) -> bool:
     """Whether a body was estimated that cannot exist, which no simulation takes."""
-    return any(one.code == _IMPOSSIBLE and one.severity is Severity.ERROR for one in fit.findings)
+    return any(one.code == IMPOSSIBLE and one.severity is Severity.ERROR for one in fit.findings)
 
 
-def purposes(outputs: Sequence[Use], no_body: bool) -> tuple[Purpose, ...]:
+def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ...]:
     """Three purposes from the five outputs: moments in the clinic, parameters in print, the next step in OpenSim."""
     of = {one.output: one for one in outputs}
     moments, motion = of["joint moments"], of["motion"]
     segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
-    kinds = {one.word for one in segments}
-    together = kinds.pop() if len(kinds) == 1 else WITH_CARE
-    by_word = [
-        f"{word}: {', '.join(one.output for one in segments if one.word == word)}"
-        for word in (USE, WITH_CARE, DO_NOT_USE)
-        if any(one.word == word for one in segments)
+    uses = {one.use for one in segments}
+    by_use = [
+        f"{use}: {', '.join(one.output for one in segments if one.use == use)}"
+        for use in (USE, WITH_CARE, DO_NOT_USE)
+        if use in uses
     ]
-    reason = segments[0].reason if len(by_word) == 1 else "; ".join(by_word)
-    worse = min((moments, motion), key=lambda one: _WORST_FIRST.index(one.word))
-    opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.word, worse.reason)
+    reason = segments[0].reason if len(uses) == 1 else "; ".join(by_use)
+    codes = tuple(dict.fromkeys(code for one in segments for code in one.codes))
+    together = uses.pop() if len(uses) == 1 else WITH_CARE
+    worse = min((moments, motion), key=lambda one: _WORST_FIRST.index(one.use))
+    both = tuple(dict.fromkeys((*moments.codes, *motion.codes)))
+    opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason, both)
     if no_body:
-        opensim = opensim._replace(word=DO_NOT_USE, reason="a segment is physically impossible")
+        opensim = opensim._replace(use=DO_NOT_USE, reason="a segment is physically impossible", codes=(IMPOSSIBLE,))
     return (
-        Purpose("Joint moments, clinical use", moments.word, moments.reason),
-        Purpose("Body segment parameters, in a paper", together, reason),
+        Purpose("Joint moments for clinical use", moments.use, moments.reason, moments.codes),
+        Purpose("Segment parameters in a paper", together, reason, codes),
         opensim,
     )
 
