@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.findings.finding import Finding
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
 from kinertia.trial.impossible_data import marker_trouble, plate_trouble
@@ -326,6 +327,7 @@ class Trial:
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
         virtual_sd_m, belt: as the recording's.
+        findings: how its loads were sorted by foot.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -343,6 +345,7 @@ class Trial:
     notes: tuple[str, ...] = ()
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))
