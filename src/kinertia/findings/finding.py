@@ -53,7 +53,7 @@ class Finding:
         >>> zero.severity.name, zero.name
         ('WARNING', 'plate-zero-offset')
         >>> zero.message
-        'Zero of plate 1 is off: it reads -23 N along vertical (Z) while unloaded.'
+        'The zero of plate 1 is off: it reads -23 N along the vertical (Z) axis while unloaded.'
     """
 
     code: str
@@ -107,7 +107,7 @@ class Finding:
         return replace(self, where=replace(self.where, trial=trial))
 
     def line(self) -> str:
-        """Where and what on one line: `walk  P213 Zero of plate 1 is off ...`."""
+        """Where and what on one line: `walk  P213 The zero of plate 1 is off ...`."""
         return f"{self.where.trial}  {self.code} {self.message}" if self.where.trial else f"{self.code} {self.message}"
 
     def to_dict(self) -> dict[str, Any]:
