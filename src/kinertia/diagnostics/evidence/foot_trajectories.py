@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 
 _LOW = 0.15
 """Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""
@@ -38,13 +38,19 @@ class FootTrajectory:
         time: (n,) s.
         back, front: (n, 2) m, horizontal places (x, z) of the two markers that are farthest apart, interpolated where
             they are not seen; the same for a foot with one marker. The foot swings forwards from back to front.
+        shown: (n,) whether both are seen, but for short gaps.
         stands: first and last time (s) of every stance phase, and whether the trial shows both ends.
     """
 
     time: FloatArray
     back: FloatArray
     front: FloatArray
+    shown: BoolArray
     stance_spans: tuple[tuple[float, float, bool], ...]
+
+    def seen(self, time: FloatArray) -> BoolArray:
+        """(k,) whether both ends are seen at these times, not interpolated."""
+        return self.shown[nearest_samples(self.time, time)]
 
     def standing(self, time: FloatArray) -> BoolArray:
         """(k,) whether it stands then, or a little before or after; everywhere where that cannot be told."""
@@ -98,11 +104,11 @@ def foot_trajectories(
     places = [_short_gaps_filled(markers.time, place) for place in places]
     trajectories = []
     for place, velocity in zip(places, _velocities(markers, places, belt), strict=True):
-        back, front = _ends(markers.time, place)
+        back, front, shown = _ends(markers.time, place)
         if _swing(velocity, front - back) < 0:
             back, front = front, back
         spans = _stance_spans(markers.time, np.linalg.norm(velocity, axis=2))
-        trajectories.append(FootTrajectory(markers.time, back, front, spans))
+        trajectories.append(FootTrajectory(markers.time, back, front, shown, spans))
     return trajectories[0], trajectories[1]
 
 
@@ -218,14 +224,20 @@ def _stance_spans(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, flo
     )
 
 
-def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    flat = place[..., [0, 2]]
-    shown = np.flatnonzero(_seen(place).any(axis=0))
-    apart = np.linalg.norm(flat[:, shown, None] - flat[:, None, shown], axis=-1)
-    together = np.isfinite(apart).any(axis=0)
-    usual = np.where(together, np.nanmedian(np.where(together, apart, 0.0), axis=0), 0.0)
+def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The two markers that are farthest apart, of those that are often seen together, and where both are (n,)."""
+    flat, seen = place[..., [0, 2]], _seen(place)
+    often = (seen[:, :, None] & seen[:, None]).sum(axis=0)
+    shown = np.flatnonzero(seen.any(axis=0))
+    apart = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=-1)
+    usual = np.full(often.shape, -1.0)
+    for one in shown:
+        for other in shown:
+            if often[one, other] >= _MOSTLY * often.max():
+                usual[one, other] = float(np.nanmedian(apart[:, one, other]))
     one, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
-    return _filled(time, flat[:, shown[one]]), _filled(time, flat[:, shown[other]])
+    both = seen[:, one] & seen[:, other]
+    return _filled(time, flat[:, one]), _filled(time, flat[:, other]), both
 
 
 def _filled(time: FloatArray, place: FloatArray) -> FloatArray:

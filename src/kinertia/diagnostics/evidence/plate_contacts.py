@@ -33,7 +33,7 @@ class PlateContact:
         plate: its index.
         start_s, end_s: when it is above `CONTACT_FORCE_N`; NaN for an end that the trial does not show.
         foot: 0 right, 1 left, under which it mostly is.
-        weight: (k,) N, its vertical force where that is firm.
+        weight: (k,) N, its vertical force where that is reliable and the foot is seen.
         time: (k,) s.
         offset_m: (2, k, 2) m, horizontally from each foot to the centre of pressure.
         ends_m: how far the first twentieth of the load is in front of the heel, and the last one in front of the toes.
@@ -81,7 +81,7 @@ class PlateContact:
 
 
 def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory]) -> list[PlateContact]:
-    """Loads of at least `SHORTEST_S` while markers are there."""
+    """Loads of at least `SHORTEST_S` while markers are there; none whose foot is mostly hidden."""
     first_s, last_s = feet[0].time[0] - TIME_TOLERANCE_S, feet[0].time[-1] + TIME_TOLERANCE_S
     point = cop_horizontal(plates)
     contacts = []
@@ -97,6 +97,10 @@ def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory])
             off = np.stack([one.offset_m(plates.time[rows], point[rows, p]) for one in feet])
             near = [float(vertical[rows] @ np.linalg.norm(one, axis=1)) for one in off]
             foot = int(np.argmin(near))
+            seen = feet[foot].seen(plates.time[rows])
+            if vertical[rows][seen].sum() < vertical[rows].sum() / 2:
+                continue
+            rows, off = rows[seen], off[:, seen]
             ahead = feet[foot].beyond(plates.time[rows], point[rows, p])
             ends_m = (_quantile(ahead[0], vertical[rows], _END), _quantile(ahead[1], vertical[rows], 1 - _END))
             begins, ends = first > 0 and start > first_s, last < len(plates.time) - 1 and end < last_s

@@ -16,7 +16,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
-from kinertia.diagnostics.plates.heel_landing import lands_on_heels
+from kinertia.diagnostics.plates.heel_landing import lands_on_heels, shows_whole_feet
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
@@ -45,6 +45,8 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         return
     if unit := list(_other_unit(context)):
         yield from unit
+        return
+    if not shows_whole_feet(context):
         return
     feet = context.foot_trajectories
     hypotheses = list(

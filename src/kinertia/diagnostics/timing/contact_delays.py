@@ -42,7 +42,8 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     plates, feet = context.whole_loads, context.foot_trajectories
     if plates is None or feet is None:
         return
-    last_row, walked = len(plates.time) - 1, [one for one in contacts_of(plates, feet) if _several_steps(one, plates)]
+    contacts = contacts_of(plates, feet)
+    last_row, walked = len(plates.time) - 1, [one for one in contacts if _several_steps(one, plates)]
     loaded = [
         float(plates.time[last] - plates.time[first])
         for p, vertical in enumerate(plates.force[..., 1].T)
@@ -50,7 +51,7 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
         if first > 0 and last < last_row and span_s(plates.time, first, last) >= SHORTEST_S
         if not any(one.plate == p and plates.time[first] <= one.time[0] <= plates.time[last] for one in walked)
     ]
-    standing = [end - start for foot in feet for start, end, whole in foot.stance_spans if whole]
+    standing = _stances(contacts, feet)
     if not loaded or not standing:
         return
     by_plates, by_markers = float(np.median(loaded)), float(np.median(standing))
@@ -67,6 +68,20 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     )
     start = float(plates.time[0])
     yield Hypothesis(found, replace(plates, time=start + (plates.time - start) / ratio))
+
+
+def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
+    """s, how long feet stand while they are loaded; of all stance phases where none of them is loaded. Before and after
+    it, somebody may stand on a box or turn round.
+    """
+    loaded = [(one.foot, one.time[0], one.time[-1]) for one in contacts]
+    whole = [(k, start, end) for k, foot in enumerate(feet) for start, end, all_of_it in foot.stance_spans if all_of_it]
+    own = [
+        end - start
+        for k, start, end in whole
+        if any(k == foot and start < last and end > first for foot, first, last in loaded)
+    ]
+    return own or [end - start for _, start, end in whole]
 
 
 def _several_steps(contact: PlateContact, plates: PlateLoads) -> bool:
@@ -147,7 +162,8 @@ class ContactDelays:
         """Of whole loads that overlap with a whole stance phase of their foot; None where there are none."""
         rows = []
         for contact in contacts:
-            if not np.isfinite(contact.end_s - contact.start_s):
+            # what goes from foot to foot begins with one of them and ends with the other
+            if contact.in_turn or not np.isfinite(contact.end_s - contact.start_s):
                 continue
             overlaps = [
                 (min(end, contact.end_s) - max(start, contact.start_s), start, end)
