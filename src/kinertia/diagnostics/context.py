@@ -9,9 +9,10 @@ from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
-from kinertia.diagnostics.evidence.foot_ways import FootWay, foot_ways
-from kinertia.diagnostics.evidence.load_contacts import Contact, contacts_of
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
+from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
+from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs, without
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding
@@ -97,16 +98,31 @@ class RecordingContext:
         return {label: name for name, labels in self.marker_set.segments.items() for label in labels}
 
     @cached_property
-    def foot_trajectories(self) -> tuple[FootWay, FootWay] | None:
+    def foot_trajectories(self) -> tuple[FootTrajectory, FootTrajectory] | None:
         """Right and left foot; None where a foot is hardly seen."""
-        return None if self.feet is None else foot_ways(self.recording.markers, self.feet, self.recording.belt)
+        return None if self.feet is None else foot_trajectories(self.recording.markers, self.feet, self.recording.belt)
 
     @cached_property
-    def contacts(self) -> Sequence[Contact]:
+    def contacts(self) -> Sequence[PlateContact]:
         """Every load on a plate, with where it is on the feet; none without plates or feet."""
         if self.plates is None or self.foot_trajectories is None:
             return ()
         return contacts_of(self.plates, self.foot_trajectories)
+
+    @cached_property
+    def overhangs(self) -> Sequence[Overhang]:
+        """Feet that reach beyond the plate that they stand on; none where its corners are not known."""
+        if self.plates is None or self.feet is None:
+            return ()
+        landmarks = {} if self.marker_set is None else self.marker_set.landmarks
+        toes = {label for side in "rl" for label in landmarks.get(f"toe_{side}", ())}
+        return overhangs(self.plates, self.contacts, self.all_markers, self.feet, toes)
+
+    @cached_property
+    def whole_loads(self) -> PlateLoads | None:
+        """The plates without loads of feet that reach beyond them: these begin late, or end early."""
+        cut = [one.contact for one in self.overhangs if not one.only_toe]
+        return self.plates if self.plates is None or not cut else without(self.plates, cut)
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
