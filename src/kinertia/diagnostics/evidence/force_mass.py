@@ -29,7 +29,7 @@ _FAST_HZ, _SLOW_HZ = 8.0, 4.0
 _AROUND_S = 0.25
 """Frames this near the window help to know velocities at its ends."""
 _FEWEST_FRAMES = 2 * MIN_SAMPLES
-_COMPLETE, _MISSING = 0.15, 0.25
+_COMPLETE, MISSING = 0.15, 0.25
 """Share of body weight within which all of it is supported, and from which on some of it is not."""
 UNMEASURED_S = 0.2
 """A part of the weight that is missing this long is on something else, whatever the mean says: in fault-free walks,
@@ -69,7 +69,7 @@ class ForceMass:
         """The longest time in which a part of the weight is on no plate though at other times none is."""
         share = self.supported_kg / total_kg - 1.0
         complete = float((np.abs(share) < _COMPLETE).mean())
-        spans = [(a, b) for a, b in runs(share < -_MISSING) if span_s(self.time, a, b) >= shortest_s]
+        spans = [(a, b) for a, b in runs(share < -MISSING) if span_s(self.time, a, b) >= shortest_s]
         if complete < _MOSTLY or not spans:
             return None
         first, last = max(spans, key=lambda span: span[1] - span[0])

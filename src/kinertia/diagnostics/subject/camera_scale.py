@@ -99,7 +99,9 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
         scale = between(first, other)
         if scale is None or not scale.differs:
             continue
-        standing = [[size(between(one, trial, AGAINST_STANDING)) for trial in (first, other)] for one in context.standing]
+        standing = [
+            [size(between(one, trial, AGAINST_STANDING)) for trial in (first, other)] for one in context.standing
+        ]
         further = [one for one in context.trials if one not in (first, other)]
         moving = [[size(between(one, trial)) for trial in (first, other)] for one in further]
         for odd in odd_ones(first, other, [(one, two) for one, two in (*standing, *moving)]):

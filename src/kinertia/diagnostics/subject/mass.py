@@ -17,8 +17,8 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.evidence.force_mass import ForceMass
+from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
 from kinertia.diagnostics.subject.majority import odd_ones
 from kinertia.estimation.carried_mass import CarriedMass
@@ -71,8 +71,8 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     known = {one.name: mass for one in context.trials if (mass := one.force_mass) is not None}
     apart = {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
     for name, found in apart.items():
-        missing = Quantity(found.missing, "1", limit=0.25)
-        yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=Quantity(found.complete, "1"))
+        missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
+        yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
     standing = [mass for one in context.standing if (mass := one.force_mass) is not None]
     whole = [_occasion(name, mass) for name, mass in known.items() if name not in apart]
     partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
@@ -83,7 +83,8 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
         alone = _occasion(context.standing[0].name, standing[0])
         if alone.differs(total, WARNING_SHARE):
             # nothing is computed from the forces of a person who stands
-            yield from (one.at(min(one.severity, Severity.WARNING)) for one in _contradiction(context, alone, total, []))
+            for found_ in _contradiction(context, alone, total, []):
+                yield found_.at(min(found_.severity, Severity.WARNING))
 
 
 def masses_of_trials(context: PersonContext) -> Iterator[Finding]:

@@ -71,8 +71,8 @@ class InformativeMovements:
     def sentence(self) -> str:
         """In words."""
         return (
-            f"the trunk leans by up to {np.degrees(self.trunk_lean_rad):.0f} degrees from its mean, the pelvis moves up "
-            f"and down by {100 * self.drop_m:.0f} cm"
+            f"the trunk leans by up to {np.degrees(self.trunk_lean_rad):.0f} degrees from its mean, "
+            f"the pelvis moves up and down by {100 * self.drop_m:.0f} cm"
         )
 
 
