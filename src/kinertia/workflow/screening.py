@@ -56,13 +56,11 @@ class Screened:
     Attributes:
         person: as given.
         context: what the questions were asked of: every recording, also those that are left out.
-        more_statics: recordings in which the person stands, of which none is the static trial.
         findings: all of them, with what explains and what overrules them.
     """
 
     person: Person
     context: PersonContext
-    more_statics: tuple[RecordingContext, ...]
     findings: tuple[Finding, ...]
 
     @property
@@ -112,9 +110,7 @@ def screen(person: Person) -> Screened:
     by_label = person.labels
     if isinstance(by_label, MarkerSetError) and by_label.finding is not None:
         found.append(by_label.finding)
-    statics = () if context.static is None else (context.static,)
-    more_statics = tuple(_static_context(person, one) for one in person.more_statics)
-    for static in (*statics, *more_statics):
+    for static in context.standing:
         found += _of_recording(static, STATIC_QUESTIONS)
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
