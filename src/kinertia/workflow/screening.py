@@ -39,6 +39,7 @@ MOTION_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     *markers.MOTION_QUESTIONS,
     *labels.MOTION_QUESTIONS,
     *SIGNAL_QUESTIONS,
+    *timing.QUESTIONS,
     *PLACE_QUESTIONS,
     *LOADED_QUESTIONS,
 )
@@ -129,7 +130,16 @@ def person_context(person: Person) -> PersonContext:
         for item in person.trials
     ]
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
-    return PersonContext(stated, trials, static, label_set, person.model, person.calibrate, total)
+    return PersonContext(
+        stated,
+        trials,
+        static,
+        label_set,
+        person.model,
+        person.calibrate,
+        total,
+        more_statics=[_static_context(person, one) for one in person.more_statics],
+    )
 
 
 def _label_set(person: Person) -> MarkerSet | None:
@@ -148,7 +158,7 @@ def _completed(person: Person) -> Subject:
     """What is stated, with what files add; as stated where it is incomplete."""
     recordings = [*([] if person.static is None else [person.static]), *person.recordings]
     try:
-        return complete_subject(person.subject, recordings, mass_only=True)[0]
+        return complete_subject(person.subject, recordings, mass_only=True)
     except KinertiaError:
         return person.subject
 
