@@ -226,6 +226,14 @@ class OsimError(FileError):
         self.kind = kind
         super().__init__(path, problem, line)
 
+    @classmethod
+    def about(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
+        """The error of a finding about an element: of the name and kind that its evidence has."""
+        error = cls.of(path, found, line)
+        texts = [found.evidence[name].value for name in ("element", "kind") if name in found.evidence]
+        error.element, error.kind = (str(text) for text in (*texts, "", "")[:2])
+        return error
+
 
 class BlockedError(KinertiaError):
     """Findings that stop a fit: all ERRORs of all trials at once.

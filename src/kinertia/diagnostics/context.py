@@ -9,12 +9,14 @@ from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
-from kinertia.diagnostics.evidence.foot_ways import FootWay, foot_ways
-from kinertia.diagnostics.evidence.load_contacts import Contact, contacts_of
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
+from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
+from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
+from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs, without
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.findings.finding import Finding
+from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
@@ -97,16 +99,31 @@ class RecordingContext:
         return {label: name for name, labels in self.marker_set.segments.items() for label in labels}
 
     @cached_property
-    def foot_trajectories(self) -> tuple[FootWay, FootWay] | None:
+    def foot_trajectories(self) -> tuple[FootTrajectory, FootTrajectory] | None:
         """Right and left foot; None where a foot is hardly seen."""
-        return None if self.feet is None else foot_ways(self.recording.markers, self.feet, self.recording.belt)
+        return None if self.feet is None else foot_trajectories(self.recording.markers, self.feet, self.recording.belt)
 
     @cached_property
-    def contacts(self) -> Sequence[Contact]:
+    def contacts(self) -> Sequence[PlateContact]:
         """Every load on a plate, with where it is on the feet; none without plates or feet."""
         if self.plates is None or self.foot_trajectories is None:
             return ()
         return contacts_of(self.plates, self.foot_trajectories)
+
+    @cached_property
+    def overhangs(self) -> Sequence[Overhang]:
+        """Feet that reach beyond the plate that they stand on; none where its corners are not known."""
+        if self.plates is None or self.feet is None:
+            return ()
+        landmarks = {} if self.marker_set is None else self.marker_set.landmarks
+        toes = {label for side in "rl" for label in landmarks.get(f"toe_{side}", ())}
+        return overhangs(self.plates, self.contacts, self.all_markers, self.feet, toes)
+
+    @cached_property
+    def whole_loads(self) -> PlateLoads | None:
+        """The plates without loads of feet that reach beyond them: these begin late, or end early."""
+        cut = [one.contact for one in self.overhangs if not one.only_toe]
+        return self.plates if self.plates is None or not cut else without(self.plates, cut)
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
@@ -133,6 +150,13 @@ class RecordingContext:
         """How fast the body is by markers and by forces, one entry per measured window."""
         return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
 
+    @cached_property
+    def force_mass(self) -> ForceMass | None:
+        """Body mass by the vertical force; None where forces or markers do not show it."""
+        if self.trial is None:
+            return None
+        return force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
+
     def at(self, **where: Any) -> Where:
         """A place in this recording: `at(plate="plate 1", **self.along(2))`."""
         return Where(trial=self.name, **where)
@@ -155,6 +179,7 @@ class PersonContext:
         calibrated: markers and joints of the model are to move.
         total_mass: what was stated of the body and of what was worn; None where no mass is known.
         found: findings of the recordings themselves, where a question depends on them.
+        more_statics: recordings in which the person stands, of which none is the static trial.
     """
 
     subject: Subject
@@ -165,3 +190,16 @@ class PersonContext:
     calibrated: bool = False
     total_mass: CarriedMass | None = None
     found: Sequence[Finding] = field(default=())
+    more_statics: Sequence[RecordingContext] = ()
+
+    @property
+    def standing(self) -> Sequence[RecordingContext]:
+        """The static trial, or every recording that may be it."""
+        return self.more_statics if self.static is None else (self.static, *self.more_statics)
+
+    def has_error(self, trial: str, *codes: str) -> bool:
+        """Whether an ERROR of one of these codes, questions or families was found in a trial."""
+        return any(
+            one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
+            for one in self.found
+        )

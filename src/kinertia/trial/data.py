@@ -356,6 +356,7 @@ class Trial:
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
         virtual_sd_m, belt: as the recording's.
+        findings: how its loads were sorted by foot.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -373,6 +374,7 @@ class Trial:
     notes: tuple[str, ...] = ()
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

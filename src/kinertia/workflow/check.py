@@ -54,8 +54,7 @@ def check_person(person: Person) -> PersonCheck:
         person: as `read_person` or `read_files` makes it.
     """
     screened = screen(person)
-    contexts = [*([] if screened.context.static is None else [screened.context.static]), *screened.context.trials]
-    contexts += screened.more_statics
+    contexts = (*screened.context.standing, *screened.context.trials)
     return PersonCheck(screened, tuple(RecordingCheck.of(one, screened.findings) for one in contexts))
 
 

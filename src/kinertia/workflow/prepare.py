@@ -11,7 +11,7 @@ from dataclasses import replace
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.swapped_markers import labels_against_model
 from kinertia.diagnostics.runner import Overrule, blocking
-from kinertia.diagnostics.subject.unseen_body import unseen_body
+from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.arm_branch import with_elbows_that_bend_forwards
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled, turn_about
@@ -112,7 +112,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     static, marker_set = context.static, context.marker_set
     if static is None or marker_set is None:
         raise SettingsError("the built-in model needs a static trial (static = ... under [model])")
-    subject = complete_subject(person.subject, [static.recording, *person.recordings])[0]
+    subject = complete_subject(person.subject, [static.recording, *person.recordings])
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
@@ -133,7 +133,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     expected = population_prior(literature_prior(literature), subject, total.body_kg)
     calibration_s = (time.perf_counter() - started) / len(turned)
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    findings = [*found, *unseen_body(skeleton), *expected.findings, *solved.findings]
+    findings = screened.overruled([*screened.findings, *found, *unobserved_segments(skeleton), *solved.findings])
     return Prepared(
         subject=subject,
         settings=settings,
@@ -144,12 +144,12 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         file=None,
         kinematics=solved.kinematics,
         seconds=solved.seconds,
-        findings=(after := tuple(screened.overruled([*screened.findings, *findings]))),
+        findings=tuple(findings),
         notes=(f"marker set: {marker_set.name}", *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
         overrule=person.overrule,
         overrule_of=person.overrule_of,
-        left_out=screened.left_out_by(after),
+        left_out=screened.left_out_by(findings),
         rules=screened.rules,
     )
 

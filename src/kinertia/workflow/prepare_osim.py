@@ -78,7 +78,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     assert model is not None
     check_trials(person.recordings)
     usable = screened.usable
-    subject = complete_subject(person.subject, person.recordings, mass_only=True)[0]
+    subject = complete_subject(person.subject, person.recordings, mass_only=True)
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
@@ -104,7 +104,8 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
     for k in solved.kinematics:
         found += [one.in_trial(k.trial.name) for one in range_findings(skeleton, k.ik)]
-    findings = [*found, *expected.findings, *solved.findings, *_assumed(model, factor, own, idle, held)]
+    found += [*solved.findings, *_assumed(model, factor, own, idle, held)]
+    findings = screened.overruled([*screened.findings, *found])
     return Prepared(
         subject=subject,
         settings=settings,
@@ -115,12 +116,12 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
         file=model,
         kinematics=solved.kinematics,
         seconds=solved.seconds,
-        findings=(after := tuple(screened.overruled([*screened.findings, *findings]))),
+        findings=tuple(findings),
         notes=(f"OpenSim model: {model.path.name}", *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
         overrule=person.overrule,
         overrule_of=person.overrule_of,
-        left_out=screened.left_out_by(after),
+        left_out=screened.left_out_by(findings),
         rules=screened.rules,
     )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.marker_set_match import MarkerSetMatch, match_labels
 from kinertia.diagnostics.plates.plate_summary import PlateCheck, check_plates
-from kinertia.diagnostics.subject.telling_movements import TellingMovements
+from kinertia.diagnostics.subject.movements import InformativeMovements
 from kinertia.findings.finding import Finding
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
@@ -23,7 +23,7 @@ class RecordingCheck:
         context: what the questions were asked of.
         marker_set: how its labels fit.
         markers: visibility, over the whole recording, of the set's markers, or of all where no set fits.
-        telling: how far trunk and pelvis move, or None.
+        movements: how far trunk and pelvis move, or None.
         plates: one entry per plate; empty without forces.
         windows: in which every foot on the ground stands on a plate, longest first.
         findings: of this recording, with what explains and what overrules them.
@@ -32,7 +32,7 @@ class RecordingCheck:
     context: RecordingContext
     marker_set: MarkerSetMatch
     markers: tuple[Visibility, ...]
-    telling: TellingMovements | None
+    movements: InformativeMovements | None
     plates: tuple[PlateCheck, ...]
     windows: tuple[tuple[float, float], ...]
     findings: tuple[Finding, ...]
@@ -42,15 +42,15 @@ class RecordingCheck:
         """Of a recording that was screened; `findings` are the whole person's."""
         recording, used = context.recording, context.marker_set
         trial = context.trial
-        telling = None
+        movements = None
         if used is not None:
             pelvis, torso = (used.segments.get(name, ()) for name in ("pelvis", "torso"))
-            telling = TellingMovements.of(recording.markers, pelvis, torso)
+            movements = InformativeMovements.of(recording.markers, pelvis, torso)
         return cls(
             context,
             match_labels(recording.markers.labels, used)[0],
             visibility(context.markers),
-            telling,
+            movements,
             check_plates(recording, context.feet),
             () if trial is None else tuple(trial.windows()),
             tuple(one for one in findings if one.where.trial == context.name),
@@ -86,8 +86,8 @@ class RecordingCheck:
             ("labels", f"{len(markers.labels)}, {len(match.others)} not in the marker set"),
             ("marker set", named if had else "none known"),
         ]
-        if self.telling is not None:
-            facts.append(("movement", self.telling.sentence()))
+        if self.movements is not None:
+            facts.append(("movement", self.movements.sentence()))
         if missing and had:
             facts.append(("missing labels", ", ".join(missing)))
         if plates is None:

@@ -39,6 +39,7 @@ MOTION_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     *markers.MOTION_QUESTIONS,
     *labels.MOTION_QUESTIONS,
     *SIGNAL_QUESTIONS,
+    *timing.QUESTIONS,
     *PLACE_QUESTIONS,
     *LOADED_QUESTIONS,
 )
@@ -56,13 +57,11 @@ class Screened:
     Attributes:
         person: as given.
         context: what the questions were asked of: every recording, also those that are left out.
-        more_statics: recordings in which the person stands, of which none is the static trial.
         findings: all of them, with what explains and what overrules them.
     """
 
     person: Person
     context: PersonContext
-    more_statics: tuple[RecordingContext, ...]
     findings: tuple[Finding, ...]
 
     @property
@@ -112,9 +111,7 @@ def screen(person: Person) -> Screened:
     by_label = person.labels
     if isinstance(by_label, MarkerSetError) and by_label.finding is not None:
         found.append(by_label.finding)
-    statics = () if context.static is None else (context.static,)
-    more_statics = tuple(_static_context(person, one) for one in person.more_statics)
-    for static in (*statics, *more_statics):
+    for static in context.standing:
         found += _of_recording(static, STATIC_QUESTIONS)
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
@@ -133,7 +130,16 @@ def person_context(person: Person) -> PersonContext:
         for item in person.trials
     ]
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
-    return PersonContext(stated, trials, static, label_set, person.model, person.calibrate, total)
+    return PersonContext(
+        stated,
+        trials,
+        static,
+        label_set,
+        person.model,
+        person.calibrate,
+        total,
+        more_statics=[_static_context(person, one) for one in person.more_statics],
+    )
 
 
 def _label_set(person: Person) -> MarkerSet | None:
@@ -152,7 +158,7 @@ def _completed(person: Person) -> Subject:
     """What is stated, with what files add; as stated where it is incomplete."""
     recordings = [*([] if person.static is None else [person.static]), *person.recordings]
     try:
-        return complete_subject(person.subject, recordings, mass_only=True)[0]
+        return complete_subject(person.subject, recordings, mass_only=True)
     except KinertiaError:
         return person.subject
 

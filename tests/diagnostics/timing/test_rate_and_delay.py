@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.trial.data import Markers
-from loads_and_feet import load_places_trouble
+from loads_and_feet import doubted, error_of
 from walk_on_plates import ALL_STEPS, FEET, STRIDE_M
 from walk_on_plates import walk as simple_walk
 
@@ -37,33 +37,32 @@ def late(recording, by_s):
 
 @pytest.mark.parametrize("steps", [FEW_STEPS, ALL_STEPS], ids=["two plates", "all steps"])
 @pytest.mark.parametrize("factor", [1.2, 0.8, 2.0])
-def test_a_wrong_rate_is_no_late_clock(steps, factor):
-    trouble = load_places_trouble(marked_at(c3d_lab(steps), factor), FEET)
-    assert trouble.startswith("markers and forces do not run at the same speed, by a factor of about ")
-    assert float(trouble.partition("of about ")[2].partition(":")[0]) == pytest.approx(factor, rel=0.02)
+def test_a_wrong_rate_is_no_delay(steps, factor):
+    found = error_of(marked_at(c3d_lab(steps), factor), FEET)
+    assert found.code == "T201"
+    assert found.evidence["ratio"].value == pytest.approx(factor, rel=0.02)
 
 
 @pytest.mark.parametrize("late_s", [-0.1, 0.1])
-def test_a_late_clock_is_no_wrong_rate(late_s):
-    word = "late" if late_s > 0 else "early"
-    assert f" ms {word}" in load_places_trouble(late(c3d_lab(FEW_STEPS), late_s), FEET)
+def test_a_delay_is_no_wrong_rate(late_s):
+    found = error_of(late(c3d_lab(FEW_STEPS), late_s), FEET)
+    assert found.code == "T211"
+    assert found.evidence["delay_s"].value == pytest.approx(late_s, abs=0.02)
 
 
 def test_loads_that_a_belt_takes_along_are_late():
     """On a fast belt, loads that come late are under no foot."""
     run = c3d_lab(ALL_STEPS, 0.08, 0.2, stride_m=3 * STRIDE_M, belt_m_s=3 * STRIDE_M)
-    assert load_places_trouble(run, FEET) == ""
-    trouble = load_places_trouble(late(run, 0.1), FEET)
-    assert trouble.startswith("the forces are ")
-    assert " ms late" in trouble
-    assert "of another trial" in trouble
+    assert error_of(run, FEET) is None
+    assert error_of(late(run, 0.1), FEET).code == "T211"
 
 
-def test_who_does_not_step_has_no_clock_to_compare():
+def test_who_does_not_step_has_no_time_base_to_compare():
     standing = simple_walk(ALL_STEPS)
     still = np.repeat(standing.markers.positions[:1], len(standing.markers.time), axis=0)
     markers = Markers(standing.markers.time, standing.markers.labels, still)
-    assert "speed" not in load_places_trouble(replace(standing, markers=markers), FEET)
+    found = error_of(replace(standing, markers=markers), FEET)
+    assert found is None or found.code != "T201"
 
 
 @pytest.mark.parametrize("plate", [0, 1])
@@ -71,6 +70,6 @@ def test_points_of_one_plate_in_mm(plate):
     recording = simple_walk(FEW_STEPS)
     moment = recording.plates.moment.copy()
     moment[:, plate] *= 1000.0
-    trouble = load_places_trouble(replace(recording, plates=replace(recording.plates, moment=moment)), FEET)
-    assert trouble.startswith(f"the points of plate {plate + 1} at which the forces act are ")
-    assert "in mm" in trouble
+    wrong = replace(recording, plates=replace(recording.plates, moment=moment))
+    assert error_of(wrong, FEET).where.plate == f"plate {plate + 1}"
+    assert "P204" in doubted(wrong, FEET)

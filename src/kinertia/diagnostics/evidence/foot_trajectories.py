@@ -10,13 +10,11 @@ import numpy as np
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 
 _LOW = 0.15
 """Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""
-_LEAST_BELT_M_S = 0.3
-_BELT_APART = 0.25
-"""Share by which a stated speed may differ from that of standing feet, which roll."""
+LEAST_BELT_M_S = 0.3
 _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 """A foot stands while one of its markers is slower than this share of its own fast speed, within these limits."""
 _LEAST_SWING_M_S = 1.0
@@ -33,27 +31,33 @@ _LANDING_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class FootWay:
+class FootTrajectory:
     """One foot.
 
     Attributes:
         time: (n,) s.
         back, front: (n, 2) m, horizontal places (x, z) of the two markers that are farthest apart, interpolated where
             they are not seen; the same for a foot with one marker. The foot swings forwards from back to front.
-        stands: first and last time (s) of every stretch in which it stands, and whether the trial shows both ends.
+        shown: (n,) whether both are seen, but for short gaps.
+        stands: first and last time (s) of every stance phase, and whether the trial shows both ends.
     """
 
     time: FloatArray
     back: FloatArray
     front: FloatArray
-    stands: tuple[tuple[float, float, bool], ...]
+    shown: BoolArray
+    stance_spans: tuple[tuple[float, float, bool], ...]
+
+    def seen(self, time: FloatArray) -> BoolArray:
+        """(k,) whether both ends are seen at these times, not interpolated."""
+        return self.shown[nearest_samples(self.time, time)]
 
     def standing(self, time: FloatArray) -> BoolArray:
         """(k,) whether it stands then, or a little before or after; everywhere where that cannot be told."""
-        if not self.stands:
+        if not self.stance_spans:
             return np.ones(len(time), dtype=bool)
         slack_s = _LANDING_S + TIME_TOLERANCE_S
-        spans = [(time >= start - slack_s) & (time <= end + slack_s) for start, end, _ in self.stands]
+        spans = [(time >= start - slack_s) & (time <= end + slack_s) for start, end, _ in self.stance_spans]
         result: BoolArray = np.any(spans, axis=0)
         return result
 
@@ -65,7 +69,7 @@ class FootWay:
         ahead: FloatArray = ((place - back) * along).sum(axis=1) / length
         return ahead, ahead - length
 
-    def load_path(self, time: FloatArray, weight: FloatArray) -> FloatArray:
+    def expected_cop(self, time: FloatArray, weight: FloatArray) -> FloatArray:
         """(k, 2) m, where the load of a step is expected that has this vertical force (k,) N at these times (k,)."""
         back, front = (self._at(end, time) for end in (self.back, self.front))
         share = _LOAD_BEGINS + _LOAD_GOES_ON * np.cumsum(weight) / weight.sum()
@@ -75,7 +79,7 @@ class FootWay:
     def _at(self, end: FloatArray, time: FloatArray) -> FloatArray:
         return np.column_stack([np.interp(time, self.time, end[:, axis]) for axis in range(2)])
 
-    def off_foot(self, time: FloatArray, place: FloatArray) -> FloatArray:
+    def offset_m(self, time: FloatArray, place: FloatArray) -> FloatArray:
         """(k, 2) m from the nearest point between back and front to places (k, 2) on the ground at times (k,)."""
         back, front = (self._at(end, time) for end in (self.back, self.front))
         along = front - back
@@ -84,9 +88,9 @@ class FootWay:
         return result
 
 
-def foot_ways(
+def foot_trajectories(
     markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt | None = None
-) -> tuple[FootWay, FootWay] | None:
+) -> tuple[FootTrajectory, FootTrajectory] | None:
     """Right and left foot; None where a foot is hardly seen.
 
     Args:
@@ -94,18 +98,18 @@ def foot_ways(
         feet: labels of the markers on each foot, "r" and "l".
         belt: of the treadmill, where its speed is stated.
     """
-    places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
-    if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
+    places = _foot_places(markers, feet)
+    if places is None:
         return None
     places = [_short_gaps_filled(markers.time, place) for place in places]
-    ways = []
+    trajectories = []
     for place, velocity in zip(places, _velocities(markers, places, belt), strict=True):
-        back, front = _ends(markers.time, place)
+        back, front, shown = _ends(markers.time, place)
         if _swing(velocity, front - back) < 0:
             back, front = front, back
-        stands = _stands(markers.time, np.linalg.norm(velocity, axis=2))
-        ways.append(FootWay(markers.time, back, front, stands))
-    return ways[0], ways[1]
+        spans = _stance_spans(markers.time, np.linalg.norm(velocity, axis=2))
+        trajectories.append(FootTrajectory(markers.time, back, front, shown, spans))
+    return trajectories[0], trajectories[1]
 
 
 def _swing(velocity: FloatArray, along: FloatArray) -> float:
@@ -124,7 +128,7 @@ def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | N
     velocities = [_velocity(markers.time, place) for place in places]
     belts = _belts(places, velocities)
     if stated is None:
-        belts = [belt if np.linalg.norm(belt) >= _LEAST_BELT_M_S else np.zeros(3) for belt in belts]
+        belts = [belt if np.linalg.norm(belt) >= LEAST_BELT_M_S else np.zeros(3) for belt in belts]
     else:
         belts = [stated.under(foot).velocity(markers.time, belt)[:, None] for foot, belt in enumerate(belts)]
     return [velocity - belt for velocity, belt in zip(velocities, belts, strict=True)]
@@ -147,35 +151,27 @@ def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
     return velocity
 
 
-def belt_doubts(markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt) -> list[str]:
-    """A stated speed of the belt that is not that of the standing feet."""
+def standing_speeds(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[float, float] | None:
+    """m/s of what the right and the left foot stand on; None where a foot is hardly seen."""
+    places = _foot_places(markers, feet)
+    if places is None:
+        return None
+    right, left = _belts(places, [_velocity(markers.time, place) for place in places])
+    return float(np.linalg.norm(right)), float(np.linalg.norm(left))
+
+
+def _foot_places(markers: Markers, feet: Mapping[str, Sequence[str]]) -> list[FloatArray] | None:
+    """(n, m, 3) m of the markers of each foot; None where a foot is hardly seen."""
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
-    if len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0:
-        return []
-    velocities = [_velocity(markers.time, place) for place in places]
-    belts = [float(np.linalg.norm(each)) for each in _belts(places, velocities)]
-    stated = [belt.under(f).way_m(*markers.time[[0, -1]]) / float(np.ptp(markers.time)) for f in range(len(FEET))]
-    pairs = list(zip(stated, belts, strict=True))
-    off = [abs(one - other) / max(_BELT_APART * max(one, other), _LEAST_BELT_M_S) for one, other in pairs]
-    worst = int(np.argmax(off))
-    if off[worst] <= 1.0:
-        return []
-    ratio = stated[worst] / max(belts[worst], 1e-9)
-    unit = "; it looks to be in km/h" if abs(ratio / 3.6 - 1) < _BELT_APART else ""
-    if belt.speed_m_s.ndim == 2 and np.abs(np.subtract(stated, belts[::-1])).max() < _LEAST_BELT_M_S:
-        unit = ": right and left look exchanged"
-    which = f" under the {('right', 'left')[worst]} foot" if belt.speed_m_s.ndim == 2 else ""
-    return [
-        f"the stated speed of the belt{which} is {stated[worst]:.2f} m/s on average, but standing feet go "
-        f"{belts[worst]:.2f} m/s{unit}: correct belt_speed_m_s (m/s), or leave it out"
-    ]
+    hardly = len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0
+    return None if hardly else places
 
 
 def _belts(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> list[FloatArray]:
     """(3,) m/s of what each foot stands on: of both together, unless they stand on belts of different speeds."""
     own = [_belt([place], [velocity]) for place, velocity in zip(places, velocities, strict=True)]
-    moving = min(float(np.linalg.norm(belt)) for belt in own) >= _LEAST_BELT_M_S
-    apart = float(np.linalg.norm(own[0] - own[1])) >= _LEAST_BELT_M_S
+    moving = min(float(np.linalg.norm(belt)) for belt in own) >= LEAST_BELT_M_S
+    apart = float(np.linalg.norm(own[0] - own[1])) >= LEAST_BELT_M_S
     return own if moving and apart else [_belt(places, velocities)] * len(own)
 
 
@@ -207,7 +203,7 @@ def _short_gaps_filled(time: FloatArray, place: FloatArray) -> FloatArray:
     return filled
 
 
-def _stands(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:
+def _stance_spans(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:
     """Where a foot stands whose markers have these speeds (n, m); those not seen may hide where it begins or ends."""
     slowest = np.nan_to_num(speed, nan=np.inf).min(axis=1)
     known = slowest[np.isfinite(slowest)]
@@ -228,16 +224,22 @@ def _stands(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bo
     )
 
 
-def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    flat = place[..., [0, 2]]
-    shown = np.flatnonzero(_seen(place).any(axis=0))
-    apart = np.linalg.norm(flat[:, shown, None] - flat[:, None, shown], axis=-1)
-    together = np.isfinite(apart).any(axis=0)
-    usual = np.where(together, np.nanmedian(np.where(together, apart, 0.0), axis=0), 0.0)
+def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The two markers that are farthest apart, of those that are often seen together, and where both are (n,)."""
+    flat, seen = place[..., [0, 2]], _seen(place)
+    often = (seen[:, :, None] & seen[:, None]).sum(axis=0)
+    shown = np.flatnonzero(seen.any(axis=0))
+    apart = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=-1)
+    usual = np.full(often.shape, -1.0)
+    for one in shown:
+        for other in shown:
+            if often[one, other] >= _MOSTLY * often.max():
+                usual[one, other] = float(np.nanmedian(apart[:, one, other]))
     one, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
-    return _filled(time, flat[:, shown[one]]), _filled(time, flat[:, shown[other]])
+    both = seen[:, one] & seen[:, other]
+    return _filled(time, flat[:, one]), _filled(time, flat[:, other]), both
 
 
-def _filled(time: FloatArray, way: FloatArray) -> FloatArray:
-    known = np.isfinite(way).all(axis=1)
-    return np.column_stack([np.interp(time, time[known], way[known, axis]) for axis in range(2)])
+def _filled(time: FloatArray, place: FloatArray) -> FloatArray:
+    known = np.isfinite(place).all(axis=1)
+    return np.column_stack([np.interp(time, time[known], place[known, axis]) for axis in range(2)])
