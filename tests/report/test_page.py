@@ -10,15 +10,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from kinertia.diagnostics.result.suitability import Suitability
 
 from command_line import run
 from found import FAULT_FREE, UNUSABLE
-from kinertia.diagnostics.result.suitability import Suitability
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.findings.finding import Severity
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
+from kinertia.report.finding_view import FindingView
 from kinertia.report.headline import purposes, words
 from kinertia.report.page import MOST_TRIALS, bsp_rows, render
 from kinertia.report.plotly_script import packed_script
@@ -258,9 +260,10 @@ def test_report_shows_findings_notes_and_settings(fit):
     open_ones = [one for one in UNUSABLE if one.status != "ignored"]
     for text in ("the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name, "walk 2"):
         assert text in elements.text
+    assert all(row.size in elements.text for row in FindingView([shown.overview]).corrections)
     for one in open_ones:
-        assert one.message in elements.text
-        assert one.remedy in elements.text or one.muted_by or one.severity.name in ("CORRECTED", "INFO")
+        assert one.message.rstrip(".") in elements.text or one.severity is Severity.CORRECTED
+        assert one.remedy in elements.text or one.muted_by is not None or one.severity < Severity.WARNING
     for name in fit.posterior.calibration:
         assert name in elements.text
     explained = {attrs["id"] for attrs in elements.named("h3") if attrs.get("id", "").startswith("explain-")}
