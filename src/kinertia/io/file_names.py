@@ -92,7 +92,11 @@ def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quan
     if expected not in ("", "a file"):
         hint += f" (expected {expected})"
     evidence = {"nearest": Quantity(", ".join(nearest))} if nearest else {}
-    return evidence | {"file": Quantity(path.name), "folder": Quantity(str(folder)), "hint": Quantity(hint)}
+    return evidence | {"file": Quantity(_printable(path.name)), "folder": Quantity(_printable(str(folder))), "hint": Quantity(hint)}
+
+
+def _printable(text: str) -> str:
+    return text if text.isprintable() else ascii(text)
 
 
 def _foreign_path(written: str) -> str:
