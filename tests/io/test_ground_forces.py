@@ -210,7 +210,7 @@ XML_TROUBLE = {
     "point body": (("point_expressed_in_body>ground", "point_expressed_in_body>hand"), "F146", {"entry": "point_exp"}),
     "no point": (("fA_p", ""), "F143", {"load": "A", "identifier": "point_identifier"}),
     "no force": (("fA_v", ""), "F143", {"load": "A", "identifier": "force_identifier"}),
-    "column": (("fA_p", "gA_p"), "F143", {"load": "A (loads.xml)", "identifier": "gA_px, gA_py, gA_pz", "found": "fA_vx"}),
+    "column": (("fA_p", "gA_p"), "F143", {"load": "A (loads.xml)", "identifier": "gA_px, gA_py, gA_pz"}),
     "not XML": (("</ExternalLoads>", ""), "F103", {"kind": "XML"}),
     "no loads": (("ExternalForce", "Force"), "F103", {"found": "ExternalForce"}),
 }  # fmt: skip
