@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
@@ -259,8 +262,8 @@ def test_nothing_measured_tells_when_feet_were_where():
         build_trial(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)
     idle = walk([("r", 0)])
     idle = replace(idle, plates=replace(idle.plates, force=0 * idle.plates.force, moment=0 * idle.plates.moment))
-    idle = replace(idle, left_out=("plate 2 was left out, it has no samples",))
-    with pytest.raises(TrialError, match=r"in no frame .*; plate 2 was left out, it has no samples"):
+    idle = replace(idle, findings=(finding("F151", Where(plate="plate 2"), reason=Quantity("it has no samples")),))
+    with pytest.raises(TrialError, match=r"in no frame .*; plate 2 cannot be used: it has no samples"):
         build_trial(idle, FEET)
 
 
