@@ -28,7 +28,10 @@ _IDLE_BLOCK_N, _STEADY_BLOCK_N = 150.0, 15.0
 """In a tenth of a second in which nobody steps on or off, a plate reads less than the first, and varies by less than
 the second."""
 _RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
-"""Between 20 and 50 % of its range a force under feet is for less than a tenth of the time, noise for two fifths."""
+"""Between 20 and 50 % of its peak a force under feet is for less than a tenth of the time, noise for two fifths."""
+_SWAYS, _ROUGH = 0.03, 0.1
+"""Of the peak: deviation of the load of feet that stay, at least, and its largest change from sample to sample, at
+most; noise that makes a zero of some newtons deviate as much jumps by more."""
 _GAUSSIAN = 1.4826
 """Deviation of Gaussian noise over its median absolute deviation."""
 
@@ -87,17 +90,24 @@ def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
 
 
 def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
-    """Whether a force (k,) of whatever unit is either next to nothing or nearly all there, and stays so for a while.
+    """Whether a force (k,) of whatever unit is like the load of feet: it pushes one way, is either next to nothing or
+    nearly all there, and stays so for a while; or it is always there and sways smoothly.
 
-    Noise, drift and hum are at a third of their range as often as elsewhere, or leave the upper half at once.
+    Noise, drift and hum go both ways or never back to zero, are in between as often as not, leave the upper half at
+    once, or are rough.
     """
     if len(time) < _FEWEST_IDLE:
         return False
-    low, high = np.percentile(vertical, _RANGE_PERCENT)
-    share = (vertical - low) / max(float(high - low), 1e-12)
+    low, high = np.percentile(vertical if vertical.max() > -vertical.min() else -vertical, _RANGE_PERCENT)
+    share = np.abs(vertical) / max(float(high), 1e-12)
+    if low > _RISING[1] * high:
+        after = time - time.mean()
+        sways = share - np.polyval(np.polyfit(after, share, 1), after)
+        return bool(np.std(sways) > _SWAYS) and float(np.abs(np.diff(share)).max()) < _ROUGH
     between = float(((share > _RISING[0]) & (share < _RISING[1])).mean())
     lasts = [span_s(time, first, last) for first, last in runs(share > _RISING[1])]
-    return between < _MOST_RISING and max(lasts, default=0.0) >= _SHORTEST_STEP_S
+    returns = bool(abs(low) < _RISING[0] * high)
+    return returns and between < _MOST_RISING and max(lasts, default=0.0) >= _SHORTEST_STEP_S
 
 
 def load_threshold_n(vertical: FloatArray) -> float:

@@ -63,7 +63,7 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
         others += own[1:]
         both.append(own[0].residual_m_s if own else residuals[axis].as_read)
     rotated = _rotated(context, parts, residuals, correlations, against)
-    if rotated is not None and rotated.residual_m_s <= float(np.hypot(*both)):
+    if rotated is not None and (not best or rotated.residual_m_s <= float(np.hypot(*both))):
         best, others = [rotated], [*best, *others]
     elif rotated is not None:
         others.append(rotated)
