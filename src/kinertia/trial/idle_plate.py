@@ -24,9 +24,9 @@ _FEWEST_IDLE = 20
 _IDLE_MOST_N, _STEADY_N = 3 * LOAD_THRESHOLD_N, 5.0
 """An idle level is below the first, and varies by less than the second: a foot that lands or leaves does not."""
 _BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
-_IDLE_BLOCK_N, _STEADY_BLOCK_N = 150.0, 15.0
+_IDLE_BLOCK_N, _STEADY_BLOCK_N, _IDLE_SHARE, _LEAST_PEAK_N = 150.0, 15.0, 0.2, 100.0
 """In a tenth of a second in which nobody steps on or off, a plate reads less than the first, and varies by less than
-the second."""
+the second. Of what it carries at its peak, if that is a load, it reads less than a fifth: half a child is 100 N."""
 _RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
 """Between 20 and 50 % of its peak a force under feet is for less than a tenth of the time, noise for two fifths."""
 _SWAYS, _ROUGH = 0.03, 0.1
@@ -80,7 +80,8 @@ def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
     blocks = force[: count * every].reshape(count, every, 3)
     low, high = np.percentile(blocks[..., 1], (5, 95), axis=1)
     level = np.median(blocks, axis=1)
-    idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < _IDLE_BLOCK_N)
+    most = min(_IDLE_BLOCK_N, _IDLE_SHARE * peak_n) if peak_n > _LEAST_PEAK_N else _IDLE_BLOCK_N
+    idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < most)
     if idle.sum() < _FEWEST_BLOCKS:
         return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
     x, y, z = (float(value) for value in np.median(level[idle], axis=0))

@@ -219,3 +219,14 @@ def test_late_forces_that_begin_with_copies_of_the_first_are_not_repeated():
     plate, rows = plates(), slice(1200, 1500)
     force, moment = (values[rows][np.maximum(np.arange(300) - 100, 0)] for values in (plate.force, plate.moment))
     assert found(replace(plate, time=plate.time[rows], force=force, moment=moment)) == []
+
+
+def test_a_child_who_stands_on_two_plates_is_no_zero():
+    """Each carries 98 N, as steadily as an unloaded plate."""
+    vertical = 98.0 + 20.0 * np.sin(np.pi * TIME) ** 2
+    noise = np.random.default_rng(100).normal(0.0, 1.0, (len(TIME), 3))
+    load = without_idle(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
+    force = np.repeat(load.force[:, None], 2, axis=1)
+    moment = 0.01 * force * [0.0, 1.0, 0.0]
+    plate = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None), idle=(load.idle,) * 2)
+    assert found(plate, mass_kg=20.0) == []

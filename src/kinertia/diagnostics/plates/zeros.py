@@ -13,9 +13,8 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, IdleReading
 
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
-_LEAST_N, _STANDING_N = 6.0, 240.0
-"""Twice what zeroed plates read: no limit is lower, however light the person. And 35 % of an adult's weight, more than
-which is a foot of somebody who stands on two plates."""
+_LEAST_N = 6.0
+"""Twice what zeroed plates read: no limit is lower, however light the person."""
 _STEP_N, _MOST_UNLOADED_N, _STEADY_N = 350.0, 150.0, 15.0
 _UNLOADED_PERCENT = (2.0, 15.0)
 """A plate that somebody walks over is unloaded for at least so many percent of the record."""
@@ -32,13 +31,12 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
     if plates is None:
         return
     for p, (name, idle) in enumerate(zip(plates.names, plates.idle or (_UNKNOWN,) * len(plates.names), strict=True)):
-        stood_on = abs(idle.level_n[1]) > _STANDING_N * share
-        drifts = abs(idle.drift_n) > _limit_n(_DRIFT_N, share) and not stood_on
+        drifts = abs(idle.drift_n) > _limit_n(_DRIFT_N, share)
         if drifts:
             drift = Quantity(idle.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
             yield finding("P211", context.at(plate=name, **context.along(1)), drift_n=drift)
         vertical = False
-        for axis, level_n in enumerate(() if stood_on else idle.level_n):
+        for axis, level_n in enumerate(idle.level_n):
             if abs(level_n) > _limit_n(_ZERO_N, share) and not (drifts and axis == 1):
                 far = axis == 1 and abs(level_n) > _FAR_FROM_ZERO_N * share
                 vertical |= axis == 1

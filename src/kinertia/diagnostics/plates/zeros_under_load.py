@@ -14,7 +14,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
 from kinertia.diagnostics.evidence.velocity_residual import HORIZONTAL, VelocityResidual
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.model.skeleton import GRAVITY_M_S2
@@ -61,22 +61,19 @@ def _unexplained(
     if abs(force_n) <= limit_n:
         return None
     weight_n = GRAVITY_M_S2 * float(np.mean([part.mass_kg for part in parts]))
+    evidence = {
+        "force_n": Quantity(force_n, "N", limit=limit_n, usual=(-8.0, 8.0)),
+        "tilt_rad": Quantity(float(np.arctan(force_n / weight_n)), "rad"),
+    }
     levels, causes = _levels(plates, axis), rule("P214").causes
-    evidence = {} if levels is None else {"unloaded_n": Quantity(tuple(levels.tolist()), "N")}
     if levels is not None:
+        evidence["unloaded_n"] = Quantity(tuple(levels.tolist()), "N")
         shares = [
             (plates.force[within(plates.time, *part.time[[0, -1]]), :, 1] > 0.0).mean(axis=0) @ levels for part in parts
         ]
         agree = abs(force_n - float(np.average(shares, weights=spans**3))) < _AGREES * abs(force_n)
         causes = tuple(sorted(causes, key=lambda cause: ("P213" in cause) != agree))
-    return finding(
-        "P214",
-        context.at(**context.along(axis)),
-        causes=causes,
-        force_n=Quantity(force_n, "N", limit=limit_n, usual=(-8.0, 8.0)),
-        tilt_rad=Quantity(float(np.arctan(force_n / weight_n)), "rad"),
-        **evidence,
-    )
+    return with_evidence("P214", context.at(**context.along(axis)), evidence, causes=causes)
 
 
 def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
@@ -104,13 +101,14 @@ def _plate_zero(
     names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * _CLEARLY_BEST < zeroed)]
     if all_plates and not (len(names) == 1 and zeroed < _CLEARLY_BEST * residual.without_trend):
         return None
+    evidence = {
+        "offset_n": Quantity(zero_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
+        "velocity_residual_m_s": residual.once(zeroed, limit_m_s),
+    }
     levels = _levels(plates, axis)
-    unloaded = {} if levels is None else {"unloaded_n": Quantity(float(levels[best]), "N")}
-    return finding(
-        "P212",
-        context.at(plate=names[0] if len(names) == 1 else None, **context.along(axis)),
-        offset_n=Quantity(zero_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
-        velocity_residual_m_s=residual.once(zeroed, limit_m_s),
-        **unloaded,
-        **({} if len(names) == 1 else {"plate": Quantity(" or ".join(names))}),
-    )
+    if levels is not None:
+        evidence["unloaded_n"] = Quantity(float(levels[best]), "N")
+    if len(names) > 1:
+        evidence["plate"] = Quantity(" or ".join(names))
+    place = context.at(plate=names[0] if len(names) == 1 else None, **context.along(axis))
+    return with_evidence("P212", place, evidence)
