@@ -1,16 +1,15 @@
-"""Torques of a force file that are not free moments at the points beside them are named; those that are never are."""
+"""Torques of a force file that are not free moments at the points beside them are found; those that are never are."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.doubts import trial_doubts
+from kinertia.diagnostics.plates.free_moments import free_moments
+from kinertia.findings.quantity import Quantity
 from kinertia.io.ground_forces import read_forces
-from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_table, write_table
-from kinertia.trial.exchanged_torques import exchanged_torques_doubts
-from kinertia.trial.torque_columns import torque_columns_doubts
+from plate_findings import plates_alone
 from recordings import WALKS, here
 
 MADE = (
@@ -51,7 +50,6 @@ SOUND = here(
     ]
 )
 WITHOUT_COLUMNS = [name for name in ("synthetic c3d", "plug-in gait a", "plug-in gait b") if name in WALKS]
-SAID_OF = [name for name in ("synthetic", "gait2354") if name in WALKS]
 
 
 @pytest.fixture
@@ -75,16 +73,20 @@ def changed(file_of, tmp_path):
     return change
 
 
+def columns(plates):
+    """What is found of torque columns: not of free moments that a file does not have."""
+    found = free_moments(plates_alone(plates))
+    return [one for one in found if one.code != "P264" and one.evidence.get("method") != Quantity("fixed point")]
+
+
 @pytest.mark.parametrize("name", SOUND)
-def test_sound_files(file_of, name):
-    plates = read_forces(file_of(name))
-    assert torque_columns_doubts(plates) == []
-    assert exchanged_torques_doubts(plates) == []
+def test_fault_free_files(file_of, name):
+    assert columns(read_forces(file_of(name))) == []
 
 
 @pytest.mark.parametrize("name", WITHOUT_COLUMNS)
 def test_plates_of_a_c3d_file_have_no_torque_columns(recording_of, name):
-    assert torque_columns_doubts(recording_of(*WALKS[name]).plates) == []
+    assert columns(recording_of(*WALKS[name]).plates) == []
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -97,24 +99,22 @@ def test_moments_about_another_point(changed, name, axis):
         arm[axis] = 0.02
         return [(force, point, torque + np.cross(arm, force)) for force, point, torque in groups]
 
-    (doubt,) = torque_columns_doubts(changed(name, other_point))
-    assert doubt.startswith("the torques of the force file do not go with the points of application beside them: those")
-    assert doubt.count("20 mm times the vertical force") == 2
-    assert "about another point" in doubt
+    found = columns(changed(name, other_point))
+    assert [one.code for one in found] == ["P261"] * 2
+    assert [one.evidence["arm_m"].value for one in found] == pytest.approx([0.02] * 2, abs=0.002)
 
 
-@pytest.mark.parametrize(("axis", "named"), [(0, "along X"), (2, "along Z")])
+@pytest.mark.parametrize("axis", [0, 2])
 @pytest.mark.parametrize("name", GROUPS)
-def test_free_moment_in_another_column(changed, name, axis, named):
+def test_free_moment_in_another_column(changed, name, axis):
     def exchange(groups):
         order = [0, 1, 2]
         order[1], order[axis] = axis, 1
         return [(force, point, torque[:, order]) for force, point, torque in groups]
 
-    (doubt,) = torque_columns_doubts(changed(name, exchange))
-    assert doubt.startswith("the torques of the force file are about a horizontal axis: those of")
-    assert doubt.count(named) == 2
-    assert "not turned with the forces" in doubt
+    plates = changed(name, exchange)
+    named = plates_alone(plates).along(axis)["axis"]
+    assert [(one.code, one.where.axis) for one in columns(plates)] == [("P262", named)] * 2
 
 
 @pytest.mark.parametrize("name", GROUPS)
@@ -124,9 +124,9 @@ def test_torques_of_the_other_plate(changed, name):
         return [(force, point, other_torque), (other_force, other_point, torque)]
 
     plates = changed(name, exchange)
-    assert torque_columns_doubts(plates) == []
-    (doubt,) = exchanged_torques_doubts(plates)
-    assert doubt.startswith(f"the free moments (torques) of {plates.names[0]} and {plates.names[1]} are exchanged: ")
+    (found,) = columns(plates)
+    assert found.code == "P263"
+    assert (found.evidence["plate"].value, found.evidence["other"].value) == plates.names
 
 
 @pytest.mark.parametrize("size_nm", [0.3, 3.0, 5.0, 8.0, 15.0, 3000.0])
@@ -141,7 +141,7 @@ def test_what_an_unloaded_plate_reads_is_no_torque_of_the_other(changed, name, s
             for force, point, torque in groups
         ]
 
-    assert exchanged_torques_doubts(changed(name, noisy)) == []
+    assert "P263" not in [one.code for one in columns(changed(name, noisy))]
 
 
 @pytest.mark.parametrize("middle", [(0.0, 0.0, 0.0), (0.9, 0.0, 0.3)])
@@ -159,29 +159,4 @@ def test_forces_at_a_point_that_stays_with_all_their_moments(changed, file_of, n
     moved, whole = changed(name, at_the_middle), read_forces(file_of(name))
     loaded = whole.force[..., 1] > 20.0
     np.testing.assert_allclose(moved.moment[loaded], whole.moment[loaded], atol=1e-3)
-    assert torque_columns_doubts(moved) == []
-
-
-@pytest.mark.parametrize("name", SAID_OF)
-def test_said_of_a_trial(changed, recording_of, name):
-    """By `check` and by every fit: both ask for these."""
-    recording = recording_of(*WALKS[name])
-    marker_set = choose_marker_set(recording.markers.labels)
-    feet = {
-        side: [one for one in own if one in recording.markers.labels] for side, own in marker_set.foot_labels().items()
-    }
-
-    def said(arm):
-        plates = changed(
-            WALKS[name][1],
-            lambda groups: [(f, p, torque + np.cross([arm, 0.0, 0.0], f)) for f, p, torque in groups],
-        )
-        return trial_doubts(replace(recording, plates=plates), marker_set, None, feet)
-
-    (doubt,) = said(0.02)
-    assert "do not go with the points of application" in doubt.sentence
-    assert not doubt.refused
-    # far off the feet the trial is refused, and told why
-    (doubt,) = said(0.5)
-    assert doubt.refused
-    assert "do not go with the points of application" in doubt.sentence
+    assert columns(moved) == []

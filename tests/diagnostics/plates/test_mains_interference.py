@@ -1,11 +1,13 @@
-"""A hum of the mains is named with its frequency, plate and axis; sound forces have none."""
+"""Mains interference is found with its frequency, plate and axis; fault-free forces have none."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.mains_hum import hum_doubts, hum_trouble
+from kinertia.diagnostics.plates.mains_interference import mains_interference
+from kinertia.findings.finding import Severity
+from plate_findings import plates_alone
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS, named_here
 
 OTHERS = {
@@ -24,23 +26,23 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
-def test_sound_forces(name, recording_of):
-    plates = recording_of(*{**WALKS, **OTHERS}[name]).plates
-    assert hum_trouble(plates) == ""
-    assert hum_doubts(plates) == []
+def test_fault_free_forces(name, recording_of):
+    assert [*mains_interference(plates_alone(recording_of(*{**WALKS, **OTHERS}[name]).plates))] == []
 
 
 @pytest.mark.parametrize("name", WALKS)
 @pytest.mark.parametrize("mains_hz", [50.0, 60.0])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_hum(name, mains_hz, axis, recording_of):
+def test_interference(name, mains_hz, axis, recording_of):
     plates = recording_of(*WALKS[name]).plates
     hum = np.sin(2 * np.pi * mains_hz * plates.time + 1.0)
-    for size, refused in ((8.0, False), (25.0, True)):
+    for size, severity in ((8.0, Severity.WARNING), (25.0, Severity.ERROR)):
         force = plates.force.copy()
         loaded = force[:, 0, 1] > 0
         force[loaded, 0, axis] += size * hum[loaded]
-        (sentence,) = hum_doubts(replace(plates, force=force))
-        assert f"N at {mains_hz:g} Hz ({plates.names[0]}, along {'XYZ'[axis]})" in sentence
-        assert float(sentence.partition("with ")[2].partition(" N")[0]) == pytest.approx(size, rel=0.15)
-        assert bool(hum_trouble(replace(plates, force=force))) == refused
+        context = plates_alone(replace(plates, force=force))
+        (found,) = mains_interference(context)
+        assert (found.code, found.severity) == ("P107", severity)
+        assert found.where == context.at(plate=plates.names[0], **context.along(axis))
+        assert found.evidence["amplitude_n"].value == pytest.approx(size, rel=0.15)
+        assert found.evidence["frequency_hz"].value == mains_hz
