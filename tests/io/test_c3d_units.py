@@ -84,5 +84,6 @@ def test_a_plate_whose_moments_nobody_can_convert_is_left_out(tmp_path):
     found = only(recording.findings, "F151", reason="in Nm while points are in mm")
     assert (found.where.plate, found.severity) == ("plate 1", Severity.WARNING)
     assert recording.left_out == (found.message,)
-    with pytest.raises(TrialError):
+    with pytest.raises(TrialError) as caught:
         assign_plates(recording, {"r": ("M0",), "l": ("M1",)})
+    assert caught.value.finding.code == "P271"

@@ -218,8 +218,8 @@ def _long_enough(
     if not used:
         first, last = max(windows, key=lambda run: run[1] - run[0])
         longest = Where(span_s=(float(time[first]), float(time[last])))
-        frames = Quantity(last - first + 1, "1", limit=FEWEST_FRAMES)
-        raise TrialError.found(trial.name, "P279", at=longest, frames=frames)
+        few = Quantity(last - first + 1, "1", limit=FEWEST_FRAMES)
+        raise TrialError.found(trial.name, "P279", at=longest, frames=few)
     frames = sum(last - first + 1 for first, last in used)
     left_out = sum(last - first + 1 for first, last in windows) - frames
     found = []
