@@ -18,11 +18,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from kinertia.errors import MarkerSetError
+from kinertia.errors import MarkerSetError, problem_of
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model import joint_centres as jc
 from kinertia.model.anthropometry import BodyGeometry
 from kinertia.model.coordinate_range import Range
-from kinertia.model.marker_set import MarkerSet
+from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial.data import Recording
 
@@ -121,10 +124,8 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     for joint in joints:
         directions = [axis.direction for axis in joint.axes]
         if not all(np.isfinite(part).all() for part in (joint.rotation, joint.translation, directions)):
-            raise MarkerSetError(
-                f"the static trial gives no frame for the {joint.child}: landmarks of it or of the {joint.parent} "
-                f"coincide or lie in line; check the static trial and the marker set '{marks.marker_set.name}'"
-            )
+            found = finding("S206", Where(part=in_words(joint.child)), parent=Quantity(joint.parent))
+            raise MarkerSetError(problem_of(found)).with_finding(found)
     worn = _markers(marks, frames)
     if not any(marker.segment == "torso" for marker in worn):
         worn = (*worn, *VIRTUAL_TRUNK)
