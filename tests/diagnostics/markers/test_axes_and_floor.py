@@ -1,6 +1,5 @@
 """Another unit, another axis up and a vertical that is tilted along the walk are found; in level laboratories never."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,10 +42,7 @@ OTHERS = here(
 
 def read(recording_of, name, turn=None):
     markers = recording_of(name).markers
-    if "r_calc" in markers.labels:
-        marker_set = read_marker_set(OPENCAP)
-    else:
-        marker_set = choose_marker_set(markers.labels)
+    marker_set = read_marker_set(OPENCAP) if "r_calc" in markers.labels else choose_marker_set(markers.labels)
     return context_of(markers if turn is None else markers.rotated(turn), marker_set)
 
 

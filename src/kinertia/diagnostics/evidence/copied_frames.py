@@ -94,7 +94,8 @@ def _amid_motion(distance: FloatArray, repeated: BoolArray) -> bool:
 
     Coordinates that are rounded repeat as well, where a person hardly moves.
     """
-    distance = np.where(np.isfinite(distance).any(axis=1)[:, None], distance, 0.0)
+    hidden = ~np.isfinite(distance).any(axis=1, keepdims=True)
+    distance = np.where(hidden, 0.0, distance)
     moving = float(np.nanmedian(distance[~repeated])) if (~repeated).any() else np.inf
     beside = [np.nanmedian(distance[[first - 1, last + 1]], axis=1).min() for first, last in _inner(repeated)]
     return max(beside, default=0.0) > max(LEAST_MOTION_M, 0.5 * moving)

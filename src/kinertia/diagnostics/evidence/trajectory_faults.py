@@ -103,7 +103,8 @@ class TrajectoryFaults:
     @property
     def labels(self) -> frozenset[str]:
         """Of all markers with faults."""
-        return frozenset(one.label for one in (*self.spikes, *self.jumps, *self.filled))
+        found: tuple[Spikes | Jump | Filled, ...] = (*self.spikes, *self.jumps, *self.filled)
+        return frozenset(one.label for one in found)
 
 
 MOST_SPIKES = 2
@@ -141,7 +142,7 @@ def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray
         if not frames.size:
             continue
         span = (float(markers.time[1 + frames[0]]), float(markers.time[1 + frames[-1]]))
-        count = np.count_nonzero(far[frames, k])
+        count = int(np.count_nonzero(far[frames, k]))
         found.append(Spikes(markers.labels[k], float(off[frames, k].max()), len(frames), count, span))
     return tuple(found)
 

@@ -21,7 +21,7 @@ from kinertia.diagnostics.evidence.landmarks import (
     landmark_positions,
     unit,
 )
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray
@@ -59,7 +59,7 @@ class _Body:
         """The finding that the labels of these landmarks are swapped."""
         self.blamed.update(landmarks)
         labels = [label for name in landmarks for label in self.marker_set.landmarks.get(name, ())]
-        return finding(code, self.context.at(markers=tuple(dict.fromkeys(labels))), **evidence)
+        return with_evidence(code, self.context.at(markers=tuple(dict.fromkeys(labels))), evidence)
 
 
 def anatomy(context: RecordingContext) -> Iterator[Finding]:

@@ -42,7 +42,8 @@ def direction_of_travel(context: RecordingContext) -> Iterator[Finding]:
     if context.marker_set is None or not context.marker_set.landmarks:
         return
     places = landmark_positions(context.all_markers, context.marker_set)
-    known, causes = headings(places), ("walking backwards",)
+    known = headings(places)
+    causes: tuple[str, ...] = ("walking backwards",)
     if not known and set(_ASIS) <= set(places):
         known = {"pelvis": np.cross([0.0, 1.0, 0.0], places["asis_r"] - places["asis_l"])}
         causes = ("walking backwards", "swapped left and right labels")

@@ -11,14 +11,14 @@ and legs in eight of these trials which change a distance by more than 60 mm, th
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers
@@ -85,13 +85,12 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
         involved = (odd, *(label for label in mates if label != odd))
         if worst.change_m < in_any_case and not any(_elsewhere(markers, marker_set, one) for one in involved):
             continue
-        yield finding(
-            "L213",
-            context.at(markers=involved),
-            change_m=Quantity(worst.change_m, "m", limit=worst.limit_m, usual=_USUAL_M),
-            segment=Quantity(worst.joined),
-            **_better(markers, marker_set, odd, worst.change_m),
-        )
+        evidence = {
+            "change_m": Quantity(worst.change_m, "m", limit=worst.limit_m, usual=_USUAL_M),
+            "segment": Quantity(worst.joined),
+        }
+        better = _better(markers, marker_set, odd, worst.change_m)
+        yield with_evidence("L213", context.at(markers=involved), evidence | better)
 
 
 def _elsewhere(markers: Markers, marker_set: MarkerSet, odd: str) -> bool:
@@ -106,7 +105,7 @@ def _elsewhere(markers: Markers, marker_set: MarkerSet, odd: str) -> bool:
     return any(change < _ELSEWHERE * mine for change in changes.values())
 
 
-def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) -> Mapping[str, Quantity]:
+def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) -> dict[str, Quantity]:
     """With which marker of another segment a marker goes, as evidence; empty where with none."""
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
     mates = [mate for mate in markers.labels if mate in owners and owners[mate] != owners.get(odd)]

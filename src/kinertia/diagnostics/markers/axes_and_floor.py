@@ -12,7 +12,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.landmarks import landmark_positions
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 from kinertia.trial.marker_quality import UPRIGHT_SHARE, extent_m
@@ -51,9 +51,8 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
     if line is not None:
         evidence["feet_to_pelvis_m"] = Quantity((float(line[0]), float(line[1]), float(line[2])), "m")
     expected = context.recording.vertical.lstrip("+")
-    yield finding(
-        "M142", context.at(), **evidence, up=Quantity(f"-{name}" if negative else name), expected=Quantity(expected)
-    )
+    evidence |= {"up": Quantity(f"-{name}" if negative else name), "expected": Quantity(expected)}
+    yield with_evidence("M142", context.at(), evidence)
 
 
 def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
