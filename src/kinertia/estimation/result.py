@@ -16,9 +16,9 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.model.anthropometry import SEGMENTS
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
+from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Skeleton

@@ -25,7 +25,7 @@ from kinertia.estimation.input_checks import complete_subject
 from kinertia.findings.finding import Finding
 from kinertia.findings.rule import matching
 from kinertia.model.marker_set import MarkerSet
-from kinertia.settings import Overrule, Subject
+from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.person import Person
