@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import known
@@ -35,6 +35,10 @@ class Prepared:
         seconds: computing time by stage, one entry per trial.
         warnings, notes: one sentence each.
         attached: what the person wore or carried.
+        elbow_rotations_rad: side ("r", "l") -> by how much the trials turned an elbow axis of the static trial
+            (`arm_branch.elbow_rotations`).
+        torso_rotation_rad: by how much calibration would have turned the torso under its markers, which were kept from
+            it; None where it would not.
 
     Examples:
         >>> ready = kinertia.prepare_subject("lab/subject.toml")
@@ -54,6 +58,8 @@ class Prepared:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     attached: tuple[Attached, ...] = ()
+    elbow_rotations_rad: Mapping[str, float] = field(default_factory=dict)
+    torso_rotation_rad: float | None = None
 
     @property
     def carried(self) -> CarriedMass:

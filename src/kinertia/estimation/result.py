@@ -202,6 +202,7 @@ class Fit:
         notes: assumptions made on the way; one sentence each.
         file: the OpenSim model that the skeleton is from, if it is.
         corrections: apparent errors of instruments and files that the estimate has put right; one sentence each.
+        evaluations: of the two-level estimate; 0 of the other one, and in files of before.
 
     Examples:
         >>> mass = fit.bsp[fit.bsp.parameter == "mass"]  # fit = kinertia.fit_subject("subject.toml")
@@ -223,6 +224,7 @@ class Fit:
     notes: tuple[str, ...]
     file: OsimModel | None = None
     corrections: tuple[str, ...] = ()
+    evaluations: int = 0
 
     @cached_property
     def bsp(self) -> pd.DataFrame:

@@ -76,7 +76,8 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         problem = "; ".join([_nothing_measured(recording.markers.time, loads, contact, window_s), *recording.left_out])
         raise TrialError(recording.name, problem)
     told = (*recording.notes, *notes)
-    return Trial(recording.name, recording.markers, loads, measured, told, recording.virtual_sd_m, recording.belt)
+    own = recording.virtual_sd_m, recording.belt, recording.vertical
+    return Trial(recording.name, recording.markers, loads, measured, told, *own)
 
 
 def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[str, ...]]:
