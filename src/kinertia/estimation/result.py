@@ -205,6 +205,7 @@ class Fit:
         file: the OpenSim model that the skeleton is from, if it is.
         left_out: names of the trials that could not be used.
         rules: how many rules were asked.
+        evaluations: of the two-level estimate; 0 of the other one.
 
     Examples:
         >>> mass = fit.bsp[fit.bsp.parameter == "mass"]  # fit = kinertia.fit_subject("subject.toml")
@@ -227,6 +228,7 @@ class Fit:
     file: OsimModel | None = None
     left_out: tuple[str, ...] = ()
     rules: int = 0
+    evaluations: int = 0
 
     @property
     def overview(self) -> Overview:

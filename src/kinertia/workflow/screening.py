@@ -116,9 +116,8 @@ def screen(person: Person) -> Screened:
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
     found += _of_person(context, found)
-    return Screened(
-        person, context, more_statics, tuple(_overruled(explained(found), person.overrule, person.overrule_of))
-    )
+    findings = overruled(explained(found), person.overrule, person.overrule_of)
+    return Screened(person, context, tuple(findings))
 
 
 def person_context(person: Person) -> PersonContext:
