@@ -12,7 +12,7 @@ from typing import Annotated, Any, NoReturn, get_type_hints
 import typer
 
 from kinertia.cli.terminal import out, print_json
-from kinertia.errors import BlockedError, KinertiaError
+from kinertia.errors import KinertiaError, findings_of
 
 _AS_JSON = Annotated[bool, typer.Option("--json", help="Print the results as JSON, for scripts, and nothing else.")]
 
@@ -41,8 +41,7 @@ def add_command(app: typer.Typer, command: Callable[..., Any], name: str | None 
 
 def of_error(error: KinertiaError) -> dict[str, Any]:
     """What a script needs of an error: its text, and the findings that it is of."""
-    findings = error.findings if isinstance(error, BlockedError) else filter(None, [error.finding])
-    return {"error": str(error), "findings": [one.to_dict() for one in findings]}
+    return {"error": str(error), "findings": [one.to_dict() for one in findings_of(error)]}
 
 
 def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Callable[..., NoReturn]:
